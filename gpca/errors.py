@@ -1,0 +1,15 @@
+"""The one exception for a user's mistake: shown as one line, never as a traceback."""
+
+from __future__ import annotations
+
+
+class InputError(ValueError):
+    """A fault in something the user gave: a file, a folder, a setting, a name.
+
+    The message is one line that names the thing, what is wrong with it and what to do.
+    The command line prints it to stderr and exits with status 2.
+    """
+
+    def __init__(self, subject: object, fault: str, remedy: str = "") -> None:
+        line = f"{subject}: {fault}" + (f"; {remedy}" if remedy else "")
+        super().__init__(" ".join(line.split()))

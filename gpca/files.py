@@ -1,0 +1,82 @@
+"""Reading and writing: whole files or none, arrays without pickles, every fault said in one line."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from gpca.errors import InputError
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; on success it is renamed to `path`, on failure removed.
+
+    A reader therefore never sees half a file, and a killed run leaves the old one in place.
+    The temporary name keeps the suffix, because several writers choose their format by it.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    try:
+        yield partial
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write an npz whose bytes depend on the arrays alone (NumPy stamps every member 1980-01-01)."""
+    with whole_file(path) as partial:
+        np.savez(partial, allow_pickle=False, **arrays)
+
+
+def load_arrays(
+    path: str | Path, shapes: Mapping[str, tuple[int | str, ...]], made_by: str
+) -> dict[str, np.ndarray]:
+    """Load an npz and check the arrays that a stage needs.
+
+    Args:
+        path: the file.
+        shapes: for each needed array its shape; a number must match, a letter (``"S"``) must be the
+            same size wherever it occurs.
+        made_by: the command that writes such a file; named in the message.
+
+    Raises:
+        InputError: missing or unreadable file, pickled objects, missing array, wrong shape, NaN or infinity.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no such file", f"make it with '{made_by}'")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except (OSError, EOFError, ValueError, zipfile.BadZipFile, AttributeError) as fault:
+        reason = "holds pickled objects, which are never loaded" if "pickle" in str(fault).lower() else (
+            "is not a readable npz archive"
+        )
+        raise InputError(path, reason, f"make it anew with '{made_by}'") from fault
+    sizes: dict[str, int] = {}
+    for name, shape in shapes.items():
+        if name not in arrays:
+            raise InputError(path, f"array '{name}' is missing", f"make it anew with '{made_by}'")
+        _check_array(path, name, arrays[name], shape, sizes, made_by)
+    return arrays
+
+
+def _check_array(path, name, array, shape, sizes, made_by) -> None:
+    matches = array.ndim == len(shape) and all(
+        sizes.setdefault(size, actual) == actual if isinstance(size, str) else size == actual
+        for size, actual in zip(shape, array.shape, strict=True)
+    )
+    if not matches:
+        expected = "×".join(str(sizes.get(size, size)) for size in shape) or "scalar"
+        actual = "×".join(map(str, array.shape)) or "scalar"
+        raise InputError(path, f"array '{name}' is {actual}, not {expected}", f"make it anew with '{made_by}'")
+    if np.issubdtype(array.dtype, np.floating) and not np.isfinite(array).all():
+        raise InputError(path, f"array '{name}' holds NaN or infinity", f"make it anew with '{made_by}'")
