@@ -1,0 +1,1 @@
+"""Point-cloud encoders, one file each, and how they are trained."""

@@ -1,0 +1,118 @@
+"""EdgeConv (Wang et al. 2019) evaluated per point instead of per edge.
+
+The edge function is one linear layer W on ``[x_j - x_i ; x_i]``. With ``W = [W1 | W2]`` it splits into
+
+    y_ij = W1 x_j + (W2 - W1) x_i = A_j + C_i ,
+
+so the matrix product runs over N points, not N·k edges. Batch normalisation is affine and LeakyReLU monotone, hence
+
+    max_j act(γ (y_ij - μ)/σ + β) = act(γ (ext_j y_ij - μ)/σ + β),  ext = max where γ >= 0, min where γ < 0.
+
+In training μ and σ² are those of all B·N·k edges, exactly as a per-edge layer would compute them; one pass over the
+neighbours gathers maxima and sums together (:mod:`gpca.encoders.edge_kernels`). The plain per-edge form is kept in
+``tests/encoders/per_edge.py``; outputs, running statistics and all gradients agree with it.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+
+from gpca.encoders import edge_kernels
+
+NEGATIVE_SLOPE = 0.2
+
+
+def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
+    """Return the indices (B, N, k) of each point's k nearest points in feature space, itself included.
+
+    The order within a neighbourhood is unspecified, because EdgeConv does not depend on it.
+    """
+    x_B_N_F = x_B_N_F.detach()
+    squares_B_1_N = (x_B_N_F * x_B_N_F).sum(-1)[:, None, :]
+    # |x_i|² is the same for a whole row and does not change which points are nearest.
+    distances_B_N_N = torch.baddbmm(squares_B_1_N, x_B_N_F, x_B_N_F.transpose(1, 2), alpha=-2)
+    if x_B_N_F.device.type == "cpu":
+        return torch.from_numpy(edge_kernels.smallest_k(distances_B_N_N.numpy(), k))
+    return distances_B_N_N.topk(k, dim=-1, largest=False, sorted=False).indices
+
+
+class EdgeConv(nn.Module):
+    """One EdgeConv layer: linear on edges, batch norm over edges, LeakyReLU(0.2), max over the k neighbours.
+
+    Parameters are laid out as in the per-edge form: ``weight`` (F_out, 2·F_in) acts on ``[x_j - x_i ; x_i]``.
+    """
+
+    def __init__(self, in_features: int, out_features: int, k: int) -> None:
+        super().__init__()
+        self.k = k
+        self.weight = nn.Parameter(torch.empty(out_features, 2 * in_features))
+        nn.init.kaiming_uniform_(self.weight, a=5**0.5)
+        self.norm = nn.BatchNorm1d(out_features)
+
+    def forward(self, x_B_N_F: torch.Tensor) -> torch.Tensor:
+        """Map features (B, N, F_in) to (B, N, F_out); the graph is rebuilt from the input features."""
+        neighbours_B_N_k = knn_indices(x_B_N_F, self.k)
+        w1, w2 = self.weight.chunk(2, dim=1)
+        ac_B_N_2F = x_B_N_F @ torch.cat([w1, w2 - w1]).T
+        if ac_B_N_2F.device.type != "cpu":
+            return _edge_max_plain(ac_B_N_2F, neighbours_B_N_k, self.norm)
+        if not self.training:
+            return self._inference(ac_B_N_2F, neighbours_B_N_k)
+        out_B_N_F, mean_F, variance_F = _EdgeMax.apply(
+            ac_B_N_2F, neighbours_B_N_k, self.norm.weight, self.norm.bias, self.norm.eps
+        )
+        self._update_running_statistics(mean_F, variance_F, n_edges=neighbours_B_N_k.numel())
+        return out_B_N_F
+
+    def _inference(self, ac_B_N_2F: torch.Tensor, neighbours_B_N_k: torch.Tensor) -> torch.Tensor:
+        scale_F = self.norm.weight * torch.rsqrt(self.norm.running_var + self.norm.eps)
+        shift_F = self.norm.bias - scale_F * self.norm.running_mean
+        out = edge_kernels.gather_max_affine(
+            *_numpy(ac_B_N_2F, neighbours_B_N_k, scale_F, shift_F), NEGATIVE_SLOPE
+        )
+        return torch.from_numpy(out)
+
+    @torch.no_grad()
+    def _update_running_statistics(self, mean_F: torch.Tensor, variance_F: torch.Tensor, n_edges: int) -> None:
+        norm = self.norm
+        norm.num_batches_tracked += 1
+        norm.running_mean.lerp_(mean_F, norm.momentum)
+        norm.running_var.lerp_(variance_F * (n_edges / (n_edges - 1)), norm.momentum)
+
+
+class _EdgeMax(torch.autograd.Function):
+    """Batch-normalised, activated maximum over neighbours with the exact statistics of all edges (CPU)."""
+
+    @staticmethod
+    def forward(ctx, ac_B_N_2F, neighbours_B_N_k, gamma_F, beta_F, eps):
+        n_edges = neighbours_B_N_k.numel()
+        ac, neighbours, gamma, beta = _numpy(ac_B_N_2F, neighbours_B_N_k, gamma_F, beta_F)
+        extreme, extreme_at, edge_sums, mean, variance = edge_kernels.gather_extreme_and_sums(ac, neighbours, gamma)
+        inverse_std = (1.0 / (variance + eps) ** 0.5).astype(ac.dtype)
+        mean = mean.astype(ac.dtype)
+        out = edge_kernels.normalise_activate(extreme, mean, inverse_std, gamma, beta, NEGATIVE_SLOPE)
+        ctx.numpy_arrays = (ac, neighbours, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges)
+        mean_F, variance_F = torch.from_numpy(mean), torch.from_numpy(variance.astype(ac.dtype))
+        ctx.mark_non_differentiable(mean_F, variance_F)
+        return torch.from_numpy(out), mean_F, variance_F
+
+    @staticmethod
+    def backward(ctx, grad_out_B_N_F, _grad_mean, _grad_variance):
+        (grad_out,) = _numpy(grad_out_B_N_F)
+        grad_ac, grad_gamma, grad_beta = edge_kernels.edge_max_backward(grad_out, *ctx.numpy_arrays, NEGATIVE_SLOPE)
+        return torch.from_numpy(grad_ac), None, torch.from_numpy(grad_gamma), torch.from_numpy(grad_beta), None
+
+
+def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbours_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
+    """Evaluate the same layer with torch operations alone (CUDA): gathers edges, still no per-edge matrix product."""
+    a_B_N_F, c_B_N_F = ac_B_N_2F.chunk(2, dim=-1)
+    batch, n, k = neighbours_B_N_k.shape
+    rows = (neighbours_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]).reshape(-1)
+    y_E_F = a_B_N_F.reshape(batch * n, -1)[rows] + c_B_N_F.reshape(batch * n, 1, -1).expand(-1, k, -1).flatten(0, 1)
+    activated = nn.functional.leaky_relu(norm(y_E_F), NEGATIVE_SLOPE)
+    return activated.view(batch, n, k, -1).amax(dim=2)
+
+
+def _numpy(*tensors: torch.Tensor):
+    return tuple(tensor.detach().contiguous().numpy() for tensor in tensors)

@@ -1,0 +1,79 @@
+import pytest
+import torch
+
+from gpca.encoders import edge_conv
+from gpca.encoders.edge_conv import EdgeConv, knn_indices
+from tests.encoders.per_edge import PerEdgeConv
+
+TOLERANCE = {"atol": 1e-4, "rtol": 1e-4}
+
+
+def layer_pair(in_features=6, out_features=32, k=8):
+    torch.manual_seed(0)
+    fused, reference = EdgeConv(in_features, out_features, k), PerEdgeConv(in_features, out_features, k)
+    with torch.no_grad():
+        # negative gammas exercise the minimum, non-zero betas the activation's kink
+        fused.norm.weight.normal_()
+        fused.norm.bias.normal_()
+        reference.linear.weight.copy_(fused.weight)
+        reference.norm.load_state_dict(fused.norm.state_dict())
+    return fused, reference
+
+
+def gradients(layer, weight, x, direction):
+    x = x.clone().requires_grad_()
+    (layer(x) * direction).sum().backward()
+    return x.grad, weight.grad, layer.norm.weight.grad, layer.norm.bias.grad
+
+
+@pytest.mark.parametrize("offset", [0.0, 3.0])
+def test_training_agrees_with_per_edge_reference(offset):
+    fused, reference = layer_pair()
+    x = torch.randn(4, 60, 6) + offset
+    direction = torch.randn(4, 60, 32)
+    for _ in range(2):
+        torch.testing.assert_close(fused(x), reference(x), **TOLERANCE)
+    torch.testing.assert_close(fused.norm.running_mean, reference.norm.running_mean, **TOLERANCE)
+    torch.testing.assert_close(fused.norm.running_var, reference.norm.running_var, **TOLERANCE)
+    assert fused.norm.num_batches_tracked == reference.norm.num_batches_tracked
+    ours = gradients(fused, fused.weight, x, direction)
+    theirs = gradients(reference, reference.linear.weight, x, direction)
+    for name, a, b in zip(["x", "weight", "gamma", "beta"], ours, theirs, strict=True):
+        torch.testing.assert_close(a / b.abs().max(), b / b.abs().max(), **TOLERANCE, msg=lambda m, n=name: n + m)
+
+
+def test_inference_agrees_with_per_edge_reference():
+    fused, reference = layer_pair()
+    x = torch.randn(4, 60, 6)
+    fused(x), reference(x)
+    torch.testing.assert_close(fused.eval()(x), reference.eval()(x), **TOLERANCE)
+
+
+def test_plain_torch_path_agrees_with_fused_path():
+    fused, _ = layer_pair()
+    plain, _ = layer_pair()
+    x = torch.randn(4, 60, 6)
+    neighbours = knn_indices(x, fused.k)
+    w1, w2 = plain.weight.chunk(2, dim=1)
+    plain_out = edge_conv._edge_max_plain(x @ torch.cat([w1, w2 - w1]).T, neighbours.long(), plain.norm)
+    fused_out = fused(x)
+    torch.testing.assert_close(plain_out, fused_out, **TOLERANCE)
+    plain_out.square().sum().backward()
+    fused_out.square().sum().backward()
+    torch.testing.assert_close(fused.weight.grad, plain.weight.grad, atol=1e-3, rtol=1e-3)
+
+
+def test_gradient_check_in_double_precision():
+    layer = EdgeConv(3, 4, 5).double()
+    x = torch.randn(2, 12, 3, dtype=torch.double, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda x: layer(x), (x,), atol=1e-6)
+
+
+def test_neighbours_are_the_nearest():
+    x = torch.randn(3, 50, 4)
+    expected = torch.cdist(x, x).topk(7, largest=False).indices.sort().values
+    assert torch.equal(knn_indices(x, 7).long().sort().values, expected)
+
+
+def test_ties_go_to_the_lower_index():
+    assert knn_indices(torch.zeros(1, 9, 2), 3).sort().values.tolist() == [[[0, 1, 2]] * 9]
