@@ -1,0 +1,29 @@
+"""Encoders by name. A new one is a file beside this one and a line here."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from gpca.errors import InputError
+
+ENCODERS = {"dgcnn": "gpca.encoders.dgcnn:DGCNN"}
+
+
+def make_encoder(backbone: str, options: dict):
+    """Return a new encoder, a module from clouds (B, N, 3) to embeddings (B, ``embedding_size``).
+
+    Raises:
+        InputError: unknown backbone, or an option that it does not have.
+    """
+    require_backbone(backbone)
+    module, name = ENCODERS[backbone].split(":")
+    try:
+        return getattr(import_module(module), name)(**options)
+    except TypeError as fault:
+        raise InputError(f"backbone '{backbone}'", str(fault), "see encoder.options in the config") from fault
+
+
+def require_backbone(backbone: str) -> None:
+    """Raise an InputError that names the known backbones unless `backbone` is one of them."""
+    if backbone not in ENCODERS:
+        raise InputError(f"backbone '{backbone}'", "unknown", f"known are {', '.join(ENCODERS)}")

@@ -1,0 +1,150 @@
+"""Training an encoder with a head over the concepts; the head is dropped afterwards (paper Sec. III-A).
+
+Each epoch sees a fresh random subset of every cloud's points. There is no other augmentation: rotations and shifts
+would erase the pose concept, jitter the noise concept, crops the overlap concept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import nn
+
+from gpca.dataset import Registrations
+from gpca.encoders.registry import make_encoder
+from gpca.errors import InputError
+from gpca.files import whole_file
+from gpca.perturbation import CONCEPTS
+from gpca.progress import progress
+from gpca.seeds import generator, seed_of
+
+
+@dataclass(frozen=True)
+class EncoderSettings:
+    """What is trained and how.
+
+    Attributes:
+        backbone: name in :mod:`gpca.encoders.registry`.
+        points: N, points of a cloud that the encoder sees.
+        epochs, batch_size: length of the training.
+        learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
+        weight_decay: of AdamW.
+        label_smoothing: of the cross entropy.
+        options: further arguments of the backbone.
+    """
+
+    backbone: str = "dgcnn"
+    points: int = 512
+    epochs: int = 14
+    batch_size: int = 16
+    learning_rate: float = 2e-3
+    weight_decay: float = 1e-2
+    label_smoothing: float = 0.0
+    options: dict = field(default_factory=dict)
+
+
+def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object) -> torch.Tensor:
+    """Return `n_points` random points of each row's aligned cloud, (B, N, 3) float32.
+
+    The draw of a sample is named by the axes and the sample's number. Clouds of fewer points repeat some.
+    """
+    clouds = np.empty((len(rows), n_points, 3), np.float32)
+    for cloud, row in zip(clouds, rows, strict=True):
+        points = registrations.cloud(row)
+        random = generator(*axes, int(registrations.sample[row]))
+        cloud[:] = points[random.choice(len(points), n_points, replace=len(points) < n_points, shuffle=False)]
+    return torch.from_numpy(clouds)
+
+
+def train_encoder(
+    registrations: Registrations, source: str, seed: int, settings: EncoderSettings, checkpoint: Path | None = None
+) -> tuple[nn.Module, list[dict[str, float]]]:
+    """Train on the rows of split ``train``.
+
+    Args:
+        checkpoint: where the state after every epoch is kept; if it is there and of the same settings, training
+            continues from it and ends with the same weights as an unbroken run.
+
+    Returns:
+        the encoder without its head, and the training curve: epoch, learning_rate, loss, accuracy.
+    """
+    torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
+    encoder = make_encoder(settings.backbone, settings.options)
+    model = nn.Sequential(encoder, nn.Linear(encoder.embedding_size, len(CONCEPTS)))
+    optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
+    rows = registrations.rows("train")
+    labels_S = torch.from_numpy(np.array([CONCEPTS.index(concept) for concept in registrations.concept]))
+    batches = -(-len(rows) // settings.batch_size)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimiser, settings.learning_rate, total_steps=settings.epochs * batches, pct_start=0.25
+    )
+    state = {"model": model, "optimiser": optimiser, "schedule": schedule}
+    identity = repr((source, seed, asdict(settings), len(rows)))
+    curve = _resume(checkpoint, identity, state)
+
+    model.train()
+    title = f"{settings.backbone} on {source}, seed {seed}"
+    for epoch in progress(range(len(curve), settings.epochs), title, initial=len(curve), total=settings.epochs):
+        loss_sum = correct = 0.0
+        order = generator(source, seed, "order", epoch).permutation(rows)
+        for batch_rows in np.array_split(order, batches):
+            points_B_N_3 = draw_points(registrations, batch_rows, settings.points, source, seed, "epoch", epoch)
+            logits_B_C, labels_B = model(points_B_N_3), labels_S[batch_rows]
+            loss = nn.functional.cross_entropy(logits_B_C, labels_B, label_smoothing=settings.label_smoothing)
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+            schedule.step()
+            loss_sum += float(loss) * len(batch_rows)
+            correct += float((logits_B_C.argmax(dim=1) == labels_B).sum())
+        curve.append(
+            {
+                "epoch": epoch + 1,
+                "learning_rate": schedule.get_last_lr()[0],
+                "loss": loss_sum / len(rows),
+                "accuracy": correct / len(rows),
+            }
+        )
+        if not np.isfinite(loss_sum):
+            raise InputError(title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
+        _keep(checkpoint, identity, state, curve)
+    return encoder.eval(), curve
+
+
+@torch.inference_mode()
+def embed(
+    encoder: nn.Module, registrations: Registrations, source: str, seed: int, n_points: int, batch_size: int = 16
+) -> np.ndarray:
+    """Return embeddings h (S, d) float32 of all rows, in their order; each cloud's points are drawn once, by name."""
+    encoder.eval()
+    parts = []
+    rows = np.arange(len(registrations))
+    for batch_rows in progress(np.array_split(rows, -(-len(rows) // batch_size)), f"embeddings of {source}, seed {seed}"):
+        parts.append(encoder(draw_points(registrations, batch_rows, n_points, source, seed, "embedding")))
+    return torch.cat(parts).numpy()
+
+
+def _keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]) -> None:
+    if checkpoint is None:
+        return
+    content = {name: part.state_dict() for name, part in state.items()}
+    with whole_file(checkpoint) as partial:
+        torch.save(content | {"identity": identity, "curve": curve}, partial)
+
+
+def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
+    """Load the checkpoint into `state`; an unreadable one or one of other settings is left aside."""
+    if checkpoint is None or not checkpoint.is_file():
+        return []
+    try:
+        content = torch.load(checkpoint, weights_only=True)
+    except Exception:  # whatever a damaged file makes torch raise, training from the start is right
+        return []
+    if content.get("identity") != identity:
+        return []
+    for name, part in state.items():
+        part.load_state_dict(content[name])
+    return content["curve"]

@@ -1,0 +1,73 @@
+"""Object models in the layout of the BOP benchmark: models/obj_000001.ply and models_info.json, in millimetres.
+
+Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.objects.canonical import diameter
+from gpca.objects.mesh_folder import metres_per, read_surface
+from gpca.objects.surface import Surface
+
+DIAMETER_TOLERANCE = 0.05
+
+
+def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
+    """Surfaces of a configured source: keys `objects` (ids, default all) and `unit` (default mm)."""
+    return surfaces(folder, entry.get("unit", "mm"), entry.get("objects"))
+
+
+def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None = None) -> Iterator[Surface]:
+    """Yield the models `objects` (all when None) in the order of their ids, named ``obj_000001``.
+
+    Args:
+        folder: holds obj_*.ply itself, or models/ with them, as the data sets and their archives do.
+        unit: of the vertices; the format says mm.
+        objects: ids.
+
+    Raises:
+        InputError: missing folder, model or models_info.json, or a model whose diameter is not the listed one.
+    """
+    models = _models_folder(Path(folder))
+    scale, listed_mm = metres_per(unit), _listed_diameters_mm(models / "models_info.json")
+    ids = sorted(int(path.stem[4:]) for path in models.glob("obj_[0-9]*.ply")) if objects is None else sorted(objects)
+    for number in ids:
+        path = models / f"obj_{number:06d}.ply"
+        if not path.is_file():
+            raise InputError(path, "no such model", "check objects in the config, or fetch the models again")
+        if number not in listed_mm:
+            raise InputError(models / "models_info.json", f"lists no object {number}", "fetch the models again")
+        surface = read_surface(path, scale)
+        measured_mm = 1e3 * diameter(surface.vertices_m, path)
+        if abs(measured_mm - listed_mm[number]) > DIAMETER_TOLERANCE * listed_mm[number]:
+            raise InputError(
+                path,
+                f"its diameter is {measured_mm:.4g} mm in unit {unit}, but models_info.json lists "
+                f"{listed_mm[number]:.4g} mm",
+                "check unit in the config (BOP models are in mm), or fetch the models again",
+            )
+        yield surface
+
+
+def _models_folder(folder: Path) -> Path:
+    if not folder.is_dir():
+        raise InputError(folder, "no such folder", "check location and data_dir in the config")
+    for candidate in (folder, folder / "models", *sorted(folder.glob("*/models"))):
+        if any(candidate.glob("obj_[0-9]*.ply")):
+            return candidate
+    raise InputError(folder, "the folder holds no models/obj_*.ply", "check location in the config")
+
+
+def _listed_diameters_mm(path: Path) -> dict[int, float]:
+    if not path.is_file():
+        raise InputError(path, "no such file", "fetch the models again, or use kind: mesh_folder for plain meshes")
+    try:
+        info = json.loads(path.read_text(encoding="utf-8"))
+        return {int(number): float(model["diameter"]) for number, model in info.items()}
+    except (ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise InputError(path, "is not a BOP models_info.json", "fetch the models again") from fault

@@ -1,0 +1,194 @@
+"""Surfaces into canonical clouds: sampled uniformly, centred on the bounding box, measured by the diameter, checked."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gpca import seeds
+from gpca.errors import InputError
+from gpca.files import load_arrays, save_arrays
+from gpca.objects.surface import Surface
+
+FEWEST_CLOUD_POINTS = 64
+SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
+NORMAL_NEIGHBOURS = 30
+
+
+def require_points(points: np.ndarray, subject: object) -> None:
+    """Raise InputError unless `points` is (P, 3), P > 0, without NaN or infinity."""
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+        raise InputError(subject, "has no points", "fetch or export it anew")
+    bad = int((~np.isfinite(points)).any(axis=1).sum())
+    if bad:
+        raise InputError(subject, f"{bad} of {len(points)} points hold NaN or infinity", "fetch or export it anew")
+
+
+def diameter(points: np.ndarray, subject: object) -> float:
+    """Largest distance between two of the (P, 3) points, in their unit (the diameter of the BOP benchmark).
+
+    The two farthest points are vertices of the convex hull, so only those are compared.
+
+    Raises:
+        InputError: no points, NaN, or all points on one line.
+    """
+    from scipy.spatial import ConvexHull
+    from scipy.spatial.distance import cdist
+
+    require_points(points, subject)
+    centred = points - points.mean(axis=0)
+    extents, axes = np.linalg.svd(centred, full_matrices=False)[1:]
+    rank = int((extents > 1e-6 * extents[0]).sum())
+    if rank < 2:
+        raise InputError(subject, "all its points lie on one point or line", "an object needs a surface")
+    # In the plane or space that the points span: Qhull refuses a flat cloud in 3-D.
+    hull = points[ConvexHull(centred @ axes[:rank].T).vertices]
+    blocks = np.array_split(hull, len(hull) // 1024 + 1)  # a sphere has thousands of hull vertices: bounded memory
+    return float(max(cdist(block, hull).max() for block in blocks))
+
+
+def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tuple[np.ndarray, np.ndarray, float]:
+    """Sample a surface uniformly and centre it on its bounding box.
+
+    A mesh gives `n_points` area-uniform samples with the normals of their triangles. A point cloud keeps all its
+    points, in random order; missing normals are estimated and turned towards the camera at the origin.
+
+    Args:
+        surface: vertices in metres.
+        source: the source's name; with the surface's name it seeds the draw.
+        n_points: points drawn from a mesh.
+
+    Returns:
+        points_m (P, 3) float32, normals (P, 3) float32 unit, diameter in metres of the vertices.
+
+    Raises:
+        InputError: no points, NaN, zero area, too small a cloud, or a diameter that no declared unit would give.
+    """
+    subject = f"{source}: object '{surface.name}'"
+    vertices_m, faces = np.asarray(surface.vertices_m, dtype=np.float64), surface.faces
+    require_points(vertices_m, subject)
+    if faces is None:
+        if len(vertices_m) < FEWEST_CLOUD_POINTS:
+            raise InputError(
+                subject, f"the cloud has {len(vertices_m)} point(s)", f"give {FEWEST_CLOUD_POINTS} or more"
+            )
+        hull_m, draw = vertices_m, _shuffled
+    else:
+        if len(faces) == 0 or not np.linalg.norm(_area_vectors(vertices_m, faces), axis=1).sum() > 0:
+            raise InputError(subject, "the mesh has no area", "export it anew, with its faces")
+        hull_m, draw = vertices_m[np.unique(faces)], _sampled  # vertices that no face uses are no surface
+    diameter_m = diameter(hull_m, subject)
+    _require_size(diameter_m, subject)
+    points_m, normals = draw(surface, n_points, seeds.generator(source, surface.name, "surface"))
+    centre_m = (hull_m.min(axis=0) + hull_m.max(axis=0)) / 2
+    return (points_m - centre_m).astype(np.float32), normals.astype(np.float32), diameter_m
+
+
+def _require_size(diameter_m: float, subject: str) -> None:
+    if SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
+        return
+    likely = "in millimetres? set unit: mm" if diameter_m > LARGEST_DIAMETER_M else "in metres? set unit: m"
+    raise InputError(
+        subject, f"its diameter is {diameter_m:.4g} m, so the declared unit looks wrong", f"is it {likely}"
+    )
+
+
+def _area_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    a, b, c = (vertices_m[faces[:, corner]] for corner in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _sampled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
+    mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
+    points_m, face = trimesh.sample.sample_surface(mesh, n_points, seed=rng)
+    normals = _area_vectors(surface.vertices_m, surface.faces[face])
+    return np.asarray(points_m), normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    order = rng.permutation(len(surface.vertices_m))
+    normals = _estimated_normals(surface.vertices_m) if surface.normals is None else surface.normals
+    return surface.vertices_m[order], normals[order]
+
+
+def _estimated_normals(points_m: np.ndarray) -> np.ndarray:
+    import open3d as o3d
+
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
+    cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBOURS))
+    cloud.orient_normals_towards_camera_location(np.zeros(3))
+    return np.asarray(cloud.normals)
+
+
+def write_objects(surfaces: Iterable[Surface], source: str, path: str | Path, n_points: int = 16384) -> None:
+    """Write the canonical clouds of a source to an objects npz (read it with :class:`ObjectClouds`).
+
+    Raises:
+        InputError: no object at all, two of one name, or a fault in one of them; nothing is written then.
+    """
+    names, clouds = [], []
+    for surface in surfaces:
+        if surface.name in names:
+            raise InputError(f"{source}: object '{surface.name}'", "occurs twice", "give each file its own name")
+        points_m, normals, diameter_m = canonical_cloud(surface, source, n_points)
+        names.append(surface.name)
+        clouds.append((points_m, normals, diameter_m))
+        print(f"{source}: {surface.name}: {len(points_m)} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)
+    if not names:
+        raise InputError(source, "the source has no object", "check its location and files")
+    points_m, normals, diameters_m = zip(*clouds, strict=True)
+    save_arrays(
+        path,
+        {
+            "names": np.array(names),
+            "points_m": np.concatenate(points_m),
+            "normals": np.concatenate(normals),
+            "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
+            "diameters_m": np.array(diameters_m, dtype=np.float64),
+        },
+    )
+
+
+@dataclass(frozen=True)
+class ObjectClouds:
+    """The canonical clouds of one source, as :func:`write_objects` wrote them.
+
+    Attributes:
+        names: of the O objects.
+        diameters_m: (O,) float64.
+        clouds: for each object its points (P, 3) in metres and unit normals (P, 3), both float32.
+    """
+
+    names: tuple[str, ...]
+    diameters_m: np.ndarray
+    clouds: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    @classmethod
+    def load(cls, path: str | Path) -> ObjectClouds:
+        """Read an objects npz; InputError when it is missing, unreadable or inconsistent."""
+        made_by = f"snakemake -j2 {path}"
+        shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
+        arrays = load_arrays(path, shapes, made_by)
+        points_m, offsets = arrays["points_m"], arrays["offsets"]
+        whole = len(offsets) == len(arrays["names"]) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
+        if not whole or not (np.diff(offsets) > 0).all() or arrays["names"].dtype.kind != "U":
+            raise InputError(path, "names, offsets and points do not fit together", f"make it anew with '{made_by}'")
+        parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
+        return cls(tuple(arrays["names"].tolist()), arrays["diameters_m"], tuple(zip(*parts, strict=True)))
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def points(self, i: int) -> np.ndarray:
+        """(P, 3) float32, metres, centred on the object's bounding box."""
+        return self.clouds[i][0]
+
+    def normals(self, i: int) -> np.ndarray:
+        """(P, 3) float32 unit normals."""
+        return self.clouds[i][1]

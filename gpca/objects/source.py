@@ -1,0 +1,112 @@
+"""A configured source of objects: where its data is, and its surfaces.
+
+A kind of source is a module beside this one with ``from_entry(entry, folder) -> Iterator[Surface]``; a new kind is
+such a file and nothing else. ``procedural`` needs no data and has ``surfaces(family)`` instead.
+"""
+
+from __future__ import annotations
+
+import os
+import pkgutil
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from gpca import objects
+from gpca.errors import InputError
+from gpca.objects import archive, download
+from gpca.objects.surface import Surface
+
+
+def resolve(entry: dict, data_dir: str | None) -> dict:
+    """Decide where a source's data comes from; reads no data, so it is quick enough for the loading of a workflow.
+
+    What lies under `data_dir` comes first: what the entry's `local` part names (its keys then override the others),
+    else what the entry itself names. A `location` counts as soon as it exists; without one, each pattern of `files`
+    must match below `data_dir`. Last comes its `url` or `urls`.
+
+    Args:
+        entry: the source's part of the config.
+        data_dir: folder that relative locations start from, or None.
+
+    Returns:
+        The entry without `local`, with `origin` "procedural", "local" or "download" and, when local, with the absolute
+        `location`. A download keeps the declared one: it says what a `data_dir` would have to hold.
+
+    Raises:
+        InputError: unknown kind, missing data_dir, location nowhere to be found and no url, checksums unlike the urls.
+    """
+    entry = dict(entry)
+    local = entry.pop("local", None)
+    subject = f"source '{entry.get('title', entry.get('kind'))}'"
+    if data_dir is not None and not Path(data_dir).expanduser().is_dir():
+        raise InputError(data_dir, "no such folder", "correct data_dir in the config")
+    for candidate in ({**entry, **local}, entry) if local else (entry,):
+        if candidate.get("kind") == "procedural":
+            if not candidate.get("family"):
+                raise InputError(subject, "names no family", "set family in the config")
+            return {**candidate, "origin": "procedural"}
+        _module_of(candidate.get("kind"))
+        if folder := _found(candidate, data_dir):
+            return {**candidate, "origin": "local", "location": os.path.abspath(folder)}
+    urls, checksums = _as_list(entry.get("urls") or entry.get("url")), _as_list(entry.get("sha256"))
+    if not urls:
+        wanted = entry.get("location") or ", ".join(entry.get("files") or ["location"])
+        raise InputError(subject, f"{wanted} is not there", "correct location, or set data_dir to the folder above it")
+    if checksums and len(checksums) != len(urls):
+        raise InputError(subject, f"has {len(urls)} url(s) but {len(checksums)} sha256", "give one for each, or null")
+    return {**entry, "origin": "download"}
+
+
+def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
+    """Yield the surfaces of a resolved entry; what has to be downloaded is kept, and unpacked, in `cache_folder`.
+
+    Raises:
+        InputError: from :mod:`gpca.objects.download`, :mod:`gpca.objects.archive` and the kind's own reader.
+    """
+    if entry["origin"] == "procedural":
+        from gpca.objects import procedural
+
+        yield from procedural.surfaces(entry["family"])
+        return
+    module = _module_of(entry["kind"])
+    if entry["origin"] == "local":
+        yield from module.from_entry(entry, Path(entry["location"]))
+        return
+    urls = _as_list(entry.get("urls") or entry.get("url"))
+    checksums = _as_list(entry.get("sha256")) or [None] * len(urls)
+    files = [
+        download.fetch(url, sha256, cache_folder, entry.get("location"))
+        for url, sha256 in zip(urls, checksums, strict=True)
+    ]
+    for file in files:
+        yield from module.from_entry(entry, file if getattr(module, "READS_ARCHIVES", False) else _unpacked(file))
+
+
+def _unpacked(file: Path) -> Path:
+    # Named by content: an archive that was fetched anew is unpacked anew.
+    return archive.unpack(file, file.with_name(f"{file.stem}-{download.sha256_of(file)[:12]}"))
+
+
+def _found(entry: dict, data_dir: str | None) -> Path | None:
+    location, patterns = entry.get("location"), entry.get("files")
+    folder = Path(data_dir or "", location or "").expanduser()
+    if (data_dir is None and not folder.is_absolute()) or not (location or patterns) or not folder.exists():
+        return None
+    return folder if location or all(any(folder.glob(pattern)) for pattern in patterns) else None
+
+
+def _module_of(kind: object) -> ModuleType:
+    names = [module.name for module in pkgutil.iter_modules(objects.__path__)]
+    module = import_module(f"gpca.objects.{kind}") if kind in names else None
+    if not hasattr(module, "from_entry"):
+        known = ["procedural"] + [
+            name for name in names if hasattr(import_module(f"gpca.objects.{name}"), "from_entry")
+        ]
+        raise InputError(f"kind '{kind}'", "there is no such kind of source", f"known are {', '.join(known)}")
+    return module
+
+
+def _as_list(value: str | list | None) -> list:
+    return value if isinstance(value, list) else [] if value is None else [value]

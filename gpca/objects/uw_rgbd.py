@@ -1,0 +1,74 @@
+"""UW RGB-D Object Dataset: single views of objects, already cut out, as PCD files or in the data set's tars.
+
+Lai, Bo, Ren, Fox: A Large-Scale Hierarchical Multi-View RGB-D Object Dataset, ICRA 2011. A view is named
+<class>_<instance>_<sequence>_<frame>, e.g. coffee_mug_1_1_1; points are in metres in the camera's frame.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from itertools import groupby
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.objects import archive, pcd
+from gpca.objects.mesh_folder import files_in, metres_per
+from gpca.objects.surface import Surface
+
+SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
+READS_ARCHIVES = True  # only a few of the 600 views in a tar are wanted, so nothing is unpacked
+
+_View = tuple[str, Callable[[], bytes], str]  # name, reader of its bytes, subject for messages
+
+
+def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
+    """Surfaces of a configured source: keys `files`, `unit` (default m), `views_per_instance` (default 6)."""
+    paths = [place] if place.is_file() else files_in(place, entry.get("files"), SUFFIXES)
+    return surfaces(paths, entry.get("unit", "m"), entry.get("views_per_instance", 6))
+
+
+def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6) -> Iterator[Surface]:
+    """Yield views of each instance, spread evenly over its views in the order of sequence and frame.
+
+    Args:
+        paths: .pcd files and tars of them.
+        unit: of the points.
+        views_per_instance: at most so many of the views of one instance, within one tar or among the single files.
+
+    Raises:
+        InputError: damaged tar or PCD, a tar without PCD, NaN.
+    """
+    paths = [Path(path) for path in paths]
+    scale = metres_per(unit)
+    single = [path for path in paths if path.suffix.lower() == ".pcd"]
+    yield from _chosen([(path.stem, path.read_bytes, str(path)) for path in single], scale, views_per_instance)
+    for path in (path for path in paths if path not in single):
+        with archive.opened(path) as members:
+            views = [
+                (PurePosixPath(member.name).stem, member.read, f"{path}, member {member.name}")
+                for member in members
+                if member.name.lower().endswith(".pcd")
+            ]
+            if not views:
+                raise InputError(path, "the archive holds no .pcd file", "check url or files in the config")
+            yield from _chosen(views, scale, views_per_instance)
+
+
+def _chosen(views: list[_View], scale: float, views_per_instance: int) -> Iterator[Surface]:
+    views = sorted(views, key=lambda view: _order(view[0]))
+    for _, group in groupby(views, key=lambda view: _order(view[0])[0]):
+        of_instance = list(group)
+        # The end is left out: the turntable's last frame is the neighbour of its first.
+        steps = np.linspace(0, len(of_instance), min(views_per_instance, len(of_instance)), endpoint=False)
+        for step in steps.astype(int):
+            name, read, subject = of_instance[step]
+            yield Surface(name, pcd.parse(read(), subject) * scale, None)
+
+
+def _order(name: str) -> tuple[str, int, int]:
+    """Instance, sequence, frame; a name of another form is an instance of its own."""
+    match = re.fullmatch(r"(.+)_(\d+)_(\d+)", name)
+    return (match[1], int(match[2]), int(match[3])) if match else (name, 0, 0)

@@ -1,0 +1,93 @@
+"""Point cloud registration by ICP (Besl & McKay 1992; Chen & Medioni 1992; Segal et al. 2009) through Open3D."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.errors import InputError
+
+METHODS = ("point_to_point", "point_to_plane", "generalized")
+
+
+@dataclass(frozen=True)
+class ICPSettings:
+    """How ICP runs.
+
+    Attributes:
+        method: ``point_to_point``, ``point_to_plane`` or ``generalized``.
+        correspondence_distance: largest distance of a correspondence, relative to the diameter.
+        max_iterations: upper limit; Open3D stops earlier when fitness and RMSE change by less than 1e-6.
+    """
+
+    method: str = "point_to_point"
+    correspondence_distance: float = 0.10
+    max_iterations: int = 50
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise InputError(f"ICP method '{self.method}'", "unknown", f"choose one of {', '.join(METHODS)}")
+
+
+@dataclass(frozen=True)
+class Registration:
+    """What ICP returns: pose (4×4), share of source points with a correspondence, RMSE over those."""
+
+    T_target_source: np.ndarray
+    fitness: float
+    inlier_rmse: float
+
+
+class ICP:
+    """ICP of many sources to one target, whose cloud and normals are converted once.
+
+    Args:
+        target: (P, 3) points, any unit; results come in the same unit.
+        target_normals: (P, 3), needed by point-to-plane and generalized ICP.
+        settings: the correspondence distance is in the unit of the points.
+    """
+
+    def __init__(self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings) -> None:
+        from gpca.environment import require_open3d
+
+        self._o3d = require_open3d()
+        self._settings = settings
+        if settings.method != "point_to_point" and target_normals is None:
+            raise InputError(f"ICP method '{settings.method}'", "the target has no normals", "use point_to_point")
+        self._target = self._cloud(target, target_normals)
+        registration = self._o3d.pipelines.registration
+        self._estimation = {
+            "point_to_point": registration.TransformationEstimationPointToPoint,
+            "point_to_plane": registration.TransformationEstimationPointToPlane,
+            "generalized": registration.TransformationEstimationForGeneralizedICP,
+        }[settings.method]()
+        self._criteria = registration.ICPConvergenceCriteria(max_iteration=settings.max_iterations)
+
+    def register(self, source: np.ndarray, T_target_source_init: np.ndarray) -> Registration:
+        """Align `source` (P, 3) from the initial pose.
+
+        Raises:
+            InputError: fewer than three points, or NaN.
+        """
+        if len(source) < 3 or not np.isfinite(source).all():
+            raise InputError("source cloud", f"{len(source)} points, or NaN among them", "give at least 3 finite points")
+        registration = self._o3d.pipelines.registration
+        align = registration.registration_icp
+        if self._settings.method == "generalized":
+            align = registration.registration_generalized_icp
+        result = align(
+            self._cloud(source),
+            self._target,
+            self._settings.correspondence_distance,
+            T_target_source_init,
+            self._estimation,
+            self._criteria,
+        )
+        return Registration(np.array(result.transformation), result.fitness, result.inlier_rmse)
+
+    def _cloud(self, points: np.ndarray, normals: np.ndarray | None = None):
+        cloud = self._o3d.geometry.PointCloud(self._o3d.utility.Vector3dVector(np.asarray(points, np.float64)))
+        if normals is not None:
+            cloud.normals = self._o3d.utility.Vector3dVector(np.asarray(normals, np.float64))
+        return cloud

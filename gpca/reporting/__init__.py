@@ -1,0 +1,1 @@
+"""Tables, figures and their style: everything here draws from files and computes no result."""

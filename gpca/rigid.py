@@ -1,0 +1,36 @@
+"""Rigid transforms as 4×4 matrices, named for what they map: ``T_target_source`` takes source points to the target."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def transform(T_b_a: np.ndarray, points_a: np.ndarray) -> np.ndarray:
+    """Map points (N, 3) from frame a to frame b."""
+    return points_a @ T_b_a[:3, :3].T + T_b_a[:3, 3]
+
+
+def inverse(T_b_a: np.ndarray) -> np.ndarray:
+    """Return ``T_a_b``, by the transpose of the rotation."""
+    T_a_b = np.eye(4)
+    T_a_b[:3, :3] = T_b_a[:3, :3].T
+    T_a_b[:3, 3] = -T_b_a[:3, :3].T @ T_b_a[:3, 3]
+    return T_a_b
+
+
+def scale_translation(T_b_a: np.ndarray, factor: float) -> np.ndarray:
+    """Return the transform in another unit of length: rotation kept, translation times `factor`."""
+    scaled = T_b_a.copy()
+    scaled[:3, 3] *= factor
+    return scaled
+
+
+def random_direction(random: np.random.Generator) -> np.ndarray:
+    """Return a unit vector (3,) drawn uniformly from the sphere."""
+    direction = random.normal(size=3)
+    return direction / np.linalg.norm(direction)
+
+
+def rotation_angle_rad(T_b_a: np.ndarray) -> float:
+    """Return the angle of the rotation, in [0, π]."""
+    return float(np.arccos(np.clip((np.trace(T_b_a[:3, :3]) - 1) / 2, -1, 1)))

@@ -1,0 +1,153 @@
+import numpy as np
+import pytest
+import trimesh
+
+from gpca.errors import InputError
+from gpca.objects.canonical import ObjectClouds, canonical_cloud, diameter, write_objects
+from gpca.objects.surface import Surface
+
+
+def box(name="box", extents=(0.1, 0.2, 0.3), shift=(1.0, 2.0, 3.0)):
+    mesh = trimesh.creation.box(extents)
+    return Surface(name, np.asarray(mesh.vertices) + shift, np.asarray(mesh.faces))
+
+
+def view(name="view", points=400, depth_m=0.8):
+    """A point cloud as a camera sees it: a bumpy patch in front of the origin."""
+    xy = np.random.default_rng(0).uniform(-0.05, 0.05, (points, 2))
+    return Surface(name, np.column_stack([xy, depth_m + 4 * (xy**2).sum(axis=1)]), None)
+
+
+def test_mesh_is_centred_uniform_and_measured():
+    points_m, normals, diameter_m = canonical_cloud(box(), "source", 20000)
+    assert points_m.shape == normals.shape == (20000, 3)
+    assert points_m.dtype == normals.dtype == np.float32
+    assert diameter_m == pytest.approx(np.sqrt(0.1**2 + 0.2**2 + 0.3**2))
+    half = np.array([0.05, 0.1, 0.15])
+    assert np.abs(points_m).max(axis=0) == pytest.approx(half, abs=1e-6)
+    # Each point lies on the face that its normal names, and each pair of faces has its share of the area.
+    axis = np.abs(normals).argmax(axis=1)
+    rows = np.arange(20000)
+    assert points_m[rows, axis] * normals[rows, axis] == pytest.approx(half[axis], abs=1e-6)
+    share = np.bincount(axis) / 20000
+    assert share == pytest.approx(np.array([6, 3, 2]) / 11, abs=0.02)
+    # In random order: the first tenth already covers all six faces.
+    assert len({(a, s) for a, s in zip(axis[:2000], np.sign(normals[rows, axis])[:2000], strict=True)}) == 6
+
+
+def test_draw_depends_on_names_alone():
+    first = canonical_cloud(box(), "source", 100)[0]
+    assert np.array_equal(first, canonical_cloud(box(), "source", 100)[0])
+    assert not np.array_equal(first, canonical_cloud(box(), "other", 100)[0])
+    assert not np.array_equal(first, canonical_cloud(box("box2"), "source", 100)[0])
+
+
+def test_unused_vertices_move_nothing():
+    plain = box()
+    stray = Surface("box", np.vstack([plain.vertices_m, [[9.0, 9.0, 9.0]]]), plain.faces)
+    for expected, actual in zip(canonical_cloud(plain, "s", 50), canonical_cloud(stray, "s", 50), strict=True):
+        assert np.array_equal(expected, actual)
+
+
+def test_cloud_keeps_all_points_and_looks_at_the_camera():
+    surface = view()
+    points_m, normals, diameter_m = canonical_cloud(surface, "source", 10)
+    centre_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
+    back_m = points_m + centre_m
+    order = np.lexsort(np.round(back_m, 5).T), np.lexsort(np.round(surface.vertices_m, 5).T)
+    assert back_m[order[0]] == pytest.approx(surface.vertices_m[order[1]], abs=1e-6)
+    assert not np.allclose(back_m, surface.vertices_m, atol=1e-4)  # shuffled
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1, abs=1e-5)
+    assert (np.einsum("pc,pc->p", normals, back_m) < 0).all()
+    assert 0.1 < diameter_m < 0.2
+
+
+def test_cloud_keeps_given_normals_beside_their_points():
+    surface = view()
+    given = surface.vertices_m / np.linalg.norm(surface.vertices_m, axis=1, keepdims=True)
+    points_m, normals, _ = canonical_cloud(Surface("view", surface.vertices_m, None, given), "source")
+    back_m = points_m + (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
+    assert normals == pytest.approx(back_m / np.linalg.norm(back_m, axis=1, keepdims=True), abs=1e-5)
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_diameter_agrees_with_all_pairs(flat):
+    points = (
+        np.random.default_rng(1).normal(size=(300, 3))
+        * [1, 2, 0 if flat else 3]
+        @ trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.5, 0.9]))[:3, :3]
+    )
+    assert diameter(points, "x") == pytest.approx(np.linalg.norm(points[:, None] - points[None], axis=2).max())
+
+
+def test_diameter_of_a_fine_sphere():
+    sphere = trimesh.creation.icosphere(subdivisions=4, radius=0.05)  # 2562 vertices, all on the hull: two blocks
+    assert diameter(np.asarray(sphere.vertices), "x") == pytest.approx(0.1)
+
+
+def scaled(factor):
+    surface = box(shift=(0, 0, 0))
+    return Surface("part", surface.vertices_m * factor, surface.faces)
+
+
+def with_nan():
+    surface = box("part")
+    vertices_m = surface.vertices_m.copy()
+    vertices_m[3, 1] = np.nan
+    return Surface("part", vertices_m, surface.faces)
+
+
+FAULTS = {
+    "no points": (Surface("part", np.zeros((0, 3)), None), "has no points"),
+    "one point": (Surface("part", np.ones((1, 3)), None), "1 point"),
+    "63 points": (Surface("part", view().vertices_m[:63], None), "64 or more"),
+    "one line": (Surface("part", np.outer(np.linspace(0, 0.1, 80), [1, 2, 3]), None), "line"),
+    "same point": (Surface("part", np.ones((80, 3)), None), "point or line"),
+    "nan": (with_nan(), "NaN"),
+    "zero area": (Surface("part", box().vertices_m * [1, 0, 0], box().faces), "no area"),
+    "no faces": (Surface("part", box().vertices_m, np.zeros((0, 3), np.int64)), "no area"),
+    "millimetres as metres": (scaled(1000), "set unit: mm"),
+    "metres as millimetres": (scaled(0.001), "set unit: m"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_name_the_object_and_leave_no_file(fault, tmp_path):
+    surface, message = FAULTS[fault]
+    with pytest.raises(InputError, match=f"my_source: object 'part'.*{message}"):
+        write_objects(iter([box(), surface]), "my_source", tmp_path / "objects.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_duplicate_names_and_no_objects(tmp_path):
+    with pytest.raises(InputError, match=r"object 'box'.*twice"):
+        write_objects([box(), box(extents=(1, 1, 1))], "s", tmp_path / "o.npz")
+    with pytest.raises(InputError, match="no object"):
+        write_objects([], "s", tmp_path / "o.npz")
+
+
+def test_written_objects_come_back(tmp_path, capsys):
+    path = tmp_path / "run" / "objects.npz"
+    surfaces = [box(), view(), box("large", (1, 1, 1))]
+    write_objects(surfaces, "s", path, n_points=128)
+    clouds = ObjectClouds.load(path)
+    assert clouds.names == ("box", "view", "large")
+    assert len(clouds) == 3
+    for i, surface in enumerate(surfaces):
+        points_m, normals, diameter_m = canonical_cloud(surface, "s", 128)
+        assert np.array_equal(clouds.points(i), points_m)
+        assert np.array_equal(clouds.normals(i), normals)
+        assert clouds.diameters_m[i] == diameter_m
+    assert "s: view: 400 points" in capsys.readouterr().err
+
+
+def test_inconsistent_file_is_refused(tmp_path):
+    path = tmp_path / "objects.npz"
+    write_objects([box(), view()], "s", path, n_points=128)
+    arrays = dict(np.load(path))
+    for offsets in ([0, 128], [0, 128, 500], [0, 600, 528], [1, 128, 528]):
+        np.savez(path, **{**arrays, "offsets": np.array(offsets)})
+        with pytest.raises(InputError, match="do not fit together"):
+            ObjectClouds.load(path)
+    with pytest.raises(InputError, match="no such file"):
+        ObjectClouds.load(tmp_path / "other.npz")
