@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class Registrations:
         severity_noise, severity_rotation_rad, severity_translation, severity_crop: (S,) as drawn, 0 where not applied.
         T_target_source_true, T_target_source_init, T_target_source_icp: (S, 4, 4), translations in metres.
         fitness, inlier_rmse: (S,) of ICP.
+        embedding: (S, d) of an encoder, for explainers that read it; in a file of its own.
     """
 
     sample: np.ndarray
@@ -52,6 +54,7 @@ class Registrations:
     T_target_source_icp: np.ndarray
     fitness: np.ndarray
     inlier_rmse: np.ndarray
+    embedding: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.sample)
@@ -66,17 +69,20 @@ class Registrations:
 
     def subset(self, rows: np.ndarray) -> Registrations:
         """Return the given rows, in the given order."""
-        columns = {
-            field.name: getattr(self, field.name)[rows]
-            for field in fields(self)
-            if field.name not in ("points", "offsets")
-        }
-        clouds = [self.cloud(i) for i in rows]
-        return replace(self, **columns, **_ragged(clouds))
+        columns = {name: getattr(self, name)[rows] for name in COLUMNS}
+        if self.embedding is not None:
+            columns["embedding"] = self.embedding[rows]
+        return replace(self, **columns, **_ragged([self.cloud(i) for i in rows]))
+
+    def without_labels(self) -> Registrations:
+        """Return the same registrations as an explainer may see them: nothing that tells what was perturbed."""
+        unknown = {name: np.full_like(getattr(self, name), np.nan) for name in COLUMNS if name.startswith("severity_")}
+        unknown["T_target_source_true"] = np.full_like(self.T_target_source_true, np.nan)
+        return replace(self, concept=np.full(len(self), ""), **unknown)
 
     def save(self, path: str | Path) -> None:
         """Write the npz of DESIGN §2."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)})
+        save_arrays(path, {name: getattr(self, name) for name in (*COLUMNS, "points", "offsets")})
 
     @classmethod
     def load(cls, path: str | Path) -> Registrations:
@@ -85,8 +91,8 @@ class Registrations:
         Raises:
             InputError: the file is missing, damaged, holds pickled objects, wrong shapes, NaN or unknown labels.
         """
-        shapes: dict[str, tuple[int | str, ...]] = {field.name: ("S",) for field in fields(cls)}
-        shapes |= {name: ("S", 4, 4) for name in shapes if name.startswith("T_")}
+        shapes: dict[str, tuple[int | str, ...]] = {name: ("S",) for name in COLUMNS}
+        shapes |= {name: ("S", 4, 4) for name in COLUMNS if name.startswith("T_")}
         shapes |= {"points": ("P", 3), "offsets": ("O",)}
         arrays = load_arrays(path, shapes, made_by="python -m gpca registrations")
         remedy = "make it anew with 'python -m gpca registrations'"
@@ -98,7 +104,10 @@ class Registrations:
         for name, known in (("split", SPLITS), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
                 raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
-        return cls(**{field.name: arrays[field.name] for field in fields(cls)})
+        return cls(**{name: arrays[name] for name in shapes})
+
+
+COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in ("points", "offsets", "embedding"))
 
 
 @dataclass(frozen=True)
@@ -128,11 +137,14 @@ class RegistrationSettings:
 
 def make_registrations(
     objects: ObjectClouds, source: str, seed: int, settings: RegistrationSettings
-) -> Registrations:
+) -> tuple[Registrations, np.ndarray]:
     """Perturb, align by ICP and label: the data set of one source and seed.
 
     Sample n of a split has concept n mod 3 and object ⌊n/3⌋ mod O; everything random in it comes from its own
     generator, named by source, seed, split and n, so that it does not depend on how many samples there are.
+
+    Returns:
+        the registrations, and the seconds (S,) that ICP took for each.
     """
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
     records = []
@@ -142,8 +154,9 @@ def make_registrations(
         random = generator(source, seed, "registration", split, n)
         record = _register_one(objects, object_index, concept, settings, random)
         records.append(record | {"sample": len(records), "split": split})
-    columns = {name: np.array([record[name] for record in records]) for name in records[0] if name != "cloud"}
-    return Registrations(**columns, **_ragged([record["cloud"] for record in records]))
+    columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
+    registrations = Registrations(**columns, **_ragged([record["cloud"] for record in records]))
+    return registrations, np.array([record["icp_seconds"] for record in records])
 
 
 def _register_one(
@@ -158,8 +171,10 @@ def _register_one(
 
     perturbed = PERTURBATIONS[concept](points[source_rows], settings.severities, random)
     T_init = np.eye(4)
+    started = perf_counter()
     icp = ICP(points[target_rows], objects.normals(object_index)[target_rows], settings.icp)
     registration = icp.register(perturbed.points, T_init)
+    icp_seconds = perf_counter() - started
     severity = {name: perturbed.severity.get(name, 0.0) for name in ("noise", "rotation_rad", "translation", "crop")}
     return {
         "concept": concept,
@@ -170,6 +185,7 @@ def _register_one(
         "T_target_source_true": scale_translation(perturbed.T_target_source_true, diameter_m),
         "T_target_source_init": T_init,
         "T_target_source_icp": scale_translation(registration.T_target_source, diameter_m),
+        "icp_seconds": icp_seconds,
         "fitness": registration.fitness,
         "inlier_rmse": registration.inlier_rmse,
         **{f"severity_{name}": value for name, value in severity.items()},

@@ -36,9 +36,7 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
         np.savez(partial, allow_pickle=False, **arrays)
 
 
-def load_arrays(
-    path: str | Path, shapes: Mapping[str, tuple[int | str, ...]], made_by: str
-) -> dict[str, np.ndarray]:
+def load_arrays(path: str | Path, shapes: Mapping[str, tuple[int | str, ...]], made_by: str) -> dict[str, np.ndarray]:
     """Load an npz and check the arrays that a stage needs.
 
     Args:
@@ -53,13 +51,15 @@ def load_arrays(
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such file", f"make it with '{made_by}'")
+    reason = "is not a readable npz archive"
+    if not zipfile.is_zipfile(path):
+        raise InputError(path, reason, f"make it anew with '{made_by}'")
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, AttributeError) as fault:
-        reason = "holds pickled objects, which are never loaded" if "pickle" in str(fault).lower() else (
-            "is not a readable npz archive"
-        )
+    except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
+        if "pickle" in str(fault).lower():
+            reason = "holds pickled objects, which are never loaded"
         raise InputError(path, reason, f"make it anew with '{made_by}'") from fault
     sizes: dict[str, int] = {}
     for name, shape in shapes.items():

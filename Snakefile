@@ -1,0 +1,66 @@
+"""GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names."""
+
+import os
+import sys
+
+sys.path.insert(0, workflow.basedir)
+from gpca import config as run_config
+from gpca.errors import InputError
+
+
+configfile: "config/sources.yaml"
+configfile: "config/config.yaml"
+
+
+try:
+    SOURCES = run_config.check(config)
+except InputError as fault:
+    sys.exit(f"gpca: {fault}")
+os.environ["GPCA_CONFIG_SHA256"] = run_config.sha256_of(config)
+# Jobs call `python`: the one that runs Snakemake, also where its environment is not activated.
+os.environ["PATH"] = os.pathsep.join(
+    [os.path.dirname(sys.executable), os.environ["PATH"]]
+)
+
+
+wildcard_constraints:
+    run=config["run"],
+    seed=r"\d+",
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/objects.smk"
+include: "workflow/rules/registrations.smk"
+include: "workflow/rules/encoders.smk"
+include: "workflow/rules/explainers.smk"
+include: "workflow/rules/collect.smk"
+include: "workflow/rules/tables.smk"
+include: "workflow/rules/figures.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        collect(
+            "results/{run}/{file}.csv", run=config["run"], file=["metrics", "timings"]
+        ),
+        collect(
+            "results/{run}/tables/{table}.md",
+            run=config["run"],
+            table=TABLE_EXPLAINERS,
+        ),
+        collect("results/{run}/figures/{figure}.png", run=config["run"], figure=FIGURES),
+
+
+rule smoke:
+    output:
+        touch("results/smoke/complete"),
+    log:
+        "results/logs/smoke.log",
+    conda:
+        "workflow/envs/gpca.yaml"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    shell:
+        "python -m snakemake -j{threads} all --configfile config/smoke.yaml --nolock 2>&1 | tee {log} >&2"

@@ -1,0 +1,1 @@
+"""Rival explainers, one per file, found by :func:`gpca.explainer.explainers`."""

@@ -1,0 +1,70 @@
+"""``python -m gpca <step> …``: the steps of the workflow, each usable by hand."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from importlib import import_module
+
+from gpca.errors import InputError
+
+STEPS = {
+    "objects": "meshes or clouds of a source -> canonical clouds",
+    "registrations": "canonical clouds -> perturbed pairs aligned by ICP",
+    "train": "registrations -> encoder weights",
+    "embed": "registrations and encoders -> embeddings",
+    "explain": "registrations and embeddings -> predictions of one explainer",
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one step; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    parser = argparse.ArgumentParser(prog="python -m gpca", description=__doc__)
+    steps = parser.add_subparsers(dest="step", required=True, metavar="step")
+    # Only the chosen step is imported: each brings libraries that take seconds to load.
+    chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
+    for name, summary in STEPS.items():
+        step = steps.add_parser(name, help=summary, description=summary)
+        step.add_argument("--threads", type=int, default=1, help="threads of torch, numba and OpenMP (default 1)")
+        step.add_argument("--settings", type=_mapping, default={}, help="JSON: the step's section of the config")
+        if name == chosen:
+            _set_threads(arguments)
+            module = import_module(f"gpca.steps.{name}")
+            module.add_arguments(step)
+            step.set_defaults(run=module.run)
+    try:
+        options = parser.parse_args(arguments)
+        options.run(options)
+    except InputError as fault:
+        print(f"gpca {chosen}: {fault}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _set_threads(arguments: list[str]) -> None:
+    """Pin every library's threads before any of them is loaded: Open3D and torch otherwise fight over the cores."""
+    early = argparse.ArgumentParser(add_help=False)
+    early.add_argument("--threads", type=int, default=1)
+    threads = str(max(1, early.parse_known_args(arguments)[0].threads))
+    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[variable] = threads
+
+
+def _mapping(text: str) -> dict:
+    try:
+        settings = json.loads(text)
+    except json.JSONDecodeError as fault:
+        raise argparse.ArgumentTypeError(f"not JSON: {fault}") from fault
+    if not isinstance(settings, dict):
+        raise argparse.ArgumentTypeError("not a JSON object")
+    return settings
+
+
+if __name__ == "__main__":
+    sys.exit(main())

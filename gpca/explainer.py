@@ -1,0 +1,112 @@
+"""The interface of every explainer, GP-CA itself, and how explainers are found by name.
+
+An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/`` (or here), listed in that file's
+``EXPLAINERS`` by the name under which the config switches it on::
+
+    EXPLAINERS = {"my_explainer": Entry("My explainer", MyExplainer)}
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from time import perf_counter
+from typing import Protocol
+
+import numpy as np
+
+import baselines
+from gpca.attribution import Attribution
+from gpca.dataset import Registrations
+from gpca.errors import InputError
+from gpca.perturbation import CONCEPTS
+
+
+class Explainer(Protocol):
+    """What the workflow calls; made as ``make(source, seed, **settings)``."""
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn from labelled registrations (the rows of split ``train``)."""
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Attribute every registration. What was perturbed is hidden from it, unless it is an oracle."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An explainer by name.
+
+    Attributes:
+        title: as tables head its column.
+        make: called with source, seed and the settings of the config.
+        reads: ``embeddings`` if it needs those of the encoder, else ``registrations``.
+        oracle: it is told the truth about what it explains; an upper bound, to be labelled so in its title.
+    """
+
+    title: str
+    make: Callable[..., Explainer]
+    reads: str = "registrations"
+    oracle: bool = False
+
+
+class GPCA:
+    """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds."""
+
+    def __init__(self, source: str, seed: int, **settings) -> None:
+        from gpca.gpc import GPC, GPCSettings
+
+        self._gpc = GPC(CONCEPTS, GPCSettings(**settings), source, seed)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit the GPC to the labelled embeddings."""
+        self._gpc.fit(registrations.embedding, registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Draw from the posterior at every embedding and summarise (Eqs. 4 to 7)."""
+        started = perf_counter()
+        scores_N_C, variances_N_C, bald_N = self._gpc.attribute(registrations.embedding)
+        seconds = (perf_counter() - started) / len(registrations)
+        zeros_N = np.zeros(len(registrations))
+        return Attribution(
+            concepts=CONCEPTS,
+            scores_N_C=scores_N_C,
+            variances_N_C=variances_N_C,
+            bald_N=bald_N,
+            abstained_N=zeros_N.astype(bool),
+            icp_calls_N=zeros_N.astype(int),
+            seconds_N=zeros_N + seconds,
+            icp_seconds_N=zeros_N,
+        )
+
+
+EXPLAINERS = {
+    "gpca_paper": Entry("GP-CA (paper's setting)", GPCA, reads="embeddings"),
+    "gpca": Entry("GP-CA (trained longer)", GPCA, reads="embeddings"),
+}
+
+
+def explainers() -> dict[str, Entry]:
+    """Return all explainers by name: those of this file and of every file in ``baselines/``."""
+    return {name: entry for entries in _by_module().values() for name, entry in entries.items()}
+
+
+def explainer_entry(name: str) -> Entry:
+    """Return the explainer of that name; an unknown one raises an InputError that lists the known."""
+    found = explainers()
+    if name not in found:
+        raise InputError(f"explainer '{name}'", "unknown", f"known are {', '.join(found)}")
+    return found[name]
+
+
+def explainer_module(name: str) -> str:
+    """Return the module that lists the explainer."""
+    explainer_entry(name)
+    return next(module for module, entries in _by_module().items() if name in entries)
+
+
+def _by_module() -> dict[str, dict[str, Entry]]:
+    names = sorted(f"baselines.{module.name}" for module in pkgutil.iter_modules(baselines.__path__))
+    modules = {name: getattr(import_module(name), "EXPLAINERS", {}) for name in names}
+    return {__name__: EXPLAINERS} | modules

@@ -1,0 +1,51 @@
+"""Step ``embed``: registrations and trained encoders -> ``embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz``."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from time import perf_counter
+
+import torch
+
+from gpca.attribution import read_timings, write_timings
+from gpca.dataset import Registrations
+from gpca.encoders.training import EncoderSettings, embed, load_encoder
+from gpca.files import save_arrays
+from gpca.provenance import recorded
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names, one of each per seed; ``--settings`` is the encoder's section of the config."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+")
+    parser.add_argument("--registration-timings", required=True, type=Path, nargs="+")
+    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights")
+    parser.add_argument("--out", required=True, type=Path, nargs="+")
+    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of the seconds, ICP included")
+
+
+def run(options: Namespace) -> None:
+    """Embed the clouds of every seed."""
+    torch.set_num_threads(options.threads)
+    settings = EncoderSettings(**options.settings)
+    jobs = zip(
+        options.seeds,
+        options.registrations,
+        options.registration_timings,
+        options.encoders,
+        options.out,
+        options.timings,
+        strict=True,
+    )
+    for seed, registrations_path, icp_timings, weights, out, timings in jobs:
+        with recorded([out], [registrations_path, weights], options.settings, seed=seed):
+            registrations = Registrations.load(registrations_path)
+            encoder = load_encoder(weights, settings)
+            started = perf_counter()
+            h_S_d = embed(encoder, registrations, options.source, seed, settings)
+            seconds = (perf_counter() - started) / len(h_S_d)
+            save_arrays(out, {"h": h_S_d, "sample": registrations.sample, "split": registrations.split})
+            seconds_S, icp_seconds_S = read_timings(icp_timings, registrations.sample)
+            write_timings(timings, registrations.sample, seconds_S + seconds, icp_seconds_S)

@@ -1,0 +1,26 @@
+"""Step ``objects``: one configured source -> ``objects/{source}.npz``."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.objects.canonical import write_objects
+from gpca.objects.source import resolve, surfaces
+from gpca.provenance import recorded
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is the source's entry of the config."""
+    parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
+    parser.add_argument("--data-dir", help="folder that holds the data; what is there is not downloaded")
+    parser.add_argument("--downloads", default="data/downloads", help="where downloads are kept")
+    parser.add_argument("--points", type=int, default=16384, help="points sampled on each mesh")
+    parser.add_argument("--out", required=True, type=Path)
+
+
+def run(options: Namespace) -> None:
+    """Read the source's surfaces, sample them and write the canonical clouds."""
+    entry = resolve(options.settings, options.data_dir)
+    with recorded([options.out], [], {"entry": entry, "points": options.points}):
+        write_objects(surfaces(entry, Path(options.downloads)), options.source, options.out, options.points)

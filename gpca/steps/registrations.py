@@ -1,0 +1,30 @@
+"""Step ``registrations``: canonical clouds -> ``registrations/{source}/seed{seed}.npz``."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.attribution import write_timings
+from gpca.dataset import RegistrationSettings, make_registrations
+from gpca.objects.canonical import ObjectClouds
+from gpca.provenance import recorded
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is the config's section ``registrations``."""
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds of every ICP")
+
+
+def run(options: Namespace) -> None:
+    """Perturb and align."""
+    settings = RegistrationSettings.from_dict(options.settings)
+    objects = ObjectClouds.load(options.objects)
+    with recorded([options.out], [options.objects], options.settings, seed=options.seed):
+        registrations, icp_seconds_S = make_registrations(objects, options.source, options.seed, settings)
+        registrations.save(options.out)
+        write_timings(options.timings, registrations.sample, icp_seconds_S, icp_seconds_S)

@@ -1,0 +1,39 @@
+"""Step ``train``: registrations -> ``encoders/{source}/{backbone}/seed{seed}.pt`` and its training curve."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from gpca.dataset import Registrations
+from gpca.encoders.training import EncoderSettings, train_encoder
+from gpca.files import whole_file
+from gpca.provenance import recorded
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is the encoder's section of the config."""
+    parser.add_argument("--registrations", required=True, type=Path)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--out", required=True, type=Path, help="weights")
+    parser.add_argument("--curve", required=True, type=Path, help="CSV of the training curve")
+
+
+def run(options: Namespace) -> None:
+    """Train, keeping a checkpoint beside the weights until they are written."""
+    torch.set_num_threads(options.threads)
+    settings = EncoderSettings(**options.settings)
+    registrations = Registrations.load(options.registrations)
+    # Not an output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
+    checkpoint = options.out.with_suffix(".checkpoint")
+    with recorded([options.out], [options.registrations], options.settings, seed=options.seed):
+        encoder, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
+        with whole_file(options.out) as partial:
+            torch.save(encoder.state_dict(), partial)
+        with whole_file(options.curve) as partial:
+            pd.DataFrame(curve).to_csv(partial, index=False, float_format="%.6g", lineterminator="\n")
+        checkpoint.unlink(missing_ok=True)

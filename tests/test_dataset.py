@@ -1,0 +1,170 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from gpca import dataset
+from gpca.dataset import COLUMNS, Registrations, RegistrationSettings, make_registrations
+from gpca.errors import InputError
+from gpca.perturbation import CONCEPTS
+from gpca.registration import ICP, ICPSettings
+from gpca.rigid import inverse, rotation_angle_rad, transform
+
+
+def arrays_of(registrations):
+    return {name: getattr(registrations, name) for name in (*COLUMNS, "points", "offsets")}
+
+
+def in_object_frame(registrations, row):
+    """The cloud with ICP's pose and the perturbation's undone, in metres."""
+    back = registrations.T_target_source_true[row] @ inverse(registrations.T_target_source_icp[row])
+    return transform(back, registrations.cloud(row) * registrations.diameter_m[row])
+
+
+def test_concepts_and_objects_are_balanced_in_both_splits(registrations):
+    for split, per_cell in (("train", 6), ("test", 3)):
+        rows = registrations.rows(split)
+        cells = list(zip(registrations.concept[rows], registrations.object_name[rows], strict=True))
+        assert {cell: cells.count(cell) for cell in cells} == {
+            (concept, name): per_cell for concept in CONCEPTS for name in ("brick", "cone")
+        }
+
+
+def test_a_sample_does_not_depend_on_how_many_there_are(objects, registrations):
+    few, _ = make_registrations(objects, "tiny", 0, RegistrationSettings(train=6, test=3, points=256))
+    for split, n in (("train", 6), ("test", 3)):
+        one, other = few.subset(few.rows(split)), registrations.subset(registrations.rows(split)[:n])
+        for name in {*COLUMNS, "points", "offsets"} - {"sample"}:
+            assert np.array_equal(getattr(one, name), getattr(other, name)), name
+
+
+@pytest.mark.parametrize(("source", "seed"), [("tiny", 1), ("other", 0)])
+def test_another_seed_or_source_gives_other_samples(objects, registrations, source, seed):
+    other, _ = make_registrations(objects, source, seed, RegistrationSettings(train=3, test=3, points=256))
+    drawn = np.concatenate([getattr(other, name) for name in ("severity_noise", "severity_crop")])
+    assert not set(drawn[drawn > 0]) & {*registrations.severity_noise, *registrations.severity_crop}
+
+
+def test_severities_are_recorded_for_the_concept_alone(registrations):
+    for name, concept in {"noise": "noise", "rotation_rad": "pose", "translation": "pose", "crop": "overlap"}.items():
+        assert np.array_equal(getattr(registrations, f"severity_{name}") > 0, registrations.concept == concept)
+    kept = np.diff(registrations.offsets)
+    assert np.array_equal(kept, np.round(256 * (1 - registrations.severity_crop)).astype(int))
+    angles = [rotation_angle_rad(T) for T in registrations.T_target_source_true]
+    assert angles == pytest.approx(registrations.severity_rotation_rad, abs=1e-7)
+    shifts = np.linalg.norm(registrations.T_target_source_true[:, :3, 3], axis=1) / registrations.diameter_m
+    assert shifts == pytest.approx(registrations.severity_translation)
+
+
+def test_poses_undone_the_clean_points_lie_on_the_object(objects, registrations):
+    for row in range(len(registrations)):
+        tree = cKDTree(objects.points(registrations.object_index[row]))
+        distance = tree.query(in_object_frame(registrations, row))[0] / registrations.diameter_m[row]
+        if registrations.concept[row] == "noise":
+            assert distance.mean() > 0.3 * registrations.severity_noise[row]
+        else:
+            assert distance.max() < 1e-6
+
+
+def test_source_and_target_share_no_point_and_icp_gives_the_stored_cloud(objects, monkeypatch):
+    seen = []
+
+    class Recorded(ICP):
+        def __init__(self, target, normals, settings):
+            super().__init__(target, normals, settings)
+            self.target = target
+
+        def register(self, source, T_target_source_init):
+            result = super().register(source, T_target_source_init)
+            seen.append((self.target, source, T_target_source_init, result))
+            return result
+
+    monkeypatch.setattr(dataset, "ICP", Recorded)
+    settings = RegistrationSettings(train=6, test=6, points=2048)
+    made, icp_seconds = make_registrations(objects, "tiny", 0, settings)
+    assert (icp_seconds > 0).all()
+    for row, (target, source, T_init, result) in enumerate(seen):
+        assert len(target) == 300  # half of the object's 600 points, though 2048 were asked for
+        clean = transform(made.T_target_source_true[row], source * made.diameter_m[row]) / made.diameter_m[row]
+        assert cKDTree(target).query(clean)[0].min() > 1e-7
+        assert np.allclose(made.cloud(row), transform(result.T_target_source, source), atol=1e-6)
+        in_metres = transform(made.T_target_source_icp[row], source * made.diameter_m[row]) / made.diameter_m[row]
+        assert np.allclose(made.cloud(row), in_metres, atol=1e-6)
+        assert np.array_equal(made.T_target_source_init[row], T_init)
+        assert (made.fitness[row], made.inlier_rmse[row]) == (result.fitness, result.inlier_rmse)
+
+
+def test_a_subset_keeps_every_rows_cloud_and_columns(registrations):
+    with_embedding = dataclasses.replace(registrations, embedding=np.arange(len(registrations))[:, None] * 1.0)
+    rows = np.array([17, 2, 40, 2])
+    chosen = with_embedding.subset(rows)
+    assert len(chosen) == 4
+    for new, old in enumerate(rows):
+        assert np.array_equal(chosen.cloud(new), registrations.cloud(old))
+        assert chosen.embedding[new] == old
+        for name in COLUMNS:
+            assert np.array_equal(getattr(chosen, name)[new], getattr(registrations, name)[old])
+
+
+def test_without_labels_nothing_tells_the_perturbation(registrations):
+    blind = registrations.without_labels()
+    assert set(blind.concept) == {""}
+    for name in COLUMNS:
+        if name.startswith("severity_") or name == "T_target_source_true":
+            assert np.isnan(getattr(blind, name)).all()
+    for name in ("points", "offsets", "T_target_source_icp", "fitness", "sample"):
+        assert np.array_equal(getattr(blind, name), getattr(registrations, name))
+
+
+def test_registrations_survive_the_file(tmp_path, registrations):
+    registrations.save(tmp_path / "a.npz")
+    loaded = Registrations.load(tmp_path / "a.npz")
+    for name, array in arrays_of(registrations).items():
+        assert getattr(loaded, name).dtype == array.dtype
+        assert np.array_equal(getattr(loaded, name), array)
+    loaded.save(tmp_path / "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def changed(array, index, value):
+    array = array.copy()
+    array[index] = value
+    return array
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "expected"),
+    [
+        ("concept", lambda a: a.astype(object), "pickled"),
+        ("concept", lambda a: changed(a, 3, "dust"), "unknown concept 'dust'; known are noise, pose, overlap"),
+        ("split", lambda a: changed(a.astype("U9"), 0, "validate"), "unknown split"),
+        ("points", lambda a: a[:, :2], r"'points' is \d+×2, not \d+×3"),
+        ("points", lambda a: changed(a, 5, np.nan), "'points' holds NaN"),
+        ("points", lambda a: a[:-1], "'offsets' do not match"),
+        ("offsets", lambda a: a[:-1], "'offsets' do not match"),
+        ("offsets", lambda a: a[:0], "'offsets' do not match"),
+        ("offsets", lambda a: changed(a, 1, a[2]), "fewer than 3 points"),
+        ("offsets", lambda a: changed(a, 1, a[3]), "fewer than 3 points"),
+        ("fitness", lambda a: a[:-1], r"'fitness' is 53, not 54"),
+        ("T_target_source_icp", lambda a: a[:, :3], "54×3×4, not 54×4×4"),
+        ("severity_crop", lambda a: None, "'severity_crop' is missing"),
+    ],
+)
+def test_faulty_files_are_refused_with_their_name(tmp_path, registrations, name, damage, expected):
+    path = tmp_path / "seed0.npz"
+    arrays = arrays_of(registrations) | {name: damage(getattr(registrations, name))}
+    np.savez(path, **{key: array for key, array in arrays.items() if array is not None})
+    with pytest.raises(InputError, match=expected) as caught:
+        Registrations.load(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_settings_come_from_the_config():
+    config = {"train": 9, "severities": {"noise": [0.1, 0.2]}, "icp": {"method": "point_to_plane"}}
+    settings = RegistrationSettings.from_dict(config)
+    assert (settings.train, settings.test, settings.severities.noise) == (9, 200, (0.1, 0.2))
+    assert settings.icp == ICPSettings("point_to_plane")
+    assert set(config) == {"train", "severities", "icp"}
+    with pytest.raises(InputError, match="'icp2': unknown"):
+        RegistrationSettings.from_dict({"icp": {"method": "icp2"}})

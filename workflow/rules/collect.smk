@@ -1,0 +1,34 @@
+rule metrics:
+    input:
+        predictions=of_all_explainers("predictions"),
+        code=code_files("gpca.metrics", "gpca.reporting.script"),
+    output:
+        "results/{run}/metrics.csv",
+    log:
+        "results/{run}/logs/metrics.log",
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    script:
+        "../scripts/collect_metrics.py"
+
+
+rule timings:
+    input:
+        timings=of_all_explainers("timings"),
+        code=code_files("gpca.metrics", "gpca.reporting.script"),
+    output:
+        "results/{run}/timings.csv",
+    log:
+        "results/{run}/logs/timings.log",
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    script:
+        "../scripts/collect_timings.py"

@@ -1,0 +1,51 @@
+rule objects_figure:
+    input:
+        objects="results/{run}/objects/{source}.npz",
+        code=code_files("gpca.reporting.contact_sheet", "gpca.reporting.script"),
+    output:
+        pdf="results/{run}/figures/objects_{source}.pdf",
+        png=report(
+            "results/{run}/figures/objects_{source}.png",
+            category="Objects",
+            labels={"source": "{source}"},
+        ),
+    log:
+        "results/{run}/logs/figures/objects_{source}.log",
+    benchmark:
+        "results/{run}/benchmarks/figures/objects_{source}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        title=lambda wildcards: title_of(wildcards.source),
+    script:
+        "../scripts/contact_sheet.py"
+
+
+rule fig3_concepts:
+    input:
+        objects=f"results/{{run}}/objects/{config['figures']['fig3_source']}.npz",
+        registrations=f"results/{{run}}/registrations/{config['figures']['fig3_source']}/seed{SEEDS[0]}.npz",
+        code=code_files("gpca.reporting.concepts_figure", "gpca.reporting.script"),
+    output:
+        pdf="results/{run}/figures/fig3_concepts.pdf",
+        png=report(
+            "results/{run}/figures/fig3_concepts.png",
+            category="Figures",
+            labels={"figure": "3"},
+        ),
+    log:
+        "results/{run}/logs/figures/fig3_concepts.log",
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        title=title_of(config["figures"]["fig3_source"]),
+    script:
+        "../scripts/concepts_figure.py"

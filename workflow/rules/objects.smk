@@ -1,0 +1,27 @@
+rule objects:
+    input:
+        code=objects_code,
+    output:
+        "results/{run}/objects/{source}.npz",
+    log:
+        "results/{run}/logs/objects/{source}.log",
+    benchmark:
+        "results/{run}/benchmarks/objects/{source}.tsv"
+    wildcard_constraints:
+        source="|".join(CONFIGURED_SOURCES),
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        settings=lambda wildcards: json.dumps(
+            config["sources"][wildcards.source], sort_keys=True
+        ),
+        data_dir=f"--data-dir '{config['data_dir']}'" if config["data_dir"] else "",
+        downloads=config["downloads"],
+        points=config["objects"]["points"],
+    shell:
+        "python -m gpca objects --threads {threads} --source {wildcards.source} --settings {params.settings:q} "
+        "{params.data_dir} --downloads {params.downloads:q} --points {params.points} --out {output} 2> {log}"

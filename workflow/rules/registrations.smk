@@ -1,0 +1,23 @@
+rule registrations:
+    input:
+        objects="results/{run}/objects/{source}.npz",
+        code=code_files("gpca.steps.registrations"),
+    output:
+        registrations="results/{run}/registrations/{source}/seed{seed}.npz",
+        timings="results/{run}/timings/{source}/icp/seed{seed}.csv",
+    log:
+        "results/{run}/logs/registrations/{source}/seed{seed}.log",
+    benchmark:
+        "results/{run}/benchmarks/registrations/{source}/seed{seed}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        settings=settings("registrations"),
+    shell:
+        "python -m gpca registrations --threads {threads} --objects {input.objects} --source {wildcards.source} "
+        "--seed {wildcards.seed} --settings {params.settings:q} "
+        "--out {output.registrations} --timings {output.timings} 2> {log}"

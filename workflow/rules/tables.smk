@@ -1,0 +1,32 @@
+rule table:
+    input:
+        predictions=table_predictions,
+        code=code_files(
+            "gpca.metrics", "gpca.reporting.tables", "gpca.reporting.script"
+        ),
+    output:
+        csv=report(
+            "results/{run}/tables/{table}.csv",
+            category="Tables",
+            labels={"table": "{table}"},
+        ),
+        md="results/{run}/tables/{table}.md",
+        tex="results/{run}/tables/{table}.tex",
+    log:
+        "results/{run}/logs/tables/{table}.log",
+    wildcard_constraints:
+        table="|".join(TABLE_EXPLAINERS),
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        sources={
+            name: {"title": entry["title"], "stand_in": entry["stand_in"]}
+            for name, entry in SOURCES.items()
+        },
+        explainers={name: explainer_entry(name).title for name in config["explainers"]},
+    script:
+        "../scripts/table.py"

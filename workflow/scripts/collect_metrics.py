@@ -1,0 +1,7 @@
+"""Prediction files -> metrics.csv."""
+
+from gpca.metrics import collect, write_metrics
+from gpca.reporting.script import logged
+
+with logged(snakemake.log):
+    write_metrics(collect(snakemake.input.predictions), snakemake.output[0])

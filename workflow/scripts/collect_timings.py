@@ -1,0 +1,7 @@
+"""Timing files -> timings.csv."""
+
+from gpca.metrics import collect_timings, write_metrics
+from gpca.reporting.script import logged
+
+with logged(snakemake.log):
+    write_metrics(collect_timings(snakemake.input.timings), snakemake.output[0])

@@ -1,0 +1,14 @@
+"""Objects and registrations of one source -> fig3_concepts."""
+
+from gpca.reporting.concepts_figure import draw_concepts_figure
+from gpca.reporting.script import logged
+
+with logged(snakemake.log):
+    draw_concepts_figure(
+        snakemake.input.objects,
+        snakemake.input.registrations,
+        snakemake.params.title,
+        snakemake.output.pdf,
+        snakemake.output.png,
+        snakemake.params.get("object_name"),
+    )

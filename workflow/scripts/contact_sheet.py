@@ -1,0 +1,7 @@
+"""Objects of one source -> one picture of each."""
+
+from gpca.reporting.contact_sheet import draw_contact_sheet
+from gpca.reporting.script import logged
+
+with logged(snakemake.log):
+    draw_contact_sheet(snakemake.input.objects, snakemake.params.title, snakemake.output.pdf, snakemake.output.png)
