@@ -1,6 +1,4 @@
-"""GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names."""
-
-import os
+# GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names.
 import sys
 
 sys.path.insert(0, workflow.basedir)
@@ -16,11 +14,7 @@ try:
     SOURCES = run_config.check(config)
 except InputError as fault:
     sys.exit(f"gpca: {fault}")
-os.environ["GPCA_CONFIG_SHA256"] = run_config.sha256_of(config)
-# Jobs call `python`: the one that runs Snakemake, also where its environment is not activated.
-os.environ["PATH"] = os.pathsep.join(
-    [os.path.dirname(sys.executable), os.environ["PATH"]]
-)
+run_config.export(config)
 
 
 wildcard_constraints:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
+import os
+import sys
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry
 from gpca.objects.source import resolve
+from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
 
 SCHEMA = Path(__file__).resolve().parent.parent / "workflow" / "schemas" / "config.schema.yaml"
 
@@ -33,6 +34,9 @@ def check(config: dict) -> dict[str, dict]:
             raise InputError(f"config key registrations.severities.{name}", f"{limits} runs downwards", "swap the two")
     for name, encoder in config["encoders"].items():
         with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
+    if (name := config["embedding"]["encoder"]) not in config["encoders"]:
+        known = ", ".join(config["encoders"])
+        raise InputError("config key embedding.encoder", f"no encoder '{name}'", f"known are {known}")
     for name in config["explainers"]:
         with_key(f"explainers.{name}", explainer_entry, name)
     sources = {
@@ -53,9 +57,13 @@ def with_key(key: str, function, *arguments):
         raise InputError(f"config key {key}", str(fault)) from fault
 
 
-def sha256_of(config: dict) -> str:
-    """Return the SHA-256 of a configuration as JSON with sorted keys."""
-    return hashlib.sha256(json.dumps(config, sort_keys=True).encode()).hexdigest()
+def export(config: dict) -> None:
+    """Set what the jobs of a run inherit: the configuration's hash, for their provenance, and this very Python.
+
+    Jobs call ``python``, which need not be the one that runs the workflow where its environment is not activated.
+    """
+    os.environ[CONFIG_VARIABLE] = sha256_of_settings(config)
+    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 
 def _check_schema(config: dict) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from time import perf_counter
 
@@ -76,7 +76,8 @@ class Registrations:
 
     def without_labels(self) -> Registrations:
         """Return the same registrations as an explainer may see them: nothing that tells what was perturbed."""
-        unknown = {name: np.full_like(getattr(self, name), np.nan) for name in COLUMNS if name.startswith("severity_")}
+        nan_S = np.full(len(self), np.nan)
+        unknown = dict.fromkeys((name for name in COLUMNS if name.startswith("severity_")), nan_S)
         unknown["T_target_source_true"] = np.full_like(self.T_target_source_true, np.nan)
         return replace(self, concept=np.full(len(self), ""), **unknown)
 
@@ -107,7 +108,8 @@ class Registrations:
         return cls(**{name: arrays[name] for name in shapes})
 
 
-COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in ("points", "offsets", "embedding"))
+NOT_COLUMNS = ("points", "offsets", "embedding")
+COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in NOT_COLUMNS)
 
 
 @dataclass(frozen=True)
@@ -124,8 +126,8 @@ class RegistrationSettings:
     train: int = 800
     test: int = 200
     points: int = 2048
-    severities: Severities = Severities()
-    icp: ICPSettings = ICPSettings()
+    severities: Severities = field(default_factory=Severities)
+    icp: ICPSettings = field(default_factory=ICPSettings)
 
     @classmethod
     def from_dict(cls, settings: dict) -> RegistrationSettings:

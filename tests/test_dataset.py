@@ -5,15 +5,11 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca import dataset
-from gpca.dataset import COLUMNS, Registrations, RegistrationSettings, make_registrations
+from gpca.dataset import COLUMNS, RegistrationSettings, make_registrations
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
 from gpca.registration import ICP, ICPSettings
 from gpca.rigid import inverse, rotation_angle_rad, transform
-
-
-def arrays_of(registrations):
-    return {name: getattr(registrations, name) for name in (*COLUMNS, "points", "offsets")}
 
 
 def in_object_frame(registrations, row):
@@ -115,49 +111,6 @@ def test_without_labels_nothing_tells_the_perturbation(registrations):
             assert np.isnan(getattr(blind, name)).all()
     for name in ("points", "offsets", "T_target_source_icp", "fitness", "sample"):
         assert np.array_equal(getattr(blind, name), getattr(registrations, name))
-
-
-def test_registrations_survive_the_file(tmp_path, registrations):
-    registrations.save(tmp_path / "a.npz")
-    loaded = Registrations.load(tmp_path / "a.npz")
-    for name, array in arrays_of(registrations).items():
-        assert getattr(loaded, name).dtype == array.dtype
-        assert np.array_equal(getattr(loaded, name), array)
-    loaded.save(tmp_path / "b.npz")
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-
-
-def changed(array, index, value):
-    array = array.copy()
-    array[index] = value
-    return array
-
-
-@pytest.mark.parametrize(
-    ("name", "damage", "expected"),
-    [
-        ("concept", lambda a: a.astype(object), "pickled"),
-        ("concept", lambda a: changed(a, 3, "dust"), "unknown concept 'dust'; known are noise, pose, overlap"),
-        ("split", lambda a: changed(a.astype("U9"), 0, "validate"), "unknown split"),
-        ("points", lambda a: a[:, :2], r"'points' is \d+×2, not \d+×3"),
-        ("points", lambda a: changed(a, 5, np.nan), "'points' holds NaN"),
-        ("points", lambda a: a[:-1], "'offsets' do not match"),
-        ("offsets", lambda a: a[:-1], "'offsets' do not match"),
-        ("offsets", lambda a: a[:0], "'offsets' do not match"),
-        ("offsets", lambda a: changed(a, 1, a[2]), "fewer than 3 points"),
-        ("offsets", lambda a: changed(a, 1, a[3]), "fewer than 3 points"),
-        ("fitness", lambda a: a[:-1], r"'fitness' is 53, not 54"),
-        ("T_target_source_icp", lambda a: a[:, :3], "54×3×4, not 54×4×4"),
-        ("severity_crop", lambda a: None, "'severity_crop' is missing"),
-    ],
-)
-def test_faulty_files_are_refused_with_their_name(tmp_path, registrations, name, damage, expected):
-    path = tmp_path / "seed0.npz"
-    arrays = arrays_of(registrations) | {name: damage(getattr(registrations, name))}
-    np.savez(path, **{key: array for key, array in arrays.items() if array is not None})
-    with pytest.raises(InputError, match=expected) as caught:
-        Registrations.load(path)
-    assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_settings_come_from_the_config():

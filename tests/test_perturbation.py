@@ -15,8 +15,8 @@ LIMITS = {
 DRAWN = {"noise": {"noise"}, "pose": {"rotation_rad", "translation"}, "overlap": {"crop"}}
 
 
-def perturbed(concept, seed, severities=Severities()):
-    return PERTURBATIONS[concept](POINTS, severities, np.random.default_rng(seed))
+def perturbed(concept, seed):
+    return PERTURBATIONS[concept](POINTS, Severities(), np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("concept", CONCEPTS)

@@ -19,6 +19,7 @@ import torch
 from torch import nn
 
 from gpca.encoders import edge_kernels
+from gpca.errors import InputError
 
 NEGATIVE_SLOPE = 0.2
 
@@ -27,8 +28,14 @@ def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
     """Return the indices (B, N, k) of each point's k nearest points in feature space, itself included.
 
     The order within a neighbourhood is unspecified, because EdgeConv does not depend on it.
+
+    Raises:
+        InputError: a cloud has fewer than k points.
     """
     x_B_N_F = x_B_N_F.detach()
+    n_points = x_B_N_F.shape[1]
+    if n_points < k:
+        raise InputError(f"cloud of {n_points} points", f"has no {k} neighbours", "raise encoder.points or lower k")
     squares_B_1_N = (x_B_N_F * x_B_N_F).sum(-1)[:, None, :]
     # |x_i|² is the same for a whole row and does not change which points are nearest.
     distances_B_N_N = torch.baddbmm(squares_B_1_N, x_B_N_F, x_B_N_F.transpose(1, 2), alpha=-2)

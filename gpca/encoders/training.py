@@ -6,6 +6,7 @@ would erase the pose concept, jitter the noise concept, crops the overlap concep
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -65,7 +66,7 @@ def train_encoder(
     """Train on the rows of split ``train``.
 
     Args:
-        checkpoint: where the state after every epoch is kept; if it is there and of the same settings, training
+        checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
             continues from it and ends with the same weights as an unbroken run.
 
     Returns:
@@ -82,7 +83,7 @@ def train_encoder(
         optimiser, settings.learning_rate, total_steps=settings.epochs * batches, pct_start=0.25
     )
     state = {"model": model, "optimiser": optimiser, "schedule": schedule}
-    identity = repr((source, seed, asdict(settings), len(rows)))
+    identity = repr((source, seed, asdict(settings), _fingerprint(registrations)))
     curve = _resume(checkpoint, identity, state)
 
     model.train()
@@ -98,7 +99,7 @@ def train_encoder(
             loss.backward()
             optimiser.step()
             schedule.step()
-            loss_sum += float(loss) * len(batch_rows)
+            loss_sum += loss.item() * len(batch_rows)
             correct += float((logits_B_C.argmax(dim=1) == labels_B).sum())
         curve.append(
             {
@@ -152,6 +153,14 @@ def load_encoder(weights: Path, settings: EncoderSettings) -> nn.Module:
     return encoder.eval()
 
 
+def _fingerprint(registrations: Registrations) -> str:
+    """Hash what training sees: the clouds, their labels and their splits."""
+    digest = hashlib.sha256(registrations.points.tobytes())
+    for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
+        digest.update(repr(column.tolist()).encode())
+    return digest.hexdigest()
+
+
 def _keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]) -> None:
     if checkpoint is None:
         return
@@ -161,14 +170,14 @@ def _keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]
 
 
 def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
-    """Load the checkpoint into `state`; an unreadable one or one of other settings is left aside."""
+    """Load the checkpoint into `state`; an unreadable one or one of other settings or data is left aside."""
     if checkpoint is None or not checkpoint.is_file():
         return []
     try:
         content = torch.load(checkpoint, weights_only=True)
     except Exception:  # whatever a damaged file makes torch raise, training from the start is right
         return []
-    if content.get("identity") != identity:
+    if not isinstance(content, dict) or content.get("identity") != identity:
         return []
     for name, part in state.items():
         part.load_state_dict(content[name])

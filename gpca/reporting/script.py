@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.provenance import recorded
 
 
 @contextmanager
-def logged(log: Sequence[str]) -> Iterator[None]:
-    """Send stderr to the first file of `log`, if there is one; an InputError ends as its one line and status 2."""
+def job(snakemake) -> Iterator[None]:
+    """Run a job of the workflow: stderr to its log, provenance beside its outputs.
+
+    An InputError ends as its one line and status 2.
+
+    Args:
+        snakemake: the object that Snakemake gives to a script; its input `code` is no data.
+    """
+    data = [path for name, paths in _named(snakemake.input) if name != "code" for path in paths]
+    parameters = {name: value for name, value in snakemake.params.items() if isinstance(name, str)}
     with ExitStack() as stack:
-        if log:
-            Path(log[0]).parent.mkdir(parents=True, exist_ok=True)
-            stack.enter_context(redirect_stderr(stack.enter_context(Path(log[0]).open("w", encoding="utf-8"))))
+        if snakemake.log:
+            Path(snakemake.log[0]).parent.mkdir(parents=True, exist_ok=True)
+            log = stack.enter_context(Path(snakemake.log[0]).open("w", encoding="utf-8"))
+            stack.enter_context(redirect_stderr(log))
         try:
-            yield
+            with recorded(list(snakemake.output), data, parameters):
+                yield
         except InputError as fault:
             print(fault, file=sys.stderr)
             sys.exit(2)
+
+
+def _named(files) -> list[tuple[str, list[str]]]:
+    return [(name, [paths] if isinstance(paths, str) else list(paths)) for name, paths in files.items()]

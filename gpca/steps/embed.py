@@ -1,4 +1,4 @@
-"""Step ``embed``: registrations and trained encoders -> ``embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz``."""
+"""Step ``embed``: registrations and encoders -> ``embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz``."""
 
 from __future__ import annotations
 

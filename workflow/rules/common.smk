@@ -4,6 +4,7 @@ from pathlib import Path
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.explainer import explainer_entry, explainer_module
+from gpca.objects.procedural import FAMILIES
 
 SEEDS = config["seeds"]
 
@@ -61,20 +62,18 @@ def encoder_code(step):
 
 def explainer_inputs(wildcards):
     """Embeddings for explainers that read them, and the seconds that were spent before the explainer starts."""
-    base = f"{wildcards.run}", f"{wildcards.source}"
+    encoder = config["embedding"]["encoder"]
     embedded = explainer_entry(wildcards.explainer).reads == "embeddings"
-    stage = "dgcnn" if embedded else "icp"
-    return {
-        "timings": [
-            f"results/{base[0]}/timings/{base[1]}/{stage}/seed{seed}.csv"
-            for seed in SEEDS
-        ],
-        "embeddings": [
-            f"results/{base[0]}/embeddings/{base[1]}/dgcnn/none/seed{seed}.npz"
-            for seed in SEEDS
-            if embedded
-        ],
+    place = f"{wildcards.run}/{{}}/{wildcards.source}"
+    inputs = {
+        "timings": f"results/{place.format('timings')}/{encoder if embedded else 'icp'}/seed{{seed}}.csv"
     }
+    if embedded:
+        folder = f"{encoder}/{config['embedding']['reduction']}"
+        inputs["embeddings"] = (
+            f"results/{place.format('embeddings')}/{folder}/seed{{seed}}.npz"
+        )
+    return {name: collect(pattern, seed=SEEDS) for name, pattern in inputs.items()}
 
 
 def of_all_explainers(kind, explainers=None):

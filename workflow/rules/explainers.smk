@@ -29,8 +29,11 @@ rule explain:
     params:
         settings=settings("explainers", "{explainer}"),
         seeds=SEEDS,
+        embeddings=lambda wildcards, input: (
+            ["--embeddings", *input.embeddings] if input.get("embeddings") else []
+        ),
     shell:
         "python -m gpca explain --threads {threads} --explainer {wildcards.explainer} "
         "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
-        "--registrations {input.registrations} --embeddings {input.embeddings} --input-timings {input.timings} "
+        "--registrations {input.registrations} {params.embeddings} --input-timings {input.timings} "
         "--predictions {output.predictions} --timings {output.timings} 2> {log}"

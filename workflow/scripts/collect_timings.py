@@ -1,7 +1,7 @@
 """Timing files -> timings.csv."""
 
 from gpca.metrics import collect_timings, write_metrics
-from gpca.reporting.script import logged
+from gpca.reporting.script import job
 
-with logged(snakemake.log):
+with job(snakemake):
     write_metrics(collect_timings(snakemake.input.timings), snakemake.output[0])

@@ -1,9 +1,9 @@
 """Objects and registrations of one source -> fig3_concepts."""
 
 from gpca.reporting.concepts_figure import draw_concepts_figure
-from gpca.reporting.script import logged
+from gpca.reporting.script import job
 
-with logged(snakemake.log):
+with job(snakemake):
     draw_concepts_figure(
         snakemake.input.objects,
         snakemake.input.registrations,
