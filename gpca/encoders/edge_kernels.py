@@ -22,7 +22,8 @@ def smallest_k(distances, k):
     than keeping the k best while scanning, and needs no order within the k.
     """
     batch, n, _columns = distances.shape
-    chosen = np.empty((batch, n, k), np.int32)
+    # Not np.empty: a row with NaN fills too few slots, and what is left must still be the index of a point.
+    chosen = np.zeros((batch, n, k), np.int32)
     for b in prange(batch):
         for i in range(n):
             row = distances[b, i]

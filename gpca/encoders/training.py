@@ -74,7 +74,8 @@ def train_encoder(
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     encoder = make_encoder(settings.backbone, settings.options)
-    model = nn.Sequential(encoder, nn.Linear(encoder.embedding_size, len(CONCEPTS)))
+    device = best_device()
+    model = nn.Sequential(encoder, nn.Linear(encoder.embedding_size, len(CONCEPTS))).to(device)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     rows = registrations.rows("train")
     labels_S = torch.from_numpy(np.array([CONCEPTS.index(concept) for concept in registrations.concept]))
@@ -93,7 +94,7 @@ def train_encoder(
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
             points_B_N_3 = draw_points(registrations, batch_rows, settings.points, source, seed, "epoch", epoch)
-            logits_B_C, labels_B = model(points_B_N_3), labels_S[batch_rows]
+            logits_B_C, labels_B = model(points_B_N_3.to(device)), labels_S[batch_rows].to(device)
             loss = nn.functional.cross_entropy(logits_B_C, labels_B)
             optimiser.zero_grad()
             loss.backward()
@@ -112,7 +113,12 @@ def train_encoder(
         if not np.isfinite(loss_sum):
             raise InputError(title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
         _keep(checkpoint, identity, state, curve)
-    return encoder.eval(), curve
+    return encoder.cpu().eval(), curve
+
+
+def best_device() -> torch.device:
+    """Return the GPU where torch finds one (results then agree with the CPU's within rounding), else the CPU."""
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
 
 
 @torch.inference_mode()
@@ -124,16 +130,17 @@ def embed(
     h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
     of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on.
     """
-    encoder.eval()
+    device = best_device()
+    encoder.to(device).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            encoder(draw_points(registrations, rows, settings.points, source, seed, "embedding", draw))
+            encoder(draw_points(registrations, rows, settings.points, source, seed, "embedding", draw).to(device))
             for draw in range(settings.draws)
         ]
         parts.append(torch.stack(draws).mean(dim=0))
-    return torch.cat(parts).numpy()
+    return torch.cat(parts).cpu().numpy()
 
 
 def load_encoder(weights: Path, settings: EncoderSettings) -> nn.Module:
@@ -174,7 +181,7 @@ def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
     if checkpoint is None or not checkpoint.is_file():
         return []
     try:
-        content = torch.load(checkpoint, weights_only=True)
+        content = torch.load(checkpoint, weights_only=True, map_location=best_device())
     except Exception:  # whatever a damaged file makes torch raise, training from the start is right
         return []
     if not isinstance(content, dict) or content.get("identity") != identity:
