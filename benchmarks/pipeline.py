@@ -81,7 +81,7 @@ def run_workflow(folder: Path, configfile: Path | None, config: list[str], cores
         command += ["--configfile", str(configfile)]
     started = perf_counter()
     if subprocess.run(command, cwd=ROOT, check=False).returncode:
-        raise InputError(" ".join(command[1:]), "failed", "see Snakemake's messages above")
+        raise InputError(" ".join(["python", *command[1:]]), "failed", "see Snakemake's messages above")
     return perf_counter() - started
 
 
@@ -94,8 +94,13 @@ def read_stages(folder: Path) -> dict[str, Stage]:
     if not folder.is_dir():
         raise InputError(folder, "no such run", "name one of the folders in results/")
     stages: dict[str, Stage] = {}
-    # A step that writes several files in one block leaves the same record beside each: its work counts once.
-    distinct = {path.read_bytes(): path for path in sorted(folder.rglob(f"*{SIDECAR}"))}
+    # A step that writes several files in one block leaves the same record beside each (predictions and timings, a
+    # table's formats): its work counts once, for the stage that comes first.
+    distinct: dict[bytes, Path] = {}
+    for path in sorted(
+        folder.rglob(f"*{SIDECAR}"), key=lambda path: (_place(_stage_name(path.relative_to(folder))), path)
+    ):
+        distinct.setdefault(path.read_bytes(), path)
     for path in distinct.values():
         stage = stages.setdefault(_stage_name(path.relative_to(folder)), Stage())
         stage.work_s += _number(path, "seconds")
@@ -106,8 +111,7 @@ def read_stages(folder: Path) -> dict[str, Stage]:
         stage.peaks_mb += _number(path, "max_rss")
     if not any(stage.work_s for stage in stages.values()):
         raise InputError(folder, f"holds no *{SIDECAR}", "make the run with this version of the workflow")
-    order = {name: i for i, name in enumerate(STAGES)}
-    return dict(sorted(stages.items(), key=lambda item: order.get(item[0], len(order))))
+    return dict(sorted(stages.items(), key=lambda item: _place(item[0])))
 
 
 def wall_time(folder: Path) -> float:
@@ -159,6 +163,11 @@ def _print_row(name: str, *cells: object) -> None:
 
 def _stage_name(path: Path) -> str:
     return path.parts[0] if len(path.parts) > 1 else "collect"
+
+
+def _place(stage: str) -> int:
+    """Return the place of a stage in the order of the work; unknown ones come last."""
+    return STAGES.index(stage) if stage in STAGES else len(STAGES)
 
 
 def _number(path: Path, key: str) -> list[float]:

@@ -22,29 +22,36 @@ STEPS = {
 def main(arguments: list[str] | None = None) -> int:
     """Run one step; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
+    try:
+        _run(arguments, chosen)
+    except (InputError, OSError) as fault:
+        print(f"gpca {chosen}: {fault}", file=sys.stderr)
+        return 2
+    except (KeyboardInterrupt, SystemError) as fault:
+        # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead.
+        if not isinstance(fault, KeyboardInterrupt) and not isinstance(fault.__cause__, KeyboardInterrupt):
+            raise
+        print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _run(arguments: list[str], chosen: str | None) -> None:
     parser = argparse.ArgumentParser(prog="python -m gpca", description=__doc__)
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
-    # Only the chosen step is imported: each brings libraries that take seconds to load.
-    chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
     for name, summary in STEPS.items():
         step = steps.add_parser(name, help=summary, description=summary)
         step.add_argument("--threads", type=int, default=1, help="threads of torch, numba and OpenMP (default 1)")
-        step.add_argument("--settings", type=_mapping, default={}, help="JSON: the step's section of the config")
-        if name == chosen:
+        step.add_argument("--settings", default="{}", help="JSON: the step's section of the config")
+        if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
             module = import_module(f"gpca.steps.{name}")
             module.add_arguments(step)
             step.set_defaults(run=module.run)
-    try:
-        options = parser.parse_args(arguments)
-        options.run(options)
-    except InputError as fault:
-        print(f"gpca {chosen}: {fault}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
-        return 130
-    return 0
+    options = parser.parse_args(arguments)
+    options.settings = _mapping(options.settings)
+    options.run(options)
 
 
 def _set_threads(arguments: list[str]) -> None:
@@ -60,9 +67,9 @@ def _mapping(text: str) -> dict:
     try:
         settings = json.loads(text)
     except json.JSONDecodeError as fault:
-        raise argparse.ArgumentTypeError(f"not JSON: {fault}") from fault
+        raise InputError("--settings", f"not JSON: {fault}", "give a JSON object") from fault
     if not isinstance(settings, dict):
-        raise argparse.ArgumentTypeError("not a JSON object")
+        raise InputError("--settings", "not a JSON object", 'give one, such as {"points": 512}')
     return settings
 
 

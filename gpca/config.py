@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from difflib import get_close_matches
 from pathlib import Path
 
-import yaml
-
+from gpca.dataset import RegistrationSettings
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
+from gpca.explainer import require_settings
 from gpca.objects.source import resolve
 from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
-
-SCHEMA = Path(__file__).resolve().parent.parent / "workflow" / "schemas" / "config.schema.yaml"
+from gpca.settings import load_schema, require_valid
 
 
 def check(config: dict) -> dict[str, dict]:
@@ -28,17 +25,15 @@ def check(config: dict) -> dict[str, dict]:
         InputError: unknown key, wrong type, value out of range; unknown source, family, kind, explainer or backbone;
             data that is neither in its folder nor downloadable. The line names the key.
     """
-    _check_schema(config)
-    for name, limits in config["registrations"]["severities"].items():
-        if limits[0] > limits[1]:
-            raise InputError(f"config key registrations.severities.{name}", f"{limits} runs downwards", "swap the two")
+    require_valid(config, load_schema(), "config key")
+    with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     for name, encoder in config["encoders"].items():
         with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
     if (name := config["embedding"]["encoder"]) not in config["encoders"]:
         known = ", ".join(config["encoders"])
         raise InputError("config key embedding.encoder", f"no encoder '{name}'", f"known are {known}")
-    for name in config["explainers"]:
-        with_key(f"explainers.{name}", explainer_entry, name)
+    for name, settings in config["explainers"].items():
+        with_key(f"explainers.{name}", require_settings, name, settings or {})
     sources = {
         name: {"stand_in": entry["kind"] == "procedural"}
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
@@ -64,23 +59,3 @@ def export(config: dict) -> None:
     """
     os.environ[CONFIG_VARIABLE] = sha256_of_settings(config)
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-
-
-def _check_schema(config: dict) -> None:
-    from jsonschema import Draft202012Validator
-    from jsonschema.exceptions import best_match
-
-    schema = yaml.safe_load(SCHEMA.read_text(encoding="utf-8"))
-    fault = best_match(Draft202012Validator(schema).iter_errors(config))
-    if fault is None:
-        return
-    key = ".".join(map(str, fault.absolute_path)) or "(top level)"
-    if fault.validator == "additionalProperties":
-        known = list(fault.schema["properties"])
-        unknown = next(name for name in fault.instance if name not in known)
-        path = ".".join([*map(str, fault.absolute_path), unknown])
-        close = get_close_matches(unknown, known, n=1)
-        raise InputError(
-            f"config key {path}", "unknown", f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
-        )
-    raise InputError(f"config key {key}", fault.message, "see workflow/schemas/config.schema.yaml")

@@ -9,9 +9,10 @@ An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import signature
 from time import perf_counter
 from typing import Protocol
 
@@ -98,6 +99,14 @@ def explainer_entry(name: str) -> Entry:
     if name not in found:
         raise InputError(f"explainer '{name}'", "unknown", f"known are {', '.join(found)}")
     return found[name]
+
+
+def require_settings(name: str, settings: Mapping[str, object]) -> None:
+    """Raise an InputError unless the explainer is known and takes settings of these names."""
+    try:
+        signature(explainer_entry(name).make).bind("source", 0, **settings)
+    except TypeError as fault:
+        raise InputError(f"explainer '{name}'", str(fault), "correct its settings") from fault
 
 
 def explainer_module(name: str) -> str:

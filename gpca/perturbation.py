@@ -7,11 +7,12 @@ object's diameter. Severities are drawn uniformly from the ranges of :class:`Sev
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gpca.errors import InputError
 from gpca.rigid import inverse, random_direction, transform
 
 CONCEPTS = ("noise", "pose", "overlap")
@@ -32,6 +33,12 @@ class Severities:
     rotation_deg: tuple[float, float] = (15.0, 60.0)
     translation: tuple[float, float] = (0.05, 0.30)
     crop: tuple[float, float] = (0.20, 0.60)
+
+    def __post_init__(self) -> None:
+        for severity in fields(self):
+            low, high = getattr(self, severity.name)
+            if low > high:
+                raise InputError(f"severity {severity.name}", f"[{low}, {high}] runs downwards", "swap the two")
 
 
 @dataclass(frozen=True)

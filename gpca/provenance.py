@@ -7,6 +7,7 @@ import json
 import os
 import platform
 import resource
+import shutil
 import subprocess
 import sys
 import time
@@ -64,7 +65,9 @@ def _sha256(content: bytes) -> str:
 
 
 def _code_version() -> dict[str, object]:
-    """The commit and whether tracked files differ from it; nulls outside a git checkout."""
+    """The commit and whether tracked files differ from it; nulls outside a git checkout, or without git."""
+    if shutil.which("git") is None:
+        return {"commit": None, "dirty": None}
     commit, changes = (
         subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, check=False)
         for arguments in (("rev-parse", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))

@@ -1,17 +1,31 @@
-"""Small real things that several tests need: two objects, and registrations made of them."""
+"""Small real things that several tests need: three objects, and registrations made of them."""
+
+import os
 
 import pytest
+
+# One thread, as in a job of the workflow, and before numba is imported: on a busy machine its threads, with so little
+# work each, spend most of their time waiting for one another.
+for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
 
 
 @pytest.fixture(scope="session")
 def objects(tmp_path_factory):
-    """A brick and a cone of 600 points each, written to an objects npz and read back."""
+    """A brick, a cone and a capsule of 600 points each, written to an objects npz and read back.
+
+    As many as there are concepts, so that a sample's number can give away both if they are dealt out carelessly.
+    """
     import trimesh
 
     from gpca.objects.canonical import ObjectClouds, write_objects
     from gpca.objects.surface import Surface
 
-    meshes = {"brick": trimesh.creation.box((0.04, 0.07, 0.10)), "cone": trimesh.creation.cone(0.03, 0.09)}
+    meshes = {
+        "brick": trimesh.creation.box((0.04, 0.07, 0.10)),
+        "cone": trimesh.creation.cone(0.03, 0.09),
+        "capsule": trimesh.creation.capsule(0.06, 0.02),
+    }
     path = tmp_path_factory.mktemp("objects") / "tiny.npz"
     surfaces = (Surface(name, mesh.vertices, mesh.faces) for name, mesh in meshes.items())
     write_objects(surfaces, "tiny", path, n_points=600)

@@ -48,6 +48,15 @@ def test_fitness_and_rmse_are_those_of_the_nearest_points(target):
     assert result.inlier_rmse == pytest.approx(np.sqrt(np.square(distance[inlier]).mean()), rel=1e-6)
 
 
+def test_the_methods_minimise_different_distances(target):
+    points, normals = target
+    noise = np.random.default_rng(0).normal(scale=0.02, size=points.shape)
+    source = transform(motion(4, [0.02, -0.01, 0.015]), points) + noise
+    poses = [ICP(points, normals, ICPSettings(method)).register(source, INIT).T_target_source for method in METHODS]
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        assert np.abs(poses[one] - poses[other]).max() > 1e-4
+
+
 def test_the_initial_pose_decides_where_icp_starts(target):
     points, normals = target
     T_true = motion(120, [0.3, 0.0, -0.2])

@@ -23,10 +23,15 @@ def surfaces(family: str) -> Iterator[Surface]:
     Raises:
         InputError: at the call, for a family that is not one of FAMILIES.
     """
-    if family not in FAMILIES:
-        raise InputError(f"family '{family}'", "no such procedural family", f"choose one of {', '.join(FAMILIES)}")
+    require_family(family)
     objects = import_module(f"gpca.objects.shapes.{FAMILIES[family]}").OBJECTS
     return (_surface(name, draw()) for name, draw in objects.items())
+
+
+def require_family(family: str) -> None:
+    """Raise an InputError that names the known families unless `family` is one of them."""
+    if family not in FAMILIES:
+        raise InputError(f"family '{family}'", "no such procedural family", f"choose one of {', '.join(FAMILIES)}")
 
 
 def _surface(name: str, mesh) -> Surface:

@@ -15,7 +15,7 @@ from types import ModuleType
 
 from gpca import objects
 from gpca.errors import InputError
-from gpca.objects import archive, download
+from gpca.objects import archive, download, procedural
 from gpca.objects.surface import Surface
 
 
@@ -46,6 +46,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         if candidate.get("kind") == "procedural":
             if not candidate.get("family"):
                 raise InputError(subject, "names no family", "set family in the config")
+            procedural.require_family(candidate["family"])
             return {**candidate, "origin": "procedural"}
         _module_of(candidate.get("kind"))
         if folder := _found(candidate, data_dir):
@@ -66,8 +67,6 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
         InputError: from :mod:`gpca.objects.download`, :mod:`gpca.objects.archive` and the kind's own reader.
     """
     if entry["origin"] == "procedural":
-        from gpca.objects import procedural
-
         yield from procedural.surfaces(entry["family"])
         return
     module = _module_of(entry["kind"])

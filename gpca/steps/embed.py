@@ -13,6 +13,8 @@ from gpca.dataset import Registrations
 from gpca.encoders.training import EncoderSettings, embed, load_encoder
 from gpca.files import save_arrays
 from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.steps import per_seed
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -29,18 +31,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Embed the clouds of every seed."""
     torch.set_num_threads(options.threads)
+    check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
-    jobs = zip(
-        options.seeds,
-        options.registrations,
-        options.registration_timings,
-        options.encoders,
-        options.out,
-        options.timings,
-        strict=True,
-    )
+    jobs = per_seed(options, "registrations", "registration_timings", "encoders", "out", "timings")
     for seed, registrations_path, icp_timings, weights, out, timings in jobs:
-        with recorded([out], [registrations_path, weights], options.settings, seed=seed):
+        with recorded([out, timings], [registrations_path, weights], options.settings, seed=seed):
             registrations = Registrations.load(registrations_path)
             encoder = load_encoder(weights, settings)
             started = perf_counter()

@@ -9,9 +9,11 @@ from pathlib import Path
 from gpca.attribution import read_timings, write_predictions, write_timings
 from gpca.dataset import Registrations
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
+from gpca.explainer import explainer_entry, require_settings
 from gpca.files import load_arrays
 from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.steps import per_seed
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -28,20 +30,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Fit on the training rows and explain every row, seed by seed."""
+    require_settings(options.explainer, options.settings)
+    check_settings(options.settings, "explainers", options.explainer)
     entry = explainer_entry(options.explainer)
-    embeddings = options.embeddings or [None] * len(options.seeds)
-    jobs = zip(
-        options.seeds,
-        options.registrations,
-        embeddings,
-        options.input_timings,
-        options.predictions,
-        options.timings,
-        strict=True,
-    )
+    options.embeddings = options.embeddings or [None] * len(options.seeds)
+    jobs = per_seed(options, "registrations", "embeddings", "input_timings", "predictions", "timings")
     for seed, registrations_path, embedding_path, input_timings, predictions, timings in jobs:
         inputs = [path for path in (registrations_path, embedding_path) if path]
-        with recorded([predictions], inputs, options.settings, seed=seed):
+        with recorded([predictions, timings], inputs, options.settings, seed=seed):
             registrations = Registrations.load(registrations_path)
             if entry.reads == "embeddings":
                 registrations = _with_embedding(registrations, embedding_path, options.explainer)

@@ -8,6 +8,7 @@ from pathlib import Path
 from gpca.objects.canonical import write_objects
 from gpca.objects.source import resolve, surfaces
 from gpca.provenance import recorded
+from gpca.settings import check_settings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -21,6 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Read the source's surfaces, sample them and write the canonical clouds."""
+    check_settings(options.settings, "sources", "*")
     entry = resolve(options.settings, options.data_dir)
     with recorded([options.out], [], {"entry": entry, "points": options.points}):
         write_objects(surfaces(entry, Path(options.downloads)), options.source, options.out, options.points)

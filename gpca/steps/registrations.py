@@ -9,6 +9,7 @@ from gpca.attribution import write_timings
 from gpca.dataset import RegistrationSettings, make_registrations
 from gpca.objects.canonical import ObjectClouds
 from gpca.provenance import recorded
+from gpca.settings import check_settings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -22,9 +23,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Perturb and align."""
+    check_settings(options.settings, "registrations")
     settings = RegistrationSettings.from_dict(options.settings)
     objects = ObjectClouds.load(options.objects)
-    with recorded([options.out], [options.objects], options.settings, seed=options.seed):
+    with recorded([options.out, options.timings], [options.objects], options.settings, seed=options.seed):
         registrations, icp_seconds_S = make_registrations(objects, options.source, options.seed, settings)
         registrations.save(options.out)
         write_timings(options.timings, registrations.sample, icp_seconds_S, icp_seconds_S)

@@ -12,6 +12,7 @@ from gpca.dataset import Registrations
 from gpca.encoders.training import EncoderSettings, train_encoder
 from gpca.files import whole_file
 from gpca.provenance import recorded
+from gpca.settings import check_settings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -26,14 +27,16 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Train, keeping a checkpoint beside the weights until they are written."""
     torch.set_num_threads(options.threads)
+    check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
     registrations = Registrations.load(options.registrations)
     # Not an output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = options.out.with_suffix(".checkpoint")
-    with recorded([options.out], [options.registrations], options.settings, seed=options.seed):
+    with recorded([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
         encoder, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
-        with whole_file(options.out) as partial:
-            torch.save(encoder.state_dict(), partial)
+        # Given a path, torch.save writes its name, here one with the process id, into the file.
+        with whole_file(options.out) as partial, partial.open("wb") as file:
+            torch.save(encoder.state_dict(), file)
         with whole_file(options.curve) as partial:
             pd.DataFrame(curve).to_csv(partial, index=False, float_format="%.6g", lineterminator="\n")
         checkpoint.unlink(missing_ok=True)

@@ -46,9 +46,7 @@ def objects_code(wildcards):
     entry = SOURCES[wildcards.source]
     modules = ["gpca.steps.objects", f"gpca.objects.{entry['kind']}"]
     if entry["kind"] == "procedural":
-        modules.append(
-            f"gpca.objects.shapes.{entry['family'].replace('coffee_cup', 'cups')}"
-        )
+        modules.append(f"gpca.objects.shapes.{FAMILIES[entry['family']]}")
     return code_files(*modules)
 
 

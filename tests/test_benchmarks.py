@@ -1,0 +1,124 @@
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import pipeline
+from gpca.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def last_line(text):
+    return json.loads(text.splitlines()[-1])
+
+
+def test_edge_conv_ends_with_three_numbers_of_the_same_networks():
+    tiny = ["--threads", "1", "--batch", "2", "--points", "48", "--k", "5", "--repeats", "1"]
+    run = subprocess.run(
+        [sys.executable, "benchmarks/edge_conv.py", *tiny], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    result = last_line(run.stdout)
+    assert list(result) == ["train_speedup", "infer_speedup", "max_abs_error"]
+    assert result["max_abs_error"] < 1e-3
+    assert result["train_speedup"] > 0
+    assert result["infer_speedup"] > 0
+    assert "2 clouds of 48 points, k = 5, 1 thread(s)" in run.stdout
+
+
+def test_edge_conv_compares_networks_of_equal_embeddings_and_notices_unequal_ones():
+    import torch
+
+    from benchmarks.edge_conv import make_networks, max_abs_error
+
+    torch.manual_seed(0)
+    clouds = torch.randn(2, 40, 3)
+    reference, fused = make_networks(5, clouds)
+    assert reference.edge_convs[0] is not fused.edge_convs[0]
+    assert max_abs_error(reference, fused, clouds) < 1e-5
+    reference.edge_convs[1].linear.weight.data.mul_(1.1)
+    assert max_abs_error(reference, fused, clouds) > 1e-3
+
+
+@pytest.fixture
+def run_folder(tmp_path):
+    """A run of three jobs: objects; encoders with two seeds in one job; a table that is written as two files."""
+    folder = tmp_path / "toy"
+
+    def sidecar(path, seconds, peak_mb, seed=None):
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        record = {"seconds": seconds, "peak_memory_mb": peak_mb, "seed": seed}
+        (folder / f"{path}.provenance.json").write_text(json.dumps(record))
+
+    def benchmark(path, seconds, max_rss):
+        (folder / "benchmarks" / path).parent.mkdir(parents=True, exist_ok=True)
+        row = f"{seconds}\t0:00:01\t{max_rss}\t1\t1\t1\t0\t0\t90\t1.0"
+        head = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time"
+        (folder / "benchmarks" / path).write_text(f"{head}\n{row}\n")
+
+    sidecar("objects/cup.npz", 2.0, 150.0)
+    sidecar("encoders/cup/dgcnn/seed0.pt", 4.0, 500.0, seed=0)
+    sidecar("curves/cup/dgcnn/seed0.csv", 4.0, 500.0, seed=0)  # another output of the same block
+    sidecar("encoders/cup/dgcnn/seed1.pt", 4.0, 500.0, seed=1)  # equally long, yet another block of work
+    for suffix in ("csv", "md"):
+        sidecar(f"tables/table1.{suffix}", 1.0, 90.0)
+    sidecar("metrics.csv", 1.0, 80.0)
+    benchmark("objects/cup.tsv", 3.0, "NA")
+    benchmark("encoders/cup/dgcnn.tsv", 10.0, 620.5)
+    os.utime(folder / "benchmarks/objects/cup.tsv", (1003.0, 1003.0))
+    os.utime(folder / "benchmarks/encoders/cup/dgcnn.tsv", (1013.0, 1013.0))
+    for path in folder.rglob("*.json"):
+        os.utime(path, (1016.0, 1016.0))
+    return folder
+
+
+def test_work_counts_once_per_block_and_stages_keep_their_order(run_folder):
+    stages = pipeline.read_stages(run_folder)
+    assert list(stages) == ["objects", "encoders", "collect", "tables"]
+    assert stages["encoders"].work_s == [4.0, 4.0]
+    assert stages["tables"].work_s == [1.0]
+    assert stages["objects"].peaks_mb == [150.0]
+
+
+def test_shares_and_overhead_add_up_to_the_core_time(run_folder):
+    result = pipeline.summary(pipeline.read_stages(run_folder), core_s=2 * 10.0)
+    assert result["stages"]["encoders"] == {"jobs": 1, "work_s": 8.0, "job_s": 10.0, "peak_mb": 620.5, "share": 0.4}
+    assert result["overhead_share"] == pytest.approx(1 - 12 / 20)
+    assert sum(stage["share"] for stage in result["stages"].values()) + result["overhead_share"] == pytest.approx(1)
+    assert result["peak_mb"] == 620.5
+
+
+def test_wall_time_runs_from_the_start_of_the_first_job_to_the_last_file(run_folder):
+    assert pipeline.wall_time(run_folder) == pytest.approx(16.0)
+
+
+def test_an_existing_run_ends_with_the_documented_line(run_folder, monkeypatch, capsys):
+    monkeypatch.setattr(pipeline, "ROOT", run_folder.parent)
+    (run_folder.parent / "results").mkdir()
+    run_folder.rename(run_folder.parent / "results" / "toy")
+    assert pipeline.main(["--existing", "toy", "--cores", "2"]) == 0
+    result = last_line(capsys.readouterr().out)
+    assert list(result) == ["stages", "overhead_share", "peak_mb"]
+    assert result["overhead_share"] == pytest.approx(1 - 12 / 32)
+
+
+def test_a_missing_run_is_one_line_and_status_2(capsys):
+    assert pipeline.main(["--existing", "no_such_run"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"peak_memory_mb": 1}', '{"seconds": "long", "peak_memory_mb": 1}'])
+def test_a_damaged_record_is_named(run_folder, text):
+    (run_folder / "objects" / "cup.npz.provenance.json").write_text(text)
+    with pytest.raises(InputError, match=r"cup\.npz\.provenance\.json: holds no number 'seconds'"):
+        pipeline.read_stages(run_folder)
+
+
+def test_a_run_without_records_is_refused(tmp_path):
+    with pytest.raises(InputError, match="holds no"):
+        pipeline.read_stages(tmp_path)
+    with pytest.raises(InputError, match="holds no benchmark files"):
+        pipeline.wall_time(tmp_path)

@@ -1,0 +1,128 @@
+"""Copies of the project in which Snakemake runs, so that no test touches the results of the working folder."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NEEDED = ("Snakefile", "config", "gpca", "baselines", "workflow", "profiles", "environment.lock")
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """What Snakemake would do: how many jobs of each rule (`all` left out), and the files that they write."""
+
+    jobs: Counter
+    outputs: set[str]
+
+
+@dataclass(frozen=True)
+class Project:
+    """A copy of the project."""
+
+    folder: Path
+
+    def snakemake(self, *arguments, check=True):
+        return self._python("-m", "snakemake", *arguments, check=check)
+
+    def gpca(self, *arguments, check=True):
+        return self._python("-m", "gpca", *arguments, check=check)
+
+    def dry_run(self, *arguments):
+        lines = self.snakemake("-n", *arguments).stdout.splitlines()
+        outputs = [line.split(": ", 1)[1].split(", ") for line in lines if line.startswith("    output: ")]
+        counts = re.findall(r"^(\w+) +(\d+)$", "\n".join(lines), flags=re.MULTILINE)
+        jobs = Counter({rule: int(count) for rule, count in counts if rule not in ("all", "total")})
+        return DryRun(jobs, {path for paths in outputs for path in paths})
+
+    def start(self, *arguments):
+        """Start Snakemake as the leader of a process group of its own."""
+        command = [sys.executable, "-m", "snakemake", *map(str, arguments)]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        return subprocess.Popen(command, cwd=self.folder, env=_environment(), start_new_session=True, **quiet)
+
+    def append(self, path, text):
+        with (self.folder / path).open("a", encoding="utf-8") as file:
+            file.write(text)
+
+    def copy(self, folder):
+        """Copy everything, results and Snakemake's memory of them included."""
+        shutil.copytree(self.folder, folder)
+        return Project(folder)
+
+    def results(self, *suffixes):
+        """The paths and bytes of all results with one of the suffixes; seconds and memory differ from run to run."""
+        files = sorted(path for path in self.folder.glob("results/smoke/**/*") if path.suffix in suffixes)
+        relative = {path.relative_to(self.folder / "results/smoke"): path for path in files}
+        measured = ("timings", "timings.csv", "benchmarks", "logs")
+        return {str(name): path.read_bytes() for name, path in relative.items() if name.parts[0] not in measured}
+
+    def _python(self, *arguments, check):
+        done = subprocess.run(
+            [sys.executable, *map(str, arguments)], cwd=self.folder, env=_environment(), capture_output=True, text=True
+        )
+        assert not check or done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+        return done
+
+
+def _environment():
+    """No other copy of the modules, nothing from a run around this one, no GPU (its sums differ from run to run).
+
+    Nothing listens where the proxies point to: a test that needs the network fails.
+    """
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("GPCA_", "PYTHONPATH"))}
+    nowhere = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
+    return kept | nowhere | {"CUDA_VISIBLE_DEVICES": "", "OMP_NUM_THREADS": "1"}
+
+
+def _copy_of_sources(folder):
+    for name in NEEDED:
+        # With their times, so that what numba has compiled beside the modules still counts.
+        (shutil.copytree if (ROOT / name).is_dir() else shutil.copy2)(ROOT / name, folder / name)
+    return Project(folder)
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A fresh copy without results."""
+    return _copy_of_sources(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def smoke(tmp_path_factory):
+    """A copy in which the smoke run is complete; shared, so it is only read."""
+    project = _copy_of_sources(tmp_path_factory.mktemp("smoke"))
+    project.snakemake("-j2", "smoke")
+    return project
+
+
+@pytest.fixture
+def finished(smoke, tmp_path):
+    """A copy of the complete smoke run, to be edited."""
+    return smoke.copy(tmp_path / "finished")
+
+
+@pytest.fixture(scope="session")
+def killed_and_continued(smoke, tmp_path_factory):
+    """The smoke run once more, one job at a time, killed in the first training and then continued."""
+    project = _copy_of_sources(tmp_path_factory.mktemp("killed"))
+    compiled = "gpca/encoders/__pycache__"
+    shutil.copytree(smoke.folder / compiled, project.folder / compiled, dirs_exist_ok=True)
+    run = ("-j1", "all", "--configfile", "config/smoke.yaml")
+    process = project.start(*run)
+    while process.poll() is None and not list(project.folder.glob("results/smoke/encoders/*/*/*.checkpoint")):
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGTERM)
+    assert process.wait() != 0
+    assert not (project.folder / "results/smoke/metrics.csv").exists()
+    project.snakemake(*run)
+    return project

@@ -1,0 +1,44 @@
+import re
+
+import pytest
+
+from .conftest import ROOT
+
+RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
+
+
+def test_snakemakes_own_linter_has_nothing_to_say(project):
+    project.snakemake("--lint")
+
+
+@pytest.mark.parametrize(
+    ("config", "run", "seeds"), [("config", "embedded", 3), ("smoke", "smoke", 2), ("real", "real", 5)]
+)
+def test_every_config_loads_offline_and_asks_for_all_results(project, config, run, seeds):
+    done = project.snakemake("-n", "all", "--configfile", f"config/{config}.yaml")
+    assert "profiles/default" in done.stderr
+    planned = project.dry_run("all", "--configfile", f"config/{config}.yaml")
+    assert planned.jobs["objects"] == 3
+    assert planned.jobs["registrations"] == planned.jobs["encoder"] == 3 * seeds
+    assert planned.jobs["explain"] == 3 * 2
+    for name in ("metrics.csv", "timings.csv", "tables/table1_single_baselines.md", "tables/table2_per_concept.tex"):
+        assert f"results/{run}/{name}" in planned.outputs
+    assert {f"results/{run}/figures/{name}.png" for name in ("fig3_concepts", "objects_ycb")} <= planned.outputs
+    assert all(path.startswith(f"results/{run}/") for path in planned.outputs)
+    assert not (project.folder / "results").exists()
+
+
+def test_the_smoke_target_runs_the_smoke_config(project):
+    assert project.dry_run("smoke").outputs == {"results/smoke/complete"}
+
+
+def test_the_snakefile_fits_on_a_page():
+    assert len((ROOT / "Snakefile").read_text().splitlines()) <= 60
+
+
+@pytest.mark.parametrize("path", RULES, ids=lambda path: path.name)
+def test_every_rule_says_what_it_needs_and_where_it_logs(path):
+    for rule in re.split(r"^rule ", path.read_text(), flags=re.MULTILINE)[1:]:
+        for keyword in ("log", "threads", "resources", "conda"):
+            assert f"\n    {keyword}:" in rule, (rule.split(":")[0], keyword)
+        assert "\n    run:" not in rule

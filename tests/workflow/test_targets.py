@@ -1,0 +1,64 @@
+import json
+
+import pytest
+
+SMOKE = ("all", "--configfile", "config/smoke.yaml")
+ALL_EXPLAINERS, COLLECTORS = {"explain": 6}, {"metrics": 1, "timings": 1, "table": 2}
+
+
+def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
+    (project.folder / "baselines/lazy.py").write_text(
+        "from gpca.explainer import Entry, GPCA\nEXPLAINERS = {'lazy': Entry('Lazy', GPCA)}\n"
+    )
+    project.append("config/smoke.yaml", "  lazy: {}\n")
+    smoke = ("--configfile", "config/smoke.yaml")
+    planned = project.dry_run("results/smoke/tables/table2_per_concept.md", *smoke)
+    assert planned.jobs == {
+        "objects": 3, "registrations": 6, "encoder": 6, "embeddings": 3, "explain": 6, "table": 1
+    }  # fmt: skip
+    assert not [path for path in planned.outputs if "lazy" in path or "figures" in path]
+    table1 = project.dry_run("results/smoke/tables/table1_single_baselines.md", *smoke)
+    assert table1.jobs["explain"] == 9
+    assert "results/smoke/predictions/ycb/lazy/seed1.csv" in table1.outputs
+
+
+def test_a_finished_run_has_nothing_to_do(finished):
+    assert not finished.dry_run(*SMOKE).jobs
+    assert not finished.dry_run("smoke").jobs
+
+
+EDITS = {
+    "gpca/gpc.py": ALL_EXPLAINERS | COLLECTORS,
+    "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
+    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1},
+    "gpca/reporting/tables.py": {"table": 2},
+    "gpca/encoders/dgcnn.py": {"encoder": 6, "embeddings": 3} | ALL_EXPLAINERS | COLLECTORS,
+    "gpca/objects/bop.py": {},
+    "gpca/objects/shapes/cups.py": {
+        "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 1, "explain": 2,
+        "objects_figure": 1, "fig3_concepts": 1,
+    } | COLLECTORS,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("module", EDITS)
+def test_an_edit_reruns_the_rules_that_use_the_module_and_no_other(finished, module):
+    finished.append(module, "\n# edited\n")
+    assert finished.dry_run(*SMOKE).jobs == EDITS[module]
+
+
+def test_a_touched_but_unchanged_module_reruns_nothing(finished):
+    (finished.folder / "gpca/gpc.py").touch()
+    assert not finished.dry_run(*SMOKE).jobs
+
+
+def test_a_changed_setting_reruns_what_depends_on_it(finished):
+    (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
+    planned = finished.dry_run(*SMOKE, "mine.yaml")
+    assert planned.jobs == {"explain": 3} | COLLECTORS
+    assert not [path for path in planned.outputs if "gpca_paper" in path]
+
+
+def test_a_figure_of_another_source_is_drawn_alone(finished):
+    (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"fig3_source": "ycb"}}))
+    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1}
