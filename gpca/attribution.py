@@ -70,7 +70,7 @@ def summarise_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
 
 
 def write_predictions(path: str | Path, registrations: Registrations, attribution: Attribution) -> None:
-    """Write the prediction file that every table is made from (DESIGN §2); six decimals."""
+    """Write the prediction file that every table is made from (results/README.md); six decimals."""
     import pandas as pd
 
     frame = pd.DataFrame(
@@ -91,15 +91,18 @@ def write_predictions(path: str | Path, registrations: Registrations, attributio
     _write_csv(path, frame)
 
 
-def write_timings(path: str | Path, sample: np.ndarray, seconds: np.ndarray, icp_seconds: np.ndarray) -> None:
+def write_timings(
+    path: str | Path, registrations: Registrations, seconds_S: np.ndarray, icp_seconds_S: np.ndarray
+) -> None:
     """Write seconds per sample; apart from the predictions, because they differ from run to run."""
     import pandas as pd
 
-    _write_csv(path, pd.DataFrame({"sample": sample, "seconds": seconds, "icp_seconds": icp_seconds}))
+    columns = {"sample": registrations.sample, "split": registrations.split}
+    _write_csv(path, pd.DataFrame(columns | {"seconds": seconds_S, "icp_seconds": icp_seconds_S}))
 
 
-def read_timings(path: str | Path, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return seconds and icp_seconds of the given samples.
+def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, np.ndarray]:
+    """Return seconds (S,) and icp_seconds (S,) of the registrations.
 
     Raises:
         InputError: the file is missing, lacks a column, or holds other samples.
@@ -110,7 +113,9 @@ def read_timings(path: str | Path, sample: np.ndarray) -> tuple[np.ndarray, np.n
     if not Path(path).is_file():
         raise InputError(path, "no such file", remedy)
     frame = pd.read_csv(path)
-    if not {"sample", "seconds", "icp_seconds"} <= set(frame.columns) or frame["sample"].tolist() != sample.tolist():
+    if not {"sample", "split", "seconds", "icp_seconds"} <= set(frame.columns):
+        raise InputError(path, "is not a file of timings", remedy)
+    if not all(np.array_equal(frame[name], getattr(registrations, name)) for name in ("sample", "split")):
         raise InputError(path, "does not hold the seconds of these samples", remedy)
     return frame["seconds"].to_numpy(), frame["icp_seconds"].to_numpy()
 

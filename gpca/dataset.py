@@ -25,7 +25,7 @@ class Registrations:
     """S registrations. Lengths are relative to the object's diameter unless the name ends in ``_m``.
 
     Attributes:
-        sample: (S,) number of the sample within the file.
+        sample: (S,) number of the sample within its split.
         split: (S,) ``train`` or ``test``.
         concept: (S,) what was perturbed: ``noise``, ``pose`` or ``overlap``.
         object_index, object_name, diameter_m: (S,) the object registered.
@@ -82,7 +82,7 @@ class Registrations:
         return replace(self, concept=np.full(len(self), ""), **unknown)
 
     def save(self, path: str | Path) -> None:
-        """Write the npz of DESIGN §2."""
+        """Write the npz described in results/README.md."""
         save_arrays(path, {name: getattr(self, name) for name in (*COLUMNS, "points", "offsets")})
 
     @classmethod
@@ -114,7 +114,7 @@ COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not 
 
 @dataclass(frozen=True)
 class RegistrationSettings:
-    """How many registrations are made and how (DESIGN §5).
+    """How many registrations are made and how (docs/protocol.md).
 
     Attributes:
         train, test: samples of each split, balanced over concepts and objects.
@@ -142,8 +142,9 @@ def make_registrations(
 ) -> tuple[Registrations, np.ndarray]:
     """Perturb, align by ICP and label: the data set of one source and seed.
 
-    Sample n of a split has concept n mod 3 and object ⌊n/3⌋ mod O; everything random in it comes from its own
-    generator, named by source, seed, split and n, so that it does not depend on how many samples there are.
+    Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order. Everything
+    random in a sample comes from generators named by source, seed, split and number, so that it does not depend on
+    how many samples there are.
 
     Returns:
         the registrations, and the seconds (S,) that ICP took for each.
@@ -151,11 +152,12 @@ def make_registrations(
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
     records = []
     for split, n in progress(samples, f"registrations of {source}, seed {seed}"):
-        concept = CONCEPTS[n % len(CONCEPTS)]
-        object_index = n // len(CONCEPTS) % len(objects)
+        deal, place = divmod(n, len(CONCEPTS))
+        concept = generator(source, seed, "concepts", split, deal).permutation(CONCEPTS)[place]
+        object_index = deal % len(objects)
         random = generator(source, seed, "registration", split, n)
         record = _register_one(objects, object_index, concept, settings, random)
-        records.append(record | {"sample": len(records), "split": split})
+        records.append(record | {"sample": n, "split": split})
     columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
     registrations = Registrations(**columns, **_ragged([record["cloud"] for record in records]))
     return registrations, np.array([record["icp_seconds"] for record in records])

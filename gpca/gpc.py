@@ -93,11 +93,9 @@ class GPC:
         means, deviations = [], []
         with torch.no_grad():
             for rows in torch.split(inputs_N_d, block):
-                # gpytorch mistakes N = C points for a batch in an old layout, so a block is never that small.
-                padded = torch.cat([rows, rows.new_zeros(len(self.classes) + 1, rows.shape[1])])
-                q = self._model(padded)
-                means.append(q.mean[: len(rows)])
-                deviations.append(q.variance[: len(rows)].clamp_min(0).sqrt())
+                q = self._model(rows)
+                means.append(q.mean)
+                deviations.append(q.variance.clamp_min(0).sqrt())
         return torch.cat(means).double().numpy(), torch.cat(deviations).double().numpy()
 
     def attribute(self, h_N_d: np.ndarray, block: int = 128) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,4 +1,5 @@
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -106,13 +107,16 @@ def test_the_same_predictions_give_the_same_bytes(tmp_path, registrations):
 
 
 def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path):
-    path, sample = tmp_path / "seed0.csv", np.array([3, 5])
+    path = tmp_path / "seed0.csv"
+    sample = SimpleNamespace(sample=np.array([3, 3]), split=np.array(["train", "test"]))
     with pytest.raises(InputError, match="no such file"):
         read_timings(path, sample)
     write_timings(path, sample, np.array([0.5, 0.25]), np.array([0.125, 0.0]))
     seconds, icp_seconds = read_timings(path, sample)
     assert (seconds.tolist(), icp_seconds.tolist()) == ([0.5, 0.25], [0.125, 0.0])
-    for wrong in (sample[:1], sample[::-1]):
+    fewer = SimpleNamespace(sample=sample.sample[:1], split=sample.split[:1])
+    other = SimpleNamespace(sample=sample.sample, split=sample.split[::-1])
+    for wrong in (fewer, other):
         with pytest.raises(InputError, match="does not hold the seconds of these samples") as caught:
             read_timings(path, wrong)
         assert str(path) in str(caught.value)

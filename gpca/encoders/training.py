@@ -50,12 +50,12 @@ class EncoderSettings:
 def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object) -> torch.Tensor:
     """Return `n_points` random points of each row's aligned cloud, (B, N, 3) float32.
 
-    The draw of a sample is named by the axes and the sample's number. Clouds of fewer points repeat some.
+    The draw of a sample is named by the axes, its split and its number. Clouds of fewer points repeat some.
     """
     clouds = np.empty((len(rows), n_points, 3), np.float32)
     for cloud, row in zip(clouds, rows, strict=True):
         points = registrations.cloud(row)
-        random = generator(*axes, int(registrations.sample[row]))
+        random = generator(*axes, registrations.split[row], registrations.sample[row])
         cloud[:] = points[random.choice(len(points), n_points, replace=len(points) < n_points, shuffle=False)]
     return torch.from_numpy(clouds)
 
@@ -78,6 +78,8 @@ def train_encoder(
     model = nn.Sequential(encoder, nn.Linear(encoder.embedding_size, len(CONCEPTS))).to(device)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     rows = registrations.rows("train")
+    if len(rows) < 2:
+        raise InputError(f"registrations of {source}, seed {seed}", "hold no training samples", "raise their number")
     labels_S = torch.from_numpy(np.array([CONCEPTS.index(concept) for concept in registrations.concept]))
     batches = -(-len(rows) // settings.batch_size)
     schedule = torch.optim.lr_scheduler.OneCycleLR(

@@ -42,7 +42,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
     if data_dir is not None and not Path(data_dir).expanduser().is_dir():
         raise InputError(data_dir, "no such folder", "correct data_dir in the config")
-    for candidate in ({**entry, **local}, entry) if local else (entry,):
+    for candidate in (entry, {**entry, **local}) if local else (entry,):
         if candidate.get("kind") == "procedural":
             if not candidate.get("family"):
                 raise InputError(subject, "names no family", "set family in the config")

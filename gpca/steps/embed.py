@@ -42,5 +42,5 @@ def run(options: Namespace) -> None:
             h_S_d = embed(encoder, registrations, options.source, seed, settings)
             seconds = (perf_counter() - started) / len(h_S_d)
             save_arrays(out, {"h": h_S_d, "sample": registrations.sample, "split": registrations.split})
-            seconds_S, icp_seconds_S = read_timings(icp_timings, registrations.sample)
-            write_timings(timings, registrations.sample, seconds_S + seconds, icp_seconds_S)
+            seconds_S, icp_seconds_S = read_timings(icp_timings, registrations)
+            write_timings(timings, registrations, seconds_S + seconds, icp_seconds_S)

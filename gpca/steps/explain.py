@@ -6,6 +6,8 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from gpca.attribution import read_timings, write_predictions, write_timings
 from gpca.dataset import Registrations
 from gpca.errors import InputError
@@ -37,19 +39,19 @@ def run(options: Namespace) -> None:
     jobs = per_seed(options, "registrations", "embeddings", "input_timings", "predictions", "timings")
     for seed, registrations_path, embedding_path, input_timings, predictions, timings in jobs:
         inputs = [path for path in (registrations_path, embedding_path) if path]
+        explainer = entry.make(options.source, seed, **options.settings)
         with recorded([predictions, timings], inputs, options.settings, seed=seed):
             registrations = Registrations.load(registrations_path)
             if entry.reads == "embeddings":
                 registrations = _with_embedding(registrations, embedding_path, options.explainer)
-            explainer = entry.make(options.source, seed, **options.settings)
             explainer.fit(registrations.subset(registrations.rows("train")))
             observed = registrations if entry.oracle else registrations.without_labels()
             attribution = explainer.explain(observed)
             write_predictions(predictions, registrations, attribution)
-            seconds_S, icp_seconds_S = read_timings(input_timings, registrations.sample)
+            seconds_S, icp_seconds_S = read_timings(input_timings, registrations)
             write_timings(
                 timings,
-                registrations.sample,
+                registrations,
                 seconds_S + attribution.seconds_N,
                 icp_seconds_S + attribution.icp_seconds_N,
             )
@@ -58,7 +60,7 @@ def run(options: Namespace) -> None:
 def _with_embedding(registrations: Registrations, path: Path | None, explainer: str) -> Registrations:
     if path is None:
         raise InputError(f"explainer '{explainer}'", "reads embeddings", "give them with --embeddings")
-    arrays = load_arrays(path, {"h": ("S", "d"), "sample": ("S",)}, made_by="python -m gpca embed")
-    if arrays["sample"].tolist() != registrations.sample.tolist():
+    arrays = load_arrays(path, {"h": ("S", "d"), "sample": ("S",), "split": ("S",)}, made_by="python -m gpca embed")
+    if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
         raise InputError(path, "holds other samples than the registrations", "make it anew with 'python -m gpca embed'")
     return replace(registrations, embedding=arrays["h"])

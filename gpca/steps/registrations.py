@@ -29,4 +29,4 @@ def run(options: Namespace) -> None:
     with recorded([options.out, options.timings], [options.objects], options.settings, seed=options.seed):
         registrations, icp_seconds_S = make_registrations(objects, options.source, options.seed, settings)
         registrations.save(options.out)
-        write_timings(options.timings, registrations.sample, icp_seconds_S, icp_seconds_S)
+        write_timings(options.timings, registrations, icp_seconds_S, icp_seconds_S)

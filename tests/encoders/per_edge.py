@@ -12,8 +12,9 @@ class PerEdgeConv(nn.Module):
         self.norm = nn.BatchNorm2d(out_features)
 
     def forward(self, x_B_N_F):
-        batch, n, features = x_B_N_F.shape
-        distances = torch.cdist(x_B_N_F, x_B_N_F, compute_mode="donot_use_mm_for_euclid_dist")
+        batch = len(x_B_N_F)
+        squares = x_B_N_F.square().sum(-1, keepdim=True)
+        distances = squares - 2 * x_B_N_F @ x_B_N_F.transpose(1, 2) + squares.transpose(1, 2)
         neighbours = distances.topk(self.k, dim=-1, largest=False).indices
         x_j = x_B_N_F[torch.arange(batch)[:, None, None], neighbours]
         x_i = x_B_N_F[:, :, None, :].expand(-1, -1, self.k, -1)

@@ -6,6 +6,8 @@ rule metrics:
         "results/{run}/metrics.csv",
     log:
         "results/{run}/logs/metrics.log",
+    benchmark:
+        "results/{run}/benchmarks/metrics.tsv"
     conda:
         "../envs/gpca.yaml"
     threads: 1
@@ -24,6 +26,8 @@ rule timings:
         "results/{run}/timings.csv",
     log:
         "results/{run}/logs/timings.log",
+    benchmark:
+        "results/{run}/benchmarks/timings.tsv"
     conda:
         "../envs/gpca.yaml"
     threads: 1

@@ -39,6 +39,8 @@ rule fig3_concepts:
         ),
     log:
         "results/{run}/logs/figures/fig3_concepts.log",
+    benchmark:
+        "results/{run}/benchmarks/figures/fig3_concepts.tsv"
     conda:
         "../envs/gpca.yaml"
     threads: 1

@@ -14,6 +14,8 @@ rule table:
         tex="results/{run}/tables/{table}.tex",
     log:
         "results/{run}/logs/tables/{table}.log",
+    benchmark:
+        "results/{run}/benchmarks/tables/{table}.tsv"
     wildcard_constraints:
         table="|".join(TABLE_EXPLAINERS),
     conda:
