@@ -74,6 +74,9 @@ lock: ## renew environment.lock from environment.in, in a fresh environment
 	    | sed -E -e '/^(nvidia|cuda|triton)/Id' -e 's/\+[A-Za-z0-9.]+$$//' > build/lock/packages
 	{ sed '/^[^#]/,$$d' environment.lock; cat build/lock/packages; } > build/lock/environment.lock
 	mv build/lock/environment.lock environment.lock
+	{ echo "# Made by 'make lock' from environment.lock, for those who run with 'snakemake --sdm conda'."
+	  printf '%s\n' 'channels: [conda-forge]' 'dependencies:' '  - python=3.11' '  - pip' '  - pip:'
+	  sed -nE 's/^([A-Za-z0-9].*)/      - \1/p' environment.lock; } > workflow/envs/gpca.yaml
 	rm -rf build/lock
 
 clean-environment: ## remove .venv

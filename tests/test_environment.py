@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from gpca.environment import require_open3d, system_library_hint
 
@@ -66,3 +67,9 @@ def test_the_lock_pins_every_package_and_no_build():
     assert not [line for line in packages if line.lower().startswith(("nvidia", "cuda", "triton"))]
     names = {line.split("==")[0].lower().replace("_", "-") for line in packages}
     assert {line.split("==")[0].lower().replace("_", "-") for line in direct} <= names
+
+
+def test_the_conda_environment_of_the_rules_holds_the_lock():
+    lock = [line for line in (ROOT / "environment.lock").read_text().splitlines() if line and line[0].isalnum()]
+    conda = yaml.safe_load((ROOT / "workflow" / "envs" / "gpca.yaml").read_text())
+    assert conda["dependencies"][-1]["pip"] == lock

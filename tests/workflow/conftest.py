@@ -84,23 +84,23 @@ def _environment():
     return kept | nowhere | {"CUDA_VISIBLE_DEVICES": "", "OMP_NUM_THREADS": "1"}
 
 
-def _copy_of_sources(folder):
+def _sources_copied(origin, folder):
     for name in NEEDED:
         # With their times, so that what numba has compiled beside the modules still counts.
-        (shutil.copytree if (ROOT / name).is_dir() else shutil.copy2)(ROOT / name, folder / name)
+        (shutil.copytree if (origin / name).is_dir() else shutil.copy2)(origin / name, folder / name)
     return Project(folder)
 
 
 @pytest.fixture
 def project(tmp_path):
     """A fresh copy without results."""
-    return _copy_of_sources(tmp_path)
+    return _sources_copied(ROOT, tmp_path)
 
 
 @pytest.fixture(scope="session")
 def smoke(tmp_path_factory):
     """A copy in which the smoke run is complete; shared, so it is only read."""
-    project = _copy_of_sources(tmp_path_factory.mktemp("smoke"))
+    project = _sources_copied(ROOT, tmp_path_factory.mktemp("smoke"))
     project.snakemake("-j2", "smoke")
     return project
 
@@ -114,9 +114,7 @@ def finished(smoke, tmp_path):
 @pytest.fixture(scope="session")
 def killed_and_continued(smoke, tmp_path_factory):
     """The smoke run once more, one job at a time, killed in the first training and then continued."""
-    project = _copy_of_sources(tmp_path_factory.mktemp("killed"))
-    compiled = "gpca/encoders/__pycache__"
-    shutil.copytree(smoke.folder / compiled, project.folder / compiled, dirs_exist_ok=True)
+    project = _sources_copied(smoke.folder, tmp_path_factory.mktemp("killed"))
     run = ("-j1", "all", "--configfile", "config/smoke.yaml")
     process = project.start(*run)
     while process.poll() is None and not list(project.folder.glob("results/smoke/encoders/*/*/*.checkpoint")):
