@@ -112,7 +112,10 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     remedy = "make it anew with the step that writes it"
     if not Path(path).is_file():
         raise InputError(path, "no such file", remedy)
-    frame = pd.read_csv(path)
+    try:
+        frame = pd.read_csv(path)
+    except ValueError as fault:  # an empty file, broken quotes, other bytes than text
+        raise InputError(path, "is not a file of timings", remedy) from fault
     if not {"sample", "split", "seconds", "icp_seconds"} <= set(frame.columns):
         raise InputError(path, "is not a file of timings", remedy)
     if not all(np.array_equal(frame[name], getattr(registrations, name)) for name in ("sample", "split")):

@@ -92,7 +92,7 @@ class Registrations:
         Raises:
             InputError: the file is missing, damaged, holds pickled objects, wrong shapes, NaN or unknown labels.
         """
-        shapes: dict[str, tuple[int | str, ...]] = {name: ("S",) for name in COLUMNS}
+        shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(COLUMNS, ("S",))
         shapes |= {name: ("S", 4, 4) for name in COLUMNS if name.startswith("T_")}
         shapes |= {"points": ("P", 3), "offsets": ("O",)}
         arrays = load_arrays(path, shapes, made_by="python -m gpca registrations")

@@ -43,9 +43,9 @@ def recorded(
         "settings": settings,
         "settings_sha256": sha256_of_settings(settings),
         "config_sha256": os.environ.get(CONFIG_VARIABLE),
-        "inputs_sha256": {str(path): _sha256(Path(path).read_bytes()) for path in inputs},
+        "inputs_sha256": {str(path): _sha256_of_file(path) for path in inputs},
         "code": _code_version(),
-        "environment_lock_sha256": _sha256((_ROOT / "environment.lock").read_bytes()),
+        "environment_lock_sha256": _sha256_of_file(_ROOT / "environment.lock"),
         "device": _device(),
         "python": platform.python_version(),
         "libraries": _library_versions(),
@@ -57,11 +57,12 @@ def recorded(
 
 def sha256_of_settings(settings: Mapping) -> str:
     """Return the SHA-256 of settings as JSON with sorted keys."""
-    return _sha256(json.dumps(settings, sort_keys=True).encode())
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+def _sha256_of_file(path: Path | str) -> str:
+    with Path(path).open("rb") as content:
+        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 def _code_version() -> dict[str, object]:

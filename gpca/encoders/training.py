@@ -82,8 +82,9 @@ def train_encoder(
         raise InputError(f"registrations of {source}, seed {seed}", "hold no training samples", "raise their number")
     labels_S = torch.from_numpy(np.array([CONCEPTS.index(concept) for concept in registrations.concept]))
     batches = -(-len(rows) // settings.batch_size)
+    # At least 5 steps long: of a length of 4, a quarter of which rises, torch divides by zero.
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, settings.learning_rate, total_steps=settings.epochs * batches, pct_start=0.25
+        optimiser, settings.learning_rate, total_steps=max(5, settings.epochs * batches), pct_start=0.25
     )
     state = {"model": model, "optimiser": optimiser, "schedule": schedule}
     identity = repr((source, seed, asdict(settings), _fingerprint(registrations)))

@@ -83,6 +83,18 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
         yield from module.from_entry(entry, file if getattr(module, "READS_ARCHIVES", False) else _unpacked(file))
 
 
+def data_files(entry: dict) -> list[Path]:
+    """Return the files that a resolved local entry is read from, sorted; none for other origins.
+
+    Without patterns these are all files of its folder and of `models` in it, as BOP lays them out.
+    """
+    if entry["origin"] != "local":
+        return []
+    patterns = entry.get("files") or ["*", "models/*"]
+    found = {path for pattern in patterns for path in Path(entry["location"]).glob(pattern)}
+    return sorted(path for path in found if path.is_file())
+
+
 def _unpacked(file: Path) -> Path:
     # Named by content: an archive that was fetched anew is unpacked anew.
     return archive.unpack(file, file.with_name(f"{file.stem}-{download.sha256_of(file)[:12]}"))

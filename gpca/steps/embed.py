@@ -37,10 +37,10 @@ def run(options: Namespace) -> None:
     for seed, registrations_path, icp_timings, weights, out, timings in jobs:
         with recorded([out, timings], [registrations_path, weights], options.settings, seed=seed):
             registrations = Registrations.load(registrations_path)
+            seconds_S, icp_seconds_S = read_timings(icp_timings, registrations)
             encoder = load_encoder(weights, settings)
             started = perf_counter()
             h_S_d = embed(encoder, registrations, options.source, seed, settings)
             seconds = (perf_counter() - started) / len(h_S_d)
             save_arrays(out, {"h": h_S_d, "sample": registrations.sample, "split": registrations.split})
-            seconds_S, icp_seconds_S = read_timings(icp_timings, registrations)
             write_timings(timings, registrations, seconds_S + seconds, icp_seconds_S)

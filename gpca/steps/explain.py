@@ -42,13 +42,13 @@ def run(options: Namespace) -> None:
         explainer = entry.make(options.source, seed, **options.settings)
         with recorded([predictions, timings], inputs, options.settings, seed=seed):
             registrations = Registrations.load(registrations_path)
+            seconds_S, icp_seconds_S = read_timings(input_timings, registrations)
             if entry.reads == "embeddings":
                 registrations = _with_embedding(registrations, embedding_path, options.explainer)
             explainer.fit(registrations.subset(registrations.rows("train")))
             observed = registrations if entry.oracle else registrations.without_labels()
             attribution = explainer.explain(observed)
             write_predictions(predictions, registrations, attribution)
-            seconds_S, icp_seconds_S = read_timings(input_timings, registrations)
             write_timings(
                 timings,
                 registrations,

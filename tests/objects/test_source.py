@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.objects.source import resolve, surfaces
+from gpca.objects.source import data_files, resolve, surfaces
 from tests.objects.test_pcd import ascii_pcd
 
 BOP = {"title": "Toy", "kind": "bop", "location": "bop/toy", "url": "https://example.org/toy_models.zip"}
@@ -144,3 +144,15 @@ def test_downloaded_tars_of_views(server, tmp_path):
     names = [surface.name for surface in surfaces(entry, tmp_path)]
     assert names == ["mug_1_1_1", "mug_1_1_5", "mug_2_1_1", "mug_2_1_5"]
     assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["mug_1.tar", "mug_2.tar"]
+
+
+def test_data_files_are_those_that_are_read(tmp_path):
+    write_bop(tmp_path / "bop" / "toy")
+    (tmp_path / "cups").mkdir()
+    (tmp_path / "more").mkdir()
+    for name in ("cups/b.ply", "cups/a.ply", "cups/notes.txt", "more/cup_1.ply"):
+        BOX.export(tmp_path / name, file_type="ply")
+    names = [path.relative_to(tmp_path).as_posix() for path in data_files(resolve(CUPS, str(tmp_path)))]
+    assert names == ["cups/a.ply", "cups/b.ply", "more/cup_1.ply"]
+    assert [path.name for path in data_files(resolve(BOP, str(tmp_path)))] == ["models_info.json", "obj_000001.ply"]
+    assert data_files(resolve({**BOP, "location": "elsewhere"}, str(tmp_path))) == []

@@ -39,6 +39,6 @@ def test_the_snakefile_fits_on_a_page():
 @pytest.mark.parametrize("path", RULES, ids=lambda path: path.name)
 def test_every_rule_says_what_it_needs_and_where_it_logs(path):
     for rule in re.split(r"^rule ", path.read_text(), flags=re.MULTILINE)[1:]:
-        for keyword in ("log", "threads", "resources", "conda"):
+        for keyword in ("log", "benchmark", "threads", "resources", "conda"):
             assert f"\n    {keyword}:" in rule, (rule.split(":")[0], keyword)
         assert "\n    run:" not in rule

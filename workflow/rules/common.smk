@@ -1,10 +1,12 @@
 import json
+import shlex
 from pathlib import Path
 
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
+from gpca.objects.source import data_files
 
 SEEDS = config["seeds"]
 
@@ -48,6 +50,15 @@ def objects_code(wildcards):
     if entry["kind"] == "procedural":
         modules.append(f"gpca.objects.shapes.{FAMILIES[entry['family']]}")
     return code_files(*modules)
+
+
+def data_option(wildcards):
+    """The one folder that the source's data comes from, and no other: a change of that one makes it anew."""
+    option, key = {
+        "local": ("--data-dir", "data_dir"),
+        "download": ("--downloads", "downloads"),
+    }.get(SOURCES[wildcards.source]["origin"], (None, None))
+    return f"{option} {shlex.quote(config[key])}" if key and config[key] else ""
 
 
 def encoder_code(step):

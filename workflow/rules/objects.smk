@@ -1,5 +1,6 @@
 rule objects:
     input:
+        data=lambda wildcards: data_files(SOURCES[wildcards.source]),
         code=objects_code,
     output:
         "results/{run}/objects/{source}.npz",
@@ -19,9 +20,8 @@ rule objects:
         settings=lambda wildcards: json.dumps(
             config["sources"][wildcards.source], sort_keys=True
         ),
-        data_dir=f"--data-dir '{config['data_dir']}'" if config["data_dir"] else "",
-        downloads=config["downloads"],
+        data=data_option,
         points=config["objects"]["points"],
     shell:
         "python -m gpca objects --threads {threads} --source {wildcards.source} --settings {params.settings:q} "
-        "{params.data_dir} --downloads {params.downloads:q} --points {params.points} --out {output} 2> {log}"
+        "{params.data} --points {params.points} --out {output} 2> {log}"

@@ -1,0 +1,86 @@
+import importlib.util
+
+import pytest
+
+from gpca import code_files as module_under_test
+from gpca.code_files import ROOT, code_files
+
+FILES = {
+    "gpca/__init__.py": "",
+    "gpca/base.py": "import json\n",
+    "gpca/middle.py": "from gpca import base\n",
+    "gpca/late.py": "def f():\n    if True:\n        from gpca.middle import something\n",
+    "gpca/cyclic.py": "import gpca.late\nimport gpca.cyclic\n",
+    "gpca/unrelated.py": "import gpca.base\n",
+    "gpca/group/__init__.py": "from gpca.group.one import One\n",
+    "gpca/group/one.py": "from baselines.rival import thing\n",
+    "gpca/says_so.py": "text = 'from gpca.unrelated import x'  # import gpca.unrelated\n",
+    "baselines/__init__.py": "",
+    "baselines/rival.py": "import numpy\n",
+}
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(module_under_test, "ROOT", tmp_path)
+    module_under_test._imports.cache_clear()
+    yield tmp_path
+    module_under_test._imports.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("modules", "expected"),
+    [
+        (["gpca.base"], ["gpca/base.py"]),
+        (["gpca.middle"], ["gpca/__init__.py", "gpca/base.py", "gpca/middle.py"]),
+        (["gpca.late"], ["gpca/__init__.py", "gpca/base.py", "gpca/late.py", "gpca/middle.py"]),
+        (["gpca.cyclic"], ["gpca/__init__.py", "gpca/base.py", "gpca/cyclic.py", "gpca/late.py", "gpca/middle.py"]),
+        (["gpca.group"], ["baselines/rival.py", "gpca/group/__init__.py", "gpca/group/one.py"]),
+        (["gpca.says_so"], ["gpca/says_so.py"]),
+        (["gpca.unrelated", "gpca.base"], ["gpca/base.py", "gpca/unrelated.py"]),
+    ],
+)
+def test_imports_are_followed_wherever_they_stand(project, modules, expected):
+    assert code_files(*modules) == expected
+
+
+def test_paths_are_sorted_relative_and_there():
+    files = code_files("gpca.steps.explain", "gpca.explainer")
+    assert files == sorted(set(files))
+    for file in files:
+        assert (ROOT / file).is_file()
+
+
+STEPS = {
+    "objects": ({"gpca/seeds.py", "gpca/objects/source.py"}, {"gpca/rigid.py", "gpca/gpc.py", "gpca/explainer.py"}),
+    "registrations": ({"gpca/rigid.py", "gpca/perturbation.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
+    "train": ({"gpca/encoders/training.py", "gpca/dataset.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
+    "embed": ({"gpca/encoders/training.py", "gpca/attribution.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
+    "explain": ({"gpca/gpc.py", "gpca/explainer.py", "gpca/attribution.py"}, {"gpca/encoders/training.py"}),
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_a_step_depends_on_what_it_uses_and_not_on_later_steps(step):
+    used, later = STEPS[step]
+    files = set(code_files(f"gpca.steps.{step}"))
+    assert used <= files
+    assert not later & files
+    assert not [file for file in files if file.startswith("gpca/reporting/") or file == "gpca/metrics.py"]
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_every_module_that_a_step_loads_is_among_its_files(step):
+    """Against Python itself: what is loaded when the step is imported, packages' own files apart."""
+    import subprocess
+    import sys
+
+    code = f"import sys, gpca.steps.{step}; print(*sorted(n for n in sys.modules if n.split('.')[0] == 'gpca'))"
+    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    files = set(code_files(f"gpca.steps.{step}"))
+    for module in loaded.stdout.split():
+        if importlib.util.find_spec(module).submodule_search_locations is None:
+            assert module.replace(".", "/") + ".py" in files

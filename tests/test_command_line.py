@@ -1,0 +1,274 @@
+"""``python -m gpca``: every step by hand on tiny data, and what it says when a file or a setting is wrong."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from gpca.__main__ import STEPS, main
+from gpca.code_files import ROOT
+from gpca.files import save_arrays
+
+ENCODER = {"points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
+COMMON = {"--source": "tiny"}
+STEP_OPTIONS = {
+    "objects": COMMON | {
+        "--settings": {"kind": "mesh_folder", "location": "meshes", "unit": "mm"}, "--data-dir": ".",
+        "--points": 600, "--out": "objects.npz",
+    },
+    "registrations": COMMON | {
+        "--settings": {"train": 18, "test": 6, "points": 128}, "--seed": 0, "--objects": "objects.npz",
+        "--out": "registrations.npz", "--timings": "icp.csv",
+    },
+    "train": COMMON | {
+        "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--out": "weights.pt",
+        "--curve": "curve.csv",
+    },
+    "embed": COMMON | {
+        "--settings": ENCODER, "--seeds": 0, "--registrations": "registrations.npz",
+        "--registration-timings": "icp.csv", "--encoders": "weights.pt", "--out": "embeddings.npz",
+        "--timings": "dgcnn.csv",
+    },
+    "explain": COMMON | {
+        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
+        "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--input-timings": "dgcnn.csv",
+        "--predictions": "predictions.csv", "--timings": "gpca.csv",
+    },
+}  # fmt: skip
+
+
+def arguments(step, changes=()):
+    """The command line of a step, with some options changed and those that are None left out."""
+    words = [step]
+    for name, value in (STEP_OPTIONS[step] | dict(changes)).items():
+        if value is not None:
+            values = value if isinstance(value, list) else [json.dumps(value) if isinstance(value, dict) else value]
+            words += [name, *map(str, values)]
+    return words
+
+
+@pytest.fixture(autouse=True)
+def threads_restored(monkeypatch):
+    """The command line sets these for its own process, which here is that of all tests."""
+    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        monkeypatch.setenv(variable, os.environ.get(variable, "1"))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder where every step has run by hand, one after the other."""
+    import trimesh
+
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "meshes").mkdir()
+    trimesh.creation.box((40, 70, 100)).export(folder / "meshes/brick.stl")
+    trimesh.creation.cone(30, 90).export(folder / "meshes/cone.ply")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for step in STEPS:
+            assert main(arguments(step)) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path, monkeypatch):
+    """A copy of that folder to spoil, and the working folder."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def content(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_every_step_runs_by_hand(made):
+    outputs = {value for options in STEP_OPTIONS.values() for value in options.values() if "." in str(value)[1:]}
+    for name in outputs:
+        assert (made / name).stat().st_size > 0
+        assert (made / f"{name}.provenance.json").is_file()
+    assert not [path for path in made.rglob("*") if "checkpoint" in path.name or "partial" in path.name]
+
+
+def test_a_step_made_anew_gives_the_same_bytes(folder, made):
+    for step in ("registrations", "train", "embed", "explain"):
+        assert main(arguments(step)) == 0
+    for name in ("registrations.npz", "weights.pt", "curve.csv", "embeddings.npz", "predictions.csv"):
+        assert (folder / name).read_bytes() == (made / name).read_bytes(), name
+
+
+def settings(step, **changed):
+    return {"--settings": STEP_OPTIONS[step]["--settings"] | changed}
+
+
+def arrays_changed(name, **changed):
+    def spoil(folder):
+        with np.load(folder / name) as archive:
+            arrays = dict(archive)
+        save_arrays(folder / name, arrays | {key: change(arrays[key]) for key, change in changed.items()})
+
+    return spoil
+
+
+def pickled(name):
+    return lambda folder: np.savez(folder / name, points=np.array([{}], dtype=object), allow_pickle=True)
+
+
+def truncated(name):
+    return lambda folder: os.truncate(folder / name, (folder / name).stat().st_size // 2)
+
+
+def removed(name):
+    return lambda folder: (folder / name).unlink()
+
+
+def written(name, text):
+    return lambda folder: (folder / name).write_text(text)
+
+
+def untouched(folder):
+    pass
+
+
+FAULTS = {
+    "objects": [
+        (untouched, settings("objects", location="nowhere"), r"'mesh_folder': nowhere is not there; correct"),
+        (untouched, {"--data-dir": "nowhere"}, r"nowhere: no such folder"),
+        (lambda folder: (folder / "empty").mkdir(), settings("objects", location="empty"), r"the folder holds none of"),
+        (truncated("meshes/cone.ply"), {}, r"cone.ply: is truncated or not a readable .ply file"),
+        (untouched, settings("objects", unit="m"), r"object 'brick': its diameter is 128.5 m, so the declared unit"),
+        (untouched, settings("objects", unit="inch"), r"setting unit: 'inch' is not one of"),
+        (untouched, settings("objects", unti="mm"), r"setting unti: unknown; did you mean unit\?"),
+        (untouched, {"--settings": {}}, r"kind 'None': there is no such kind"),
+        (untouched, {"--settings": "{kind: x"}, r"--settings: not JSON"),
+        (untouched, {"--settings": "[1]"}, r"--settings: not a JSON object"),
+        (untouched, {"--out": "meshes/brick.stl/objects.npz"}, r"meshes/brick.stl"),
+    ],
+    "registrations": [
+        (untouched, {"--objects": "nowhere.npz"}, r"nowhere.npz: no such file; make it with"),
+        (pickled("objects.npz"), {}, r"objects.npz: holds pickled objects, which are never loaded"),
+        (truncated("objects.npz"), {}, r"objects.npz: is not a readable npz archive"),
+        (arrays_changed("objects.npz", normals=lambda n: n[1:]), {}, r"array 'normals' is 1199×3, not 1200×3"),
+        (arrays_changed("objects.npz", points_m=lambda points: points * np.nan), {}, r"array 'points_m' holds NaN"),
+        (untouched, settings("registrations", trian=9), r"setting trian: unknown; did you mean train\?"),
+        (untouched, settings("registrations", severities={"crop": [0.6, 0.2]}), r"severity crop: .* runs downwards"),
+        (untouched, settings("registrations", icp={"max_iterations": 0}), r"setting icp.max_iterations: 0 is less"),
+    ],
+    "train": [
+        (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
+        (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
+        (arrays_changed("registrations.npz", concept=lambda c: np.full_like(c, "x")), {}, r"unknown concept 'x'"),
+        (untouched, settings("train", epochs="two"), r"setting epochs: 'two' is not of type 'integer'"),
+        (untouched, settings("train", layers=3), r"setting layers: unknown; known are backbone, points"),
+        (untouched, settings("train", backbone="dgcn"), r"backbone 'dgcn': unknown; known are dgcnn"),
+        (untouched, settings("train", backbone="dgcnn", options={"kk": 8}), r"options.kk: unknown; did you mean k\?"),
+    ],
+    "embed": [
+        (removed("weights.pt"), {}, r"weights.pt: no such weights; make them anew with 'python -m gpca train'"),
+        (truncated("weights.pt"), {}, r"weights.pt: not the weights of backbone 'dgcnn'"),
+        (written("weights.pt", "no weights"), {}, r"weights.pt: not the weights of backbone 'dgcnn'"),
+        (untouched, settings("embed", options={"k": 8}), r"weights.pt: not the weights of backbone 'dgcnn'"),
+        (removed("icp.csv"), {}, r"icp.csv: no such file"),
+        (written("icp.csv", ""), {}, r"icp.csv: is not a file of timings"),
+        (written("icp.csv", 'sample,"split\n1'), {}, r"icp.csv: is not a file of timings"),
+        (written("icp.csv", "sample,split,seconds,icp_seconds\n0,train,1,1\n"), {}, r"icp.csv: does not hold the sec"),
+        (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
+        (untouched, {"--encoders": ["weights.pt"] * 2}, r"--encoders: 2 file\(s\) for 1 seed\(s\)"),
+    ],
+    "explain": [
+        (untouched, {"--explainer": "shapley"}, r"explainer 'shapley': unknown; known are gpca_paper, gpca"),
+        (untouched, {"--embeddings": None}, r"explainer 'gpca': reads embeddings; give them with --embeddings"),
+        (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+        (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"holds other samples than the registr"),
+        (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
+        (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'sample' is 24, not 23"),
+        (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: is not a file of timings"),
+        (untouched, settings("explain", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
+        (untouched, settings("explain", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
+        (untouched, {"--predictions": "meshes"}, r"meshes"),
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("step", "fault"), [(step, i) for step, faults in FAULTS.items() for i in range(len(faults))])
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, step, fault):
+    spoil, changes, message = FAULTS[step][fault]
+    spoil(folder)
+    before = content(folder)
+    assert main(arguments(step, changes)) == 2
+    out, err = capsys.readouterr()
+    line = err.splitlines()[-1]
+    assert line.startswith(f"gpca {step}: ")
+    assert re.search(message, line), line
+    assert "Traceback" not in err
+    assert out == ""
+    assert content(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("step", "changes", "message"),
+    [
+        ("objects", {"--data-dir": "nowhere"}, "gpca objects: nowhere: no such folder; correct data_dir in the config"),
+        ("registrations", {"--objects": "lost.npz"}, "gpca registrations: lost.npz: no such file; make it with"),
+        ("explain", {"--explainer": "shapley"}, "gpca explain: explainer 'shapley': unknown; known are"),
+    ],
+)
+def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, changes, message):
+    done = subprocess.run(
+        [sys.executable, "-m", "gpca", *arguments(step, changes)],
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith(message)
+
+
+def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder):
+    longer = settings("train", epochs=30)
+    assert main(arguments("train", longer | {"--out": "unbroken.pt"})) == 0
+    # Where the tests run in the background of a shell, SIGINT is ignored, and children inherit that.
+    code = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from gpca.__main__ import main; sys.exit(main(sys.argv[1:]))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *arguments("train", longer)],
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while process.poll() is None and not (folder / "weights.checkpoint").exists():
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "gpca train: stopped; the same command continues"
+    assert "Traceback" not in err
+    assert main(arguments("train", longer)) == 0
+    assert (folder / "weights.pt").read_bytes() == (folder / "unbroken.pt").read_bytes()
+
+
+def test_help_and_wrong_usage_need_no_heavy_library():
+    code = (
+        "import sys; from gpca.__main__ import main\n"
+        "try: main(['--help'])\n"
+        "finally: print({'torch', 'open3d', 'numpy'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stdout.endswith("set()\n")
+    for step in STEPS:
+        assert step in done.stdout
+
+
+@pytest.mark.parametrize("words", [[], ["nosuchstep"], ["train", "--seed", "one"], ["objects"]])
+def test_wrong_usage_is_argparses_status_2(words, capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(words)
+    assert caught.value.code == 2
+    assert "error:" in capsys.readouterr().err

@@ -1,0 +1,189 @@
+import copy
+
+import pytest
+import yaml
+
+from gpca import config as run_config
+from gpca.errors import InputError
+from gpca.settings import SCHEMA, check_settings
+
+CONFIG = SCHEMA.parents[2] / "config"
+MISSING = object()
+NAN = float("nan")
+
+
+def merged(*parts):
+    """Snakemake's way of laying one config over another."""
+    whole = {}
+    for part in parts:
+        for key, value in part.items():
+            both = isinstance(value, dict) and isinstance(whole.get(key), dict)
+            whole[key] = merged(whole[key], value) if both else copy.deepcopy(value)
+    return whole
+
+
+def load(*names):
+    return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in ("sources", "config", *names)))
+
+
+def changed(key, value):
+    """The default config with the key (a path with dots) set to the value, or removed."""
+    config = load()
+    *path, last = key.split(".")
+    section = config
+    for name in path:
+        section = section[name]
+    if value is MISSING:
+        del section[last]
+    else:
+        section[last] = value
+    return config
+
+
+@pytest.mark.parametrize("name", ["config", "smoke", "real"])
+def test_the_shipped_configs_are_sound(name):
+    sources = run_config.check(load(name))
+    assert list(sources) == ["coffee_cup", "linemod", "ycb"]
+    for entry in sources.values():
+        assert entry["stand_in"] == (name != "real")
+        assert entry["origin"] == ("download" if name == "real" else "procedural")
+
+
+def test_local_data_comes_before_the_download(tmp_path):
+    (tmp_path / "bop/lm").mkdir(parents=True)
+    sources = run_config.check(load("real") | {"data_dir": str(tmp_path)})
+    assert sources["linemod"]["origin"] == "local"
+    assert sources["linemod"]["location"] == str(tmp_path / "bop/lm")
+    assert sources["ycb"]["origin"] == "download"
+
+
+def folder(**more):
+    return {"title": "Mine", "kind": "mesh_folder", "location": "/", "unit": "mm"} | more
+
+
+LINK = {"title": "Mine", "kind": "mesh_folder", "unit": "mm", "url": "https://a.org/b.zip"}
+FAULTS = [
+    # unknown keys, with a hint
+    ("sedes", [1], "sedes: unknown; did you mean seeds?"),
+    ("zzz", 1, "zzz: unknown; known are run, data_dir, "),
+    ("registrations.trian", 5, "registrations.trian: unknown; did you mean train?"),
+    ("registrations.severities.crops", [0, 0.1], "registrations.severities.crops: unknown; did you mean crop?"),
+    ("encoders.dgcnn.options.kk", 3, "encoders.dgcnn.options.kk: unknown; did you mean k?"),
+    ("explainers.gpca.iteratons", 3, "explainers.gpca.iteratons: unknown; did you mean iterations?"),
+    ("sources.ycb.famly", "ycb", "sources.ycb.famly: unknown; did you mean family?"),
+    ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
+    # missing keys
+    ("seeds", MISSING, "'seeds' is a required property"),
+    ("registrations.icp", MISSING, "registrations: 'icp' is a required property"),
+    ("encoders.dgcnn.backbone", MISSING, "encoders.dgcnn: 'backbone' is a required property"),
+    ("sources.ycb.kind", MISSING, "sources.ycb: 'kind' is a required property"),
+    ("sources.my", {key: folder()[key] for key in ("title", "kind", "location")}, "sources.my: 'unit' is a required"),
+    # wrong types
+    ("registrations.train", "many", "registrations.train: 'many' is not of type 'integer'"),
+    ("registrations.train", 36.0, "registrations.train: 36.0 is not of type 'integer'"),
+    ("registrations.train", True, "registrations.train: True is not of type 'integer'"),
+    ("registrations", None, "registrations: None is not of type 'object'"),
+    ("registrations.severities.crop", 0.2, "registrations.severities.crop: 0.2 is not of type 'array'"),
+    ("registrations.severities.crop", ["a", 0.2], "registrations.severities.crop.0: 'a' is not of type 'number'"),
+    ("explainers.gpca", [1], "explainers.gpca: [1] is not of type 'object', 'null'"),
+    ("seeds", 3, "seeds: 3 is not of type 'array'"),
+    # out of range
+    ("registrations.severities.crop", [0.2, 0.99], "registrations.severities.crop.1: 0.99 is greater than the maximum"),
+    ("registrations.severities.crop", [0.2], "registrations.severities.crop: [0.2] is too short"),
+    ("registrations.severities.noise", [NAN, 0.2], "registrations.severities.noise.0: nan is not of type 'number'"),
+    ("registrations.severities.crop", [0.6, 0.2], "severity crop: [0.6, 0.2] runs downwards; swap the two"),
+    ("registrations.icp.method", "icp2", "registrations.icp.method: 'icp2' is not one of ['point_to_point', "),
+    ("registrations.icp.correspondence_distance", 0, "registrations.icp.correspondence_distance: 0 is less than or eq"),
+    ("encoders.dgcnn.epochs", -1, "encoders.dgcnn.epochs: -1 is less than the minimum of 1"),
+    ("encoders.dgcnn.learning_rate", NAN, "encoders.dgcnn.learning_rate: nan is not of type 'number'"),
+    ("encoders.dgcnn.weight_decay", float("inf"), "encoders.dgcnn.weight_decay: inf is not of type 'number'"),
+    ("explainers.gpca.iterations", 0, "explainers.gpca.iterations: 0 is less than the minimum of 1"),
+    ("explainers.gpca.kernel", "cubic", "explainers.gpca.kernel: 'cubic' is not one of ['rbf', 'matern32']"),
+    ("objects.points", 100, "objects.points: 100 is less than the minimum of 256"),
+    ("seeds", [], "seeds: [] should be non-empty"),
+    ("seeds", [0, 1, 0], "seeds: [0, 1, 0] has non-unique elements"),
+    ("seeds", [-1], "seeds.0: -1 is less than the minimum of 0"),
+    ("run", "../elsewhere", "run: '../elsewhere' does not match"),
+    ("downloads", "", "downloads: '' should be non-empty"),
+    # names of what does not exist
+    ("encoders.dgcnn.backbone", "dgcn", "encoders.dgcnn.backbone: backbone 'dgcn': unknown; known are dgcnn"),
+    ("embedding.encoder", "pointnet", "embedding.encoder: no encoder 'pointnet'; known are dgcnn"),
+    ("explainers.shapley", {}, "explainers.shapley: explainer 'shapley': unknown; known are gpca_paper, gpca"),
+    ("figures.fig3_source", "ycbv", "figures.fig3_source: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    # sources
+    ("sources.ycb", None, "sources.ycb: None is not of type 'object'"),
+    ("sources.ycb.kind", "procedurl", "sources.ycb: kind 'procedurl': there is no such kind of source; known are"),
+    ("sources.ycb.family", "ycbb", "sources.ycb: family 'ycbb': no such procedural family; choose one of coffee_cup,"),
+    ("sources.ycb.family", MISSING, "sources.ycb: source 'YCB': names no family"),
+    ("sources.My", folder(), "sources: 'My' does not match"),
+    ("sources.my", folder(location="lost"), "sources.my: source 'Mine': lost is not there; correct location, or set d"),
+    ("sources.my", folder(unit="inch"), "sources.my.unit: 'inch' is not one of ['m', 'cm', 'mm']"),
+    ("sources.my", LINK | {"url": "ftp://a.org/b.zip"}, "sources.my.url: 'ftp://a.org/b.zip' does not match"),
+    ("sources.my", LINK | {"sha256": "abc"}, "sources.my.sha256: 'abc'"),
+    ("sources.my", LINK | {"sha256": ["0" * 64, "1" * 64]}, "sources.my: source 'Mine': has 1 url(s) but 2 sha256"),
+    ("data_dir", "/nowhere/at/all", "/nowhere/at/all: no such folder; correct data_dir in the config"),
+]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"), FAULTS, ids=[f"{key}-{i}" for i, (key, _, _) in enumerate(FAULTS)]
+)
+def test_a_fault_is_one_line_that_names_the_key(key, value, message):
+    with pytest.raises(InputError) as caught:
+        run_config.check(changed(key, value))
+    line = str(caught.value)
+    assert line.startswith("config key ")
+    assert message in line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("explainers.gpca", None),
+        ("registrations.severities.noise", [0, 0]),
+        ("encoders.other", {"backbone": "dgcnn"}),
+        ("sources.my", folder(local={"kind": "bop"})),
+        ("sources.my", LINK | {"sha256": None}),
+    ],
+)
+def test_what_is_allowed_passes(key, value):
+    run_config.check(changed(key, value))
+
+
+def test_settings_given_by_hand_need_not_be_complete():
+    check_settings({}, "registrations")
+    check_settings({"train": 12, "severities": {"noise": [0.1, 0.2]}}, "registrations")
+    check_settings({"points": 64, "options": {"k": 8}}, "encoders", "any")
+    check_settings({"kind": "mesh_folder", "location": "parts"}, "sources", "any")
+    check_settings({"whatever": 1}, "explainers", "an_own_one")
+
+
+@pytest.mark.parametrize(
+    ("section", "settings", "message"),
+    [
+        (("registrations",), {"trian": 12}, "setting trian: unknown; did you mean train?"),
+        (("registrations",), {"severities": {"noise": [NAN, 1]}}, "setting severities.noise.0: nan is not"),
+        (("encoders", "any"), {"epochs": "ten"}, "setting epochs: 'ten' is not of type 'integer'"),
+        (("explainers", "gpca"), {"draws": 0}, "setting draws: 0 is less than the minimum of 2"),
+        (("sources", "any"), {"unit": "inch"}, r"setting unit: 'inch' is not one of"),
+    ],
+)
+def test_settings_given_by_hand_are_checked_like_their_section(section, settings, message):
+    with pytest.raises(InputError, match=message.replace("?", r"\?")):
+        check_settings(settings, *section)
+
+
+def test_jobs_inherit_the_hash_of_the_config_and_this_python(monkeypatch):
+    import os
+    import shutil
+    import sys
+
+    monkeypatch.setenv("GPCA_CONFIG_SHA256", "")
+    monkeypatch.setenv("PATH", "/bin")
+    hashes = []
+    for config in (load(), dict(reversed(load().items())), changed("seeds", [7])):
+        run_config.export(config)
+        hashes.append(os.environ["GPCA_CONFIG_SHA256"])
+    assert hashes[0] == hashes[1] != hashes[2]
+    assert os.path.dirname(shutil.which("python")) == os.path.dirname(sys.executable)

@@ -1,0 +1,78 @@
+import hashlib
+import json
+import platform
+import shutil
+import subprocess
+import time
+
+import pytest
+
+from gpca import provenance
+from gpca.provenance import recorded, sha256_of_settings
+
+
+@pytest.fixture
+def record(tmp_path, monkeypatch):
+    """The sidecar of a block that took 20 ms and had one input."""
+    monkeypatch.setenv("GPCA_CONFIG_SHA256", "c0ffee")
+    source, outputs = tmp_path / "in.npz", [tmp_path / "out.npz", tmp_path / "out.csv"]
+    source.write_bytes(b"data")
+    with recorded(outputs, [source], {"points": 5, "options": {"k": 3}}, seed=4):
+        assert not list(tmp_path.glob("*.json"))
+        time.sleep(0.02)
+    sidecars = [output.with_name(output.name + ".provenance.json").read_text() for output in outputs]
+    assert sidecars[0] == sidecars[1]
+    return json.loads(sidecars[0])
+
+
+def test_the_sidecar_says_where_a_result_comes_from(record, tmp_path):
+    assert record["inputs_sha256"] == {str(tmp_path / "in.npz"): hashlib.sha256(b"data").hexdigest()}
+    assert record["settings"] == {"points": 5, "options": {"k": 3}}
+    assert record["settings_sha256"] == sha256_of_settings({"options": {"k": 3}, "points": 5})
+    assert (record["seed"], record["config_sha256"]) == (4, "c0ffee")
+    lock = (provenance._ROOT / "environment.lock").read_bytes()
+    assert record["environment_lock_sha256"] == hashlib.sha256(lock).hexdigest()
+    assert record["python"] == platform.python_version()
+    assert {"numpy", "torch", "open3d-cpu", "gpytorch"} <= set(record["libraries"])
+    assert 0.02 <= record["seconds"] < 5
+    assert 10 < record["peak_memory_mb"] < 1e6
+    assert "cores" in record["device"]
+    assert set(record["code"]) == {"commit", "dirty"}
+
+
+def test_another_setting_gives_another_hash():
+    assert sha256_of_settings({"a": 1}) != sha256_of_settings({"a": 2})
+
+
+def test_a_failed_block_leaves_no_sidecar(tmp_path):
+    with pytest.raises(RuntimeError), recorded([tmp_path / "out.npz"], [], {}):
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    if shutil.which("git") is None:
+        pytest.skip("needs git")
+    identity = ["-c", "user.name=A", "-c", "user.email=a@b.org"]
+    for command in (["init"], ["add", "."], [*identity, "commit", "-m", "first"]):
+        (tmp_path / "code.py").write_text("one = 1\n")
+        subprocess.run(["git", "-C", tmp_path, *command], check=True, capture_output=True)
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    return tmp_path
+
+
+def test_the_code_version_tells_the_commit_and_whether_it_was_edited(checkout):
+    head = subprocess.run(["git", "-C", checkout, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
+    assert provenance._code_version() == {"commit": head.stdout.strip(), "dirty": False}
+    (checkout / "result.csv").write_text("untracked files are no code\n")
+    assert provenance._code_version()["dirty"] is False
+    (checkout / "code.py").write_text("one = 2\n")
+    assert provenance._code_version()["dirty"] is True
+
+
+def test_no_checkout_and_no_git_are_no_fault(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    assert provenance._code_version() == {"commit": None, "dirty": None}
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert provenance._code_version() == {"commit": None, "dirty": None}
