@@ -15,7 +15,7 @@ STEPS = {
     "objects": "meshes or clouds of a source -> canonical clouds",
     "registrations": "canonical clouds -> perturbed pairs aligned by ICP",
     "train": "registrations -> encoder weights",
-    "embed": "registrations and encoders -> embeddings",
+    "embed": "registrations and encoder -> embeddings",
     "explain": "registrations and embeddings -> predictions of one explainer",
 }
 

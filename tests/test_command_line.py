@@ -32,8 +32,8 @@ STEP_OPTIONS = {
         "--curve": "curve.csv",
     },
     "embed": COMMON | {
-        "--settings": ENCODER, "--seeds": 0, "--registrations": "registrations.npz",
-        "--registration-timings": "icp.csv", "--encoders": "weights.pt", "--out": "embeddings.npz",
+        "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz",
+        "--registration-timings": "icp.csv", "--encoder": "weights.pt", "--out": "embeddings.npz",
         "--timings": "dgcnn.csv",
     },
     "explain": COMMON | {
@@ -179,11 +179,11 @@ FAULTS = {
         (written("icp.csv", ""), {}, r"icp.csv: is not a file of timings"),
         (written("icp.csv", 'sample,"split\n1'), {}, r"icp.csv: is not a file of timings"),
         (written("icp.csv", "sample,split,seconds,icp_seconds\n0,train,1,1\n"), {}, r"icp.csv: does not hold the sec"),
-        (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
-        (untouched, {"--encoders": ["weights.pt"] * 2}, r"--encoders: 2 file\(s\) for 1 seed\(s\)"),
     ],
     "explain": [
         (untouched, {"--explainer": "shapley"}, r"explainer 'shapley': unknown; known are gpca_paper, gpca"),
+        (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
+        (untouched, {"--embeddings": ["embeddings.npz"] * 2}, r"--embeddings: 2 file\(s\) for 1 seed\(s\)"),
         (untouched, {"--embeddings": None}, r"explainer 'gpca': reads embeddings; give them with --embeddings"),
         (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
         (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"holds other samples than the registr"),

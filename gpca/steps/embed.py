@@ -1,4 +1,4 @@
-"""Step ``embed``: registrations and encoders -> ``embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz``."""
+"""Step ``embed``: registrations and encoder -> ``embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz``."""
 
 from __future__ import annotations
 
@@ -14,33 +14,31 @@ from gpca.encoders.training import EncoderSettings, embed, load_encoder
 from gpca.files import save_arrays
 from gpca.provenance import recorded
 from gpca.settings import check_settings
-from gpca.steps import per_seed
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names, one of each per seed; ``--settings`` is the encoder's section of the config."""
+    """Declare files and names; ``--settings`` is the encoder's section of the config."""
+    parser.add_argument("--registrations", required=True, type=Path)
+    parser.add_argument("--registration-timings", required=True, type=Path)
+    parser.add_argument("--encoder", required=True, type=Path, help="weights")
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=int, nargs="+")
-    parser.add_argument("--registrations", required=True, type=Path, nargs="+")
-    parser.add_argument("--registration-timings", required=True, type=Path, nargs="+")
-    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights")
-    parser.add_argument("--out", required=True, type=Path, nargs="+")
-    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of the seconds, ICP included")
+    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds, ICP included")
 
 
 def run(options: Namespace) -> None:
-    """Embed the clouds of every seed."""
+    """Embed every cloud."""
     torch.set_num_threads(options.threads)
     check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
-    jobs = per_seed(options, "registrations", "registration_timings", "encoders", "out", "timings")
-    for seed, registrations_path, icp_timings, weights, out, timings in jobs:
-        with recorded([out, timings], [registrations_path, weights], options.settings, seed=seed):
-            registrations = Registrations.load(registrations_path)
-            seconds_S, icp_seconds_S = read_timings(icp_timings, registrations)
-            encoder = load_encoder(weights, settings)
-            started = perf_counter()
-            h_S_d = embed(encoder, registrations, options.source, seed, settings)
-            seconds = (perf_counter() - started) / len(h_S_d)
-            save_arrays(out, {"h": h_S_d, "sample": registrations.sample, "split": registrations.split})
-            write_timings(timings, registrations, seconds_S + seconds, icp_seconds_S)
+    inputs = [options.registrations, options.encoder]
+    with recorded([options.out, options.timings], inputs, options.settings, seed=options.seed):
+        registrations = Registrations.load(options.registrations)
+        seconds_S, icp_seconds_S = read_timings(options.registration_timings, registrations)
+        encoder = load_encoder(options.encoder, settings)
+        started = perf_counter()
+        h_S_d = embed(encoder, registrations, options.source, options.seed, settings)
+        seconds = (perf_counter() - started) / len(h_S_d)
+        save_arrays(options.out, {"h": h_S_d, "sample": registrations.sample, "split": registrations.split})
+        write_timings(options.timings, registrations, seconds_S + seconds, icp_seconds_S)

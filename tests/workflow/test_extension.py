@@ -8,7 +8,7 @@ import pytest
 from gpca.objects.canonical import ObjectClouds
 
 SMOKE = ("--configfile", "config/smoke.yaml")
-ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 1, "explain": 2, "objects_figure": 1}
+ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "explain": 2, "objects_figure": 1}
 COLLECTORS = {"metrics": 1, "timings": 1, "table": 2}
 
 

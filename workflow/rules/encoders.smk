@@ -25,33 +25,19 @@ rule encoder:
         "--out {output.weights} --curve {output.curve} 2> {log}"
 
 
-# All seeds in one job: embedding takes less time per seed than importing torch.
 rule embeddings:
     input:
-        registrations=collect(
-            "results/{{run}}/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
-        ),
-        timings=collect(
-            "results/{{run}}/timings/{{source}}/icp/seed{seed}.csv", seed=SEEDS
-        ),
-        encoders=collect(
-            "results/{{run}}/encoders/{{source}}/{{backbone}}/seed{seed}.pt",
-            seed=SEEDS,
-        ),
+        registrations="results/{run}/registrations/{source}/seed{seed}.npz",
+        timings="results/{run}/timings/{source}/icp/seed{seed}.csv",
+        weights="results/{run}/encoders/{source}/{backbone}/seed{seed}.pt",
         code=encoder_code("embed"),
     output:
-        embeddings=collect(
-            "results/{{run}}/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
-            seed=SEEDS,
-        ),
-        timings=collect(
-            "results/{{run}}/timings/{{source}}/{{backbone}}/seed{seed}.csv",
-            seed=SEEDS,
-        ),
+        embeddings="results/{run}/embeddings/{source}/{backbone}/none/seed{seed}.npz",
+        timings="results/{run}/timings/{source}/{backbone}/seed{seed}.csv",
     log:
-        "results/{run}/logs/embeddings/{source}/{backbone}.log",
+        "results/{run}/logs/embeddings/{source}/{backbone}/seed{seed}.log",
     benchmark:
-        "results/{run}/benchmarks/embeddings/{source}/{backbone}.tsv"
+        "results/{run}/benchmarks/embeddings/{source}/{backbone}/seed{seed}.tsv"
     priority: 5
     conda:
         "../envs/gpca.yaml"
@@ -61,9 +47,8 @@ rule embeddings:
         runtime=60,
     params:
         settings=settings("encoders", "{backbone}"),
-        seeds=SEEDS,
     shell:
-        "python -m gpca embed --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--settings {params.settings:q} --registrations {input.registrations} "
-        "--registration-timings {input.timings} --encoders {input.encoders} "
+        "python -m gpca embed --threads {threads} --registrations {input.registrations} "
+        "--registration-timings {input.timings} --encoder {input.weights} "
+        "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
         "--out {output.embeddings} --timings {output.timings} 2> {log}"
