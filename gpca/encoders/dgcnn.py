@@ -11,9 +11,9 @@ from gpca.encoders.edge_conv import NEGATIVE_SLOPE, EdgeConv
 class DGCNN(nn.Module):
     """Four EdgeConvs (64, 64, 128, 256) on dynamic graphs, a point-wise layer, max and mean pooling.
 
-    The published widths; the point-wise layer has 256 channels here (1024 in the ModelNet40 network), because three
-    concepts need no more and it is half of the arithmetic. The cloud is used as it is: no centring, scaling or
-    spatial transformer, which would erase the concepts.
+    The published widths; the point-wise layer has 256 channels here (1024 in the ModelNet40 network), which keeps
+    it to half of the arithmetic. The cloud is used as it is: no centring, scaling or spatial transformer, which would
+    erase the concepts.
 
     Args:
         k: neighbours per point, the point itself included.
