@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from gpca.files import whole_file
+from gpca.files import sha256_of_file, whole_file
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
 CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # set by the Snakefile for its jobs
@@ -43,9 +43,9 @@ def recorded(
         "settings": settings,
         "settings_sha256": sha256_of_settings(settings),
         "config_sha256": os.environ.get(CONFIG_VARIABLE),
-        "inputs_sha256": {str(path): _sha256_of_file(path) for path in inputs},
+        "inputs_sha256": {str(path): sha256_of_file(path) for path in inputs},
         "code": _code_version(),
-        "environment_lock_sha256": _sha256_of_file(_ROOT / "environment.lock"),
+        "environment_lock_sha256": sha256_of_file(_ROOT / "environment.lock"),
         "device": _device(),
         "python": platform.python_version(),
         "libraries": _library_versions(),
@@ -58,11 +58,6 @@ def recorded(
 def sha256_of_settings(settings: Mapping) -> str:
     """Return the SHA-256 of settings as JSON with sorted keys."""
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
-
-
-def _sha256_of_file(path: Path | str) -> str:
-    with Path(path).open("rb") as content:
-        return hashlib.file_digest(content, "sha256").hexdigest()
 
 
 def _code_version() -> dict[str, object]:

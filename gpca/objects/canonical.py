@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca import seeds
+from gpca.environment import require_open3d
 from gpca.errors import InputError
 from gpca.files import load_arrays, save_arrays
 from gpca.objects.surface import Surface
@@ -118,8 +119,7 @@ def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tupl
 
 
 def _estimated_normals(points_m: np.ndarray) -> np.ndarray:
-    import open3d as o3d
-
+    o3d = require_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBOURS))
     cloud.orient_normals_towards_camera_location(np.zeros(3))

@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from gpca.errors import InputError
-from gpca.files import whole_file
+from gpca.files import sha256_of_file, whole_file
 
 TIMEOUT_S = 30
 
@@ -50,15 +50,8 @@ def cached_path(url: str, folder: str | Path) -> Path:
     return Path(folder, parts.hostname, *names)
 
 
-def sha256_of(path: Path) -> str:
-    """Hexadecimal SHA-256 of a file."""
-    import pooch
-
-    return pooch.file_hash(str(path), alg="sha256")
-
-
 def _check(path: Path, expected: str | None, url: str, remedy: str) -> str:
-    actual = sha256_of(path)
+    actual = sha256_of_file(path)
     if expected is not None and actual != expected.lower():
         raise InputError(url, f"the checksum does not match: expected sha256 {expected}, got {actual}", remedy)
     return actual

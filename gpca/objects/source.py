@@ -15,6 +15,7 @@ from types import ModuleType
 
 from gpca import objects
 from gpca.errors import InputError
+from gpca.files import sha256_of_file
 from gpca.objects import archive, download, procedural
 from gpca.objects.surface import Surface
 
@@ -97,7 +98,7 @@ def data_files(entry: dict) -> list[Path]:
 
 def _unpacked(file: Path) -> Path:
     # Named by content: an archive that was fetched anew is unpacked anew.
-    return archive.unpack(file, file.with_name(f"{file.stem}-{download.sha256_of(file)[:12]}"))
+    return archive.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
 
 
 def _found(entry: dict, data_dir: str | None) -> Path | None:

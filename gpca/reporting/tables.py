@@ -34,7 +34,7 @@ def table1_single_baselines(
     for source, entry in sources.items():
         of_row = {name: cell for name in shown if (cell := _accuracy_cell(metrics, source, name, ALL))}
         cells |= {(len(rows), name): cell for name, cell in of_row.items()}
-        rows += [((source, _title(entry)),)] if of_row else []
+        rows += [((source, title_of(entry)),)] if of_row else []
     return _accuracy_table(
         metrics,
         sources,
@@ -61,7 +61,7 @@ def table2_per_concept(metrics: pd.DataFrame, sources: Mapping[str, Mapping], ex
         for explainer, title in ((name, title) for name, title in explainers.items() if name in GPCA):
             of_row = {c: cell for c in columns if (cell := _accuracy_cell(metrics, source, explainer, c))}
             cells |= {(len(rows), concept): cell for concept, cell in of_row.items()}
-            rows += [((source, _title(entry)), (explainer, title))] if of_row else []
+            rows += [((source, title_of(entry)), (explainer, title))] if of_row else []
     return _accuracy_table(
         metrics,
         sources,
@@ -117,5 +117,6 @@ def _span(numbers: Iterable[float]) -> str:
     return str(distinct[0]) if len(distinct) == 1 else f"{distinct[0]} to {distinct[-1]}"
 
 
-def _title(entry: Mapping) -> str:
+def title_of(entry: Mapping) -> str:
+    """Return a source's title, with the words that it is a stand-in where it is one."""
     return f"{entry['title']} ({STAND_IN})" if entry["stand_in"] else entry["title"]

@@ -7,6 +7,7 @@ from gpca.encoders.registry import ENCODERS
 from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
+from gpca.reporting.tables import GPCA, title_of
 
 SEEDS = config["seeds"]
 
@@ -33,15 +34,6 @@ def settings(*keys):
         return json.dumps(found or {}, sort_keys=True)
 
     return section
-
-
-def title_of(source):
-    entry = SOURCES[source]
-    return (
-        f"{entry['title']} (procedural stand-in)"
-        if entry["stand_in"]
-        else entry["title"]
-    )
 
 
 def objects_code(wildcards):
@@ -97,9 +89,7 @@ def of_all_explainers(kind, explainers=None):
 # The explainers that each table shows: asked for alone, a table builds these and nothing else.
 TABLE_EXPLAINERS = {
     "table1_single_baselines": list(config["explainers"]),
-    "table2_per_concept": [
-        name for name in config["explainers"] if name in ("gpca_paper", "gpca")
-    ],
+    "table2_per_concept": [name for name in config["explainers"] if name in GPCA],
 }
 
 

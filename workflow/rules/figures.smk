@@ -20,7 +20,7 @@ rule objects_figure:
         mem_mb=2000,
         runtime=10,
     params:
-        title=lambda wildcards: title_of(wildcards.source),
+        title=lambda wildcards: title_of(SOURCES[wildcards.source]),
     script:
         "../scripts/contact_sheet.py"
 
@@ -48,6 +48,6 @@ rule fig3_concepts:
         mem_mb=2000,
         runtime=10,
     params:
-        title=title_of(config["figures"]["fig3_source"]),
+        title=title_of(SOURCES[config["figures"]["fig3_source"]]),
     script:
         "../scripts/concepts_figure.py"
