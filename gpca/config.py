@@ -6,13 +6,13 @@ import os
 import sys
 from pathlib import Path
 
-from gpca.dataset import RegistrationSettings
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.explainer import require_settings
 from gpca.objects.source import resolve
 from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
 from gpca.settings import load_schema, require_valid
+from gpca.synthesis import RegistrationSettings
 
 
 def check(config: dict) -> dict[str, dict]:

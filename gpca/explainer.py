@@ -1,6 +1,6 @@
-"""The interface of every explainer, GP-CA itself, and how explainers are found by name.
+"""The interface of every explainer, and how explainers are found by name.
 
-An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/`` (or here), listed in that file's
+An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
 ``EXPLAINERS`` by the name under which the config switches it on::
 
     EXPLAINERS = {"my_explainer": Entry("My explainer", MyExplainer)}
@@ -13,16 +13,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from inspect import signature
-from time import perf_counter
 from typing import Protocol
-
-import numpy as np
 
 import baselines
 from gpca.attribution import Attribution
 from gpca.dataset import Registrations
 from gpca.errors import InputError
-from gpca.perturbation import CONCEPTS
 
 
 class Explainer(Protocol):
@@ -52,44 +48,8 @@ class Entry:
     oracle: bool = False
 
 
-class GPCA:
-    """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds."""
-
-    def __init__(self, source: str, seed: int, **settings) -> None:
-        from gpca.gpc import GPC, GPCSettings
-
-        self._gpc = GPC(CONCEPTS, GPCSettings(**settings), source, seed)
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit the GPC to the labelled embeddings."""
-        self._gpc.fit(registrations.embedding, registrations.concept)
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every embedding and summarise (Eqs. 4 to 7)."""
-        started = perf_counter()
-        scores_N_C, variances_N_C, bald_N = self._gpc.attribute(registrations.embedding)
-        seconds = (perf_counter() - started) / len(registrations)
-        zeros_N = np.zeros(len(registrations))
-        return Attribution(
-            concepts=CONCEPTS,
-            scores_N_C=scores_N_C,
-            variances_N_C=variances_N_C,
-            bald_N=bald_N,
-            abstained_N=zeros_N.astype(bool),
-            icp_calls_N=zeros_N.astype(int),
-            seconds_N=zeros_N + seconds,
-            icp_seconds_N=zeros_N,
-        )
-
-
-EXPLAINERS = {
-    "gpca_paper": Entry("GP-CA (paper's setting)", GPCA, reads="embeddings"),
-    "gpca": Entry("GP-CA (trained longer)", GPCA, reads="embeddings"),
-}
-
-
 def explainers() -> dict[str, Entry]:
-    """Return all explainers by name: those of this file and of every file in ``baselines/``."""
+    """Return all explainers by name: GP-CA itself and those of every file in ``baselines/``."""
     return {name: entry for entries in _by_module().values() for name, entry in entries.items()}
 
 
@@ -116,6 +76,5 @@ def explainer_module(name: str) -> str:
 
 
 def _by_module() -> dict[str, dict[str, Entry]]:
-    names = sorted(f"baselines.{module.name}" for module in pkgutil.iter_modules(baselines.__path__))
-    modules = {name: getattr(import_module(name), "EXPLAINERS", {}) for name in names}
-    return {__name__: EXPLAINERS} | modules
+    rivals = sorted(f"baselines.{module.name}" for module in pkgutil.iter_modules(baselines.__path__))
+    return {name: getattr(import_module(name), "EXPLAINERS", {}) for name in ("gpca.concept_attribution", *rivals)}

@@ -35,6 +35,6 @@ def objects(tmp_path_factory):
 @pytest.fixture(scope="session")
 def registrations(objects):
     """36 training and 18 test registrations of clouds of up to 256 points."""
-    from gpca.dataset import RegistrationSettings, make_registrations
+    from gpca.synthesis import RegistrationSettings, make_registrations
 
     return make_registrations(objects, "tiny", 0, RegistrationSettings(train=36, test=18, points=256))[0]

@@ -188,7 +188,7 @@ FAULTS = {
         (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
         (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"holds other samples than the registr"),
         (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
-        (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'sample' is 24, not 23"),
+        (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'head_logits' is 24×3, not 23"),
         (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: is not a file of timings"),
         (untouched, settings("explain", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
         (untouched, settings("explain", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),

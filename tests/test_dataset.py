@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gpca import dataset
-from gpca.dataset import COLUMNS, RegistrationSettings, make_registrations
+from gpca import synthesis
+from gpca.dataset import COLUMNS
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
 from gpca.registration import ICP, ICPSettings
 from gpca.rigid import inverse, rotation_angle_rad, transform
+from gpca.synthesis import RegistrationSettings, make_registrations
 
 
 def in_object_frame(registrations, row):
@@ -76,7 +77,7 @@ def test_source_and_target_share_no_point_and_icp_gives_the_stored_cloud(objects
             seen.append((self.target, source, T_target_source_init, result))
             return result
 
-    monkeypatch.setattr(dataset, "ICP", Recorded)
+    monkeypatch.setattr(synthesis, "ICP", Recorded)
     settings = RegistrationSettings(train=6, test=6, points=2048)
     made, icp_seconds = make_registrations(objects, "tiny", 0, settings)
     assert (icp_seconds > 0).all()
@@ -84,6 +85,7 @@ def test_source_and_target_share_no_point_and_icp_gives_the_stored_cloud(objects
         assert len(target) == 300  # half of the object's 600 points, though 2048 were asked for
         clean = transform(made.T_target_source_true[row], source * made.diameter_m[row]) / made.diameter_m[row]
         assert cKDTree(target).query(clean)[0].min() > 1e-7
+        assert np.array_equal(made.target(row), target.astype(np.float32))
         assert np.allclose(made.cloud(row), transform(result.T_target_source, source), atol=1e-6)
         in_metres = transform(made.T_target_source_icp[row], source * made.diameter_m[row]) / made.diameter_m[row]
         assert np.allclose(made.cloud(row), in_metres, atol=1e-6)
@@ -92,12 +94,15 @@ def test_source_and_target_share_no_point_and_icp_gives_the_stored_cloud(objects
 
 
 def test_a_subset_keeps_every_rows_cloud_and_columns(registrations):
-    with_embedding = dataclasses.replace(registrations, embedding=np.arange(len(registrations))[:, None] * 1.0)
+    with_embedding = dataclasses.replace(
+        registrations, attached={"embedding": np.arange(len(registrations))[:, None] * 1.0}
+    )
     rows = np.array([17, 2, 40, 2])
     chosen = with_embedding.subset(rows)
     assert len(chosen) == 4
     for new, old in enumerate(rows):
         assert np.array_equal(chosen.cloud(new), registrations.cloud(old))
+        assert np.array_equal(chosen.target(new), registrations.target(old))
         assert chosen.embedding[new] == old
         for name in COLUMNS:
             assert np.array_equal(getattr(chosen, name)[new], getattr(registrations, name)[old])

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from gpca.dataset import COLUMNS, Registrations
+from gpca.dataset import CLOUDS, COLUMNS, Registrations
 from gpca.errors import InputError
 
 
 def arrays_of(registrations):
-    return {name: getattr(registrations, name) for name in (*COLUMNS, "points", "offsets")}
+    return {name: getattr(registrations, name) for name in (*COLUMNS, *CLOUDS)}
 
 
 def test_registrations_survive_the_file(tmp_path, registrations):
@@ -35,6 +35,8 @@ def changed(array, index, value):
         ("points", lambda a: changed(a, 5, np.nan), "'points' holds NaN"),
         ("points", lambda a: a[:-1], "'offsets' do not match"),
         ("offsets", lambda a: a[:-1], "'offsets' do not match"),
+        ("target_points", lambda a: a[:-1], "'target_offsets' do not match"),
+        ("target_offsets", lambda a: a[:-1], "'target_offsets' do not match"),
         ("offsets", lambda a: a[:0], "'offsets' do not match"),
         ("offsets", lambda a: changed(a, 1, a[2]), "fewer than 3 points"),
         ("offsets", lambda a: changed(a, 1, a[3]), "fewer than 3 points"),

@@ -263,8 +263,8 @@ def test_an_encoder(config, added_modules, registrations, monkeypatch):
     check(config)
     assert config["embedding"]["encoder"] in config["encoders"]
     settings = EncoderSettings(**config["encoders"]["pointwise"] | {"epochs": 1, "points": 64})
-    encoder, curve = train_encoder(registrations, "tiny", 0, settings)
+    model, curve = train_encoder(registrations, "tiny", 0, settings)
     assert len(curve) == 1
-    h_S_d = embed(encoder, registrations, "tiny", 0, settings)
+    h_S_d, _ = embed(model, registrations, "tiny", 0, settings)
     assert h_S_d.shape == (len(registrations), 128)
     assert np.isfinite(h_S_d).all()

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import baselines
+from gpca.concept_attribution import GPCA
 from gpca.errors import InputError
-from gpca.explainer import GPCA, explainer_entry, explainers
+from gpca.explainer import explainer_entry, explainers
 from gpca.perturbation import CONCEPTS
 
 QUICK = {"learning_rate": 0.05, "iterations": 30, "inducing": 12, "draws": 100}
@@ -19,14 +20,15 @@ def embedded(registrations):
     centres = 3 * np.random.default_rng(0).normal(size=(3, 8))
     concept_S = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
     h = centres[concept_S] + np.random.default_rng(1).normal(size=(len(concept_S), 8))
-    return dataclasses.replace(registrations, embedding=h)
+    return dataclasses.replace(registrations, attached={"embedding": h})
 
 
 @pytest.fixture
 def own_baseline(tmp_path, monkeypatch):
     """A file of the user's in a folder of baselines."""
     (tmp_path / "always_noise.py").write_text(
-        "from gpca.explainer import Entry, GPCA\nEXPLAINERS = {'always_noise': Entry('Always noise', GPCA)}\n"
+        "from gpca.concept_attribution import GPCA\nfrom gpca.explainer import Entry\n"
+        "EXPLAINERS = {'always_noise': Entry('Always noise', GPCA)}\n"
     )
     (tmp_path / "helper_without_explainers.py").write_text("")
     monkeypatch.setattr(baselines, "__path__", [*baselines.__path__, str(tmp_path)])

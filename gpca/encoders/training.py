@@ -1,4 +1,4 @@
-"""Training an encoder with a head over the concepts; the head is dropped afterwards (paper Sec. III-A).
+"""Training an encoder with a head over the concepts (paper Sec. III-A); GP-CA reads the encoder, a rival the head.
 
 Each epoch sees a fresh random subset of every cloud's points. There is no other augmentation: rotations and shifts
 would erase the pose concept, jitter the noise concept, crops the overlap concept.
@@ -7,6 +7,7 @@ would erase the pose concept, jitter the noise concept, crops the overlap concep
 from __future__ import annotations
 
 import hashlib
+from collections import OrderedDict
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -62,7 +63,7 @@ def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *
 
 def train_encoder(
     registrations: Registrations, source: str, seed: int, settings: EncoderSettings, checkpoint: Path | None = None
-) -> tuple[nn.Module, list[dict[str, float]]]:
+) -> tuple[nn.Sequential, list[dict[str, float]]]:
     """Train on the rows of split ``train``.
 
     Args:
@@ -70,12 +71,11 @@ def train_encoder(
             continues from it and ends with the same weights as an unbroken run.
 
     Returns:
-        the encoder without its head, and the training curve: epoch, learning_rate, loss, accuracy.
+        the model (``model.encoder``, ``model.head``), and the training curve: epoch, learning_rate, loss, accuracy.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
-    encoder = make_encoder(settings.backbone, settings.options)
     device = best_device()
-    model = nn.Sequential(encoder, nn.Linear(encoder.embedding_size, len(CONCEPTS))).to(device)
+    model = _make_model(settings).to(device)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     rows = registrations.rows("train")
     if len(rows) < 2:
@@ -116,7 +116,7 @@ def train_encoder(
         if not np.isfinite(loss_sum):
             raise InputError(title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
         _keep(checkpoint, identity, state, curve)
-    return encoder.cpu().eval(), curve
+    return model.cpu().eval(), curve
 
 
 def best_device() -> torch.device:
@@ -126,41 +126,48 @@ def best_device() -> torch.device:
 
 @torch.inference_mode()
 def embed(
-    encoder: nn.Module, registrations: Registrations, source: str, seed: int, settings: EncoderSettings
-) -> np.ndarray:
-    """Return embeddings h (S, d) float32 of all rows, in their order.
+    model: nn.Sequential, registrations: Registrations, source: str, seed: int, settings: EncoderSettings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return embeddings h (S, d) of all rows, in their order, and the head's logits (S, C) at them; float32.
 
     h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
-    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on.
+    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. As the head is
+    linear, its logits at h are the mean over the draws too.
     """
     device = best_device()
-    encoder.to(device).eval()
+    model.to(device).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            encoder(draw_points(registrations, rows, settings.points, source, seed, "embedding", draw).to(device))
+            model.encoder(draw_points(registrations, rows, settings.points, source, seed, "embedding", draw).to(device))
             for draw in range(settings.draws)
         ]
         parts.append(torch.stack(draws).mean(dim=0))
-    return torch.cat(parts).cpu().numpy()
+    h_S_d = torch.cat(parts)
+    return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
 
 
-def load_encoder(weights: Path, settings: EncoderSettings) -> nn.Module:
-    """Load an encoder that the step ``train`` wrote, ready for inference.
+def load_model(weights: Path, settings: EncoderSettings) -> nn.Sequential:
+    """Load encoder and head as the step ``train`` wrote them, ready for inference.
 
     Raises:
         InputError: missing, damaged, pickled or another encoder's weights.
     """
-    encoder = make_encoder(settings.backbone, settings.options)
+    model = _make_model(settings)
     remedy = "make them anew with 'python -m gpca train'"
     if not Path(weights).is_file():
         raise InputError(weights, "no such weights", remedy)
     try:
-        encoder.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
+        model.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
     except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
         raise InputError(weights, f"not the weights of backbone '{settings.backbone}'", remedy) from fault
-    return encoder.eval()
+    return model.eval()
+
+
+def _make_model(settings: EncoderSettings) -> nn.Sequential:
+    encoder = make_encoder(settings.backbone, settings.options)
+    return nn.Sequential(OrderedDict(encoder=encoder, head=nn.Linear(encoder.embedding_size, len(CONCEPTS))))
 
 
 def _fingerprint(registrations: Registrations) -> str:

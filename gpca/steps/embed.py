@@ -10,7 +10,7 @@ import torch
 
 from gpca.attribution import read_timings, write_timings
 from gpca.dataset import Registrations
-from gpca.encoders.training import EncoderSettings, embed, load_encoder
+from gpca.encoders.training import EncoderSettings, embed, load_model
 from gpca.files import save_arrays
 from gpca.provenance import recorded
 from gpca.settings import check_settings
@@ -36,9 +36,10 @@ def run(options: Namespace) -> None:
     with recorded([options.out, options.timings], inputs, options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         seconds_S, icp_seconds_S = read_timings(options.registration_timings, registrations)
-        encoder = load_encoder(options.encoder, settings)
+        model = load_model(options.encoder, settings)
         started = perf_counter()
-        h_S_d = embed(encoder, registrations, options.source, options.seed, settings)
+        h_S_d, logits_S_C = embed(model, registrations, options.source, options.seed, settings)
         seconds = (perf_counter() - started) / len(h_S_d)
-        save_arrays(options.out, {"h": h_S_d, "sample": registrations.sample, "split": registrations.split})
+        arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
+        save_arrays(options.out, arrays)
         write_timings(options.timings, registrations, seconds_S + seconds, icp_seconds_S)

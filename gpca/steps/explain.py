@@ -60,7 +60,8 @@ def run(options: Namespace) -> None:
 def _with_embedding(registrations: Registrations, path: Path | None, explainer: str) -> Registrations:
     if path is None:
         raise InputError(f"explainer '{explainer}'", "reads embeddings", "give them with --embeddings")
-    arrays = load_arrays(path, {"h": ("S", "d"), "sample": ("S",), "split": ("S",)}, made_by="python -m gpca embed")
+    shapes = {"h": ("S", "d"), "head_logits": ("S", "C"), "sample": ("S",), "split": ("S",)}
+    arrays = load_arrays(path, shapes, made_by="python -m gpca embed")
     if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
         raise InputError(path, "holds other samples than the registrations", "make it anew with 'python -m gpca embed'")
-    return replace(registrations, embedding=arrays["h"])
+    return replace(registrations, attached={"embedding": arrays["h"], "head_logits": arrays["head_logits"]})

@@ -6,10 +6,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.attribution import write_timings
-from gpca.dataset import RegistrationSettings, make_registrations
 from gpca.objects.canonical import ObjectClouds
 from gpca.provenance import recorded
 from gpca.settings import check_settings
+from gpca.synthesis import RegistrationSettings, make_registrations
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -33,10 +33,10 @@ def run(options: Namespace) -> None:
     # Not an output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = options.out.with_suffix(".checkpoint")
     with recorded([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
-        encoder, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
+        model, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
         # Given a path, torch.save writes its name, here one with the process id, into the file.
         with whole_file(options.out) as partial, partial.open("wb") as file:
-            torch.save(encoder.state_dict(), file)
+            torch.save(model.state_dict(), file)
         with whole_file(options.curve) as partial:
             pd.DataFrame(curve).to_csv(partial, index=False, float_format="%.6g", lineterminator="\n")
         checkpoint.unlink(missing_ok=True)

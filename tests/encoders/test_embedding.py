@@ -1,4 +1,5 @@
 import dataclasses
+from collections import OrderedDict
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ SETTINGS = EncoderSettings(points=64, draws=2, batch_size=12, options={"k": 8, "
 
 
 @pytest.fixture(scope="module")
-def encoder():
+def model():
     torch.manual_seed(0)
-    return make_encoder("dgcnn", SETTINGS.options).eval()
+    encoder = make_encoder("dgcnn", SETTINGS.options)
+    head = torch.nn.Linear(encoder.embedding_size, 3)
+    return torch.nn.Sequential(OrderedDict(encoder=encoder, head=head)).eval()
 
 
 def test_points_are_of_the_cloud_and_named_by_sample_not_by_batch(registrations):
@@ -36,18 +39,22 @@ def test_a_cloud_of_fewer_points_repeats_some(registrations):
     assert {tuple(point) for point in drawn} <= {tuple(point) for point in cloud}
 
 
-def test_embeddings_do_not_depend_on_the_batch_size(registrations, encoder):
-    h = embed(encoder, registrations, "tiny", 0, SETTINGS)
-    assert h.shape == (len(registrations), encoder.embedding_size)
+def test_embeddings_do_not_depend_on_the_batch_size(registrations, model):
+    h, _ = embed(model, registrations, "tiny", 0, SETTINGS)
+    assert h.shape == (len(registrations), model.encoder.embedding_size)
     assert h.dtype == np.float32
-    in_other_batches = embed(encoder, registrations, "tiny", 0, dataclasses.replace(SETTINGS, batch_size=5))
+    in_other_batches, _ = embed(model, registrations, "tiny", 0, dataclasses.replace(SETTINGS, batch_size=5))
     assert np.abs(h - in_other_batches).max() < 1e-5
 
 
-def test_an_embedding_is_the_mean_over_its_draws(registrations, encoder):
+def test_an_embedding_is_the_mean_over_its_draws(registrations, model):
     rows = np.arange(len(registrations))
     with torch.no_grad():
-        draws = [encoder(draw_points(registrations, rows, 64, "tiny", 0, "embedding", draw)) for draw in range(2)]
-    h = embed(encoder, registrations, "tiny", 0, SETTINGS)
+        draws = [model.encoder(draw_points(registrations, rows, 64, "tiny", 0, "embedding", draw)) for draw in range(2)]
+    h, logits = embed(model, registrations, "tiny", 0, SETTINGS)
     assert np.abs(h - sum(draws).numpy() / 2).max() < 1e-5
+    with torch.no_grad():
+        of_draws = sum(model.head(draw) for draw in draws).numpy() / 2
+    assert np.abs(logits - of_draws).max() < 1e-5
+    assert np.ptp(logits, axis=0).min() > 1e-3
     assert (draws[0] - draws[1]).abs().max() > 1e-3

@@ -3,11 +3,11 @@ import dataclasses
 import pytest
 import torch
 
-from gpca.dataset import RegistrationSettings, make_registrations
 from gpca.encoders import training
-from gpca.encoders.training import EncoderSettings, load_encoder, train_encoder
+from gpca.encoders.training import EncoderSettings, load_model, train_encoder
 from gpca.errors import InputError
 from gpca.perturbation import Severities
+from gpca.synthesis import RegistrationSettings, make_registrations
 
 SETTINGS = EncoderSettings(points=64, draws=2, epochs=6, batch_size=12, options={"k": 8, "point_features": 16})
 KEEP = training._keep
@@ -112,13 +112,13 @@ def test_a_checkpoint_of_other_settings_or_data_is_left_aside(tmp_path, registra
 def test_weights_survive_the_file_and_others_are_refused(tmp_path, unbroken):
     path = tmp_path / "seed0.pt"
     with pytest.raises(InputError, match="no such weights"):
-        load_encoder(path, SETTINGS)
+        load_model(path, SETTINGS)
     torch.save(unbroken[0].state_dict(), path)
-    assert same_weights(load_encoder(path, SETTINGS), unbroken[0])
+    assert same_weights(load_model(path, SETTINGS), unbroken[0])
     for damage in (truncate, lambda path: torch.save(torch.nn.Linear(3, 3).state_dict(), path)):
         damage(path)
         with pytest.raises(InputError, match="not the weights of backbone 'dgcnn'") as caught:
-            load_encoder(path, SETTINGS)
+            load_model(path, SETTINGS)
         assert str(path) in str(caught.value)
 
 

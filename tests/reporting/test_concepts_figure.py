@@ -68,6 +68,8 @@ def files(clouds, tmp_path_factory):
         diameter_m=DIAMETERS_M[rows],
         points=np.concatenate(aligned),
         offsets=np.cumsum([0, *map(len, aligned)]),
+        target_points=np.concatenate(aligned),
+        target_offsets=np.cumsum([0, *map(len, aligned)]),
         severity_noise=noise,
         severity_rotation_rad=rotation,
         severity_translation=translation,

@@ -8,7 +8,8 @@ ALL_EXPLAINERS, COLLECTORS = {"explain": 6}, {"metrics": 1, "timings": 1, "table
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
     (project.folder / "baselines/lazy.py").write_text(
-        "from gpca.explainer import Entry, GPCA\nEXPLAINERS = {'lazy': Entry('Lazy', GPCA)}\n"
+        "from gpca.concept_attribution import GPCA\nfrom gpca.explainer import Entry\n"
+        "EXPLAINERS = {'lazy': Entry('Lazy', GPCA)}\n"
     )
     project.append("config/smoke.yaml", "  lazy: {}\n")
     smoke = ("--configfile", "config/smoke.yaml")
