@@ -16,7 +16,8 @@ STEPS = {
     "registrations": "canonical clouds -> perturbed pairs aligned by ICP",
     "train": "registrations -> encoder weights",
     "embed": "registrations and encoder -> embeddings",
-    "explain": "registrations and embeddings -> predictions of one explainer",
+    "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
+    "explain": "registrations, embeddings or uncertainty -> predictions of one explainer",
 }
 
 

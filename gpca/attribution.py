@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-
-from gpca.dataset import Registrations
-from gpca.errors import InputError
-from gpca.files import whole_file
 
 
 @dataclass(frozen=True)
@@ -35,6 +30,33 @@ class Attribution:
     seconds_N: np.ndarray
     icp_seconds_N: np.ndarray
 
+    @classmethod
+    def of_scores(
+        cls,
+        concepts: tuple[str, ...],
+        scores_N_C: np.ndarray,
+        *,
+        seconds: np.ndarray | float,
+        icp_seconds: np.ndarray | float = 0.0,
+        icp_calls: np.ndarray | int = 0,
+        abstained_N: np.ndarray | None = None,
+    ) -> Attribution:
+        """Make the attribution of an explainer that gives scores alone; variances and BALD are NaN.
+
+        Times and calls are one number for each row, or one for all.
+        """
+        n = len(scores_N_C)
+        return cls(
+            concepts=concepts,
+            scores_N_C=scores_N_C,
+            variances_N_C=np.full(scores_N_C.shape, np.nan),
+            bald_N=np.full(n, np.nan),
+            abstained_N=np.zeros(n, bool) if abstained_N is None else abstained_N,
+            icp_calls_N=np.broadcast_to(icp_calls, n).astype(int),
+            seconds_N=np.broadcast_to(seconds, n).astype(float),
+            icp_seconds_N=np.broadcast_to(icp_seconds, n).astype(float),
+        )
+
     @property
     def predicted_N(self) -> np.ndarray:
         """The concept with the largest score (Eq. 6), the first of equals; empty where abstained."""
@@ -43,8 +65,13 @@ class Attribution:
 
     @property
     def entropy_N(self) -> np.ndarray:
-        """Predictive entropy H[ŝ] in nats of the scores, normalised to sum to one."""
-        return entropy(self.scores_N_C / self.scores_N_C.sum(axis=1, keepdims=True))
+        """Predictive entropy H[ŝ] in nats of the scores, normalised to sum to one.
+
+        Scores may be signed, as Shapley values are: a negative one has no share. Without any share all are equal.
+        """
+        positive_N_C = np.maximum(self.scores_N_C, 0)
+        positive_N_C = np.where(positive_N_C.sum(axis=1, keepdims=True) > 0, positive_N_C, 1.0)
+        return entropy(positive_N_C / positive_N_C.sum(axis=1, keepdims=True))
 
 
 def entropy(p: np.ndarray) -> np.ndarray:
@@ -67,62 +94,3 @@ def summarise_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     variances_N_C = np.square(p_M_N_C - scores_N_C).mean(axis=0)
     bald_N = entropy(scores_N_C) - entropy(p_M_N_C).mean(axis=0)
     return scores_N_C, variances_N_C, bald_N
-
-
-def write_predictions(path: str | Path, registrations: Registrations, attribution: Attribution) -> None:
-    """Write the prediction file that every table is made from (results/README.md); six decimals."""
-    import pandas as pd
-
-    frame = pd.DataFrame(
-        {
-            "sample": registrations.sample,
-            "split": registrations.split,
-            "object": registrations.object_name,
-            "concept_true": registrations.concept,
-            "concept_predicted": attribution.predicted_N,
-            **{f"score_{c}": attribution.scores_N_C[:, i] for i, c in enumerate(attribution.concepts)},
-            **{f"variance_{c}": attribution.variances_N_C[:, i] for i, c in enumerate(attribution.concepts)},
-            "bald": attribution.bald_N,
-            "entropy": attribution.entropy_N,
-            "abstained": attribution.abstained_N,
-            "icp_calls": attribution.icp_calls_N,
-        }
-    )
-    _write_csv(path, frame)
-
-
-def write_timings(
-    path: str | Path, registrations: Registrations, seconds_S: np.ndarray, icp_seconds_S: np.ndarray
-) -> None:
-    """Write seconds per sample; apart from the predictions, because they differ from run to run."""
-    import pandas as pd
-
-    columns = {"sample": registrations.sample, "split": registrations.split}
-    _write_csv(path, pd.DataFrame(columns | {"seconds": seconds_S, "icp_seconds": icp_seconds_S}))
-
-
-def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, np.ndarray]:
-    """Return seconds (S,) and icp_seconds (S,) of the registrations.
-
-    Raises:
-        InputError: the file is missing, lacks a column, or holds other samples.
-    """
-    import pandas as pd
-
-    remedy = "make it anew with the step that writes it"
-    if not Path(path).is_file():
-        raise InputError(path, "no such file", remedy)
-    try:
-        frame = pd.read_csv(path)
-    except ValueError as fault:  # an empty file, broken quotes, other bytes than text
-        raise InputError(path, "is not a file of timings", remedy) from fault
-    if not {"sample", "split", "seconds", "icp_seconds"} <= set(frame.columns):
-        raise InputError(path, "is not a file of timings", remedy)
-    if not all(np.array_equal(frame[name], getattr(registrations, name)) for name in ("sample", "split")):
-        raise InputError(path, "does not hold the seconds of these samples", remedy)
-    return frame["seconds"].to_numpy(), frame["icp_seconds"].to_numpy()
-
-
-def _write_csv(path, frame) -> None:
-    with whole_file(path) as partial:
-        frame.to_csv(partial, index=False, float_format="%.6f", lineterminator="\n")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
-from gpca.explainer import require_settings
+from gpca.explainer import explainer_entry, require_settings
 from gpca.objects.source import resolve
 from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
 from gpca.settings import load_schema, require_valid
@@ -34,6 +34,10 @@ def check(config: dict) -> dict[str, dict]:
         raise InputError("config key embedding.encoder", f"no encoder '{name}'", f"known are {known}")
     for name, settings in config["explainers"].items():
         with_key(f"explainers.{name}", require_settings, name, settings or {})
+        design = explainer_entry(name).design
+        if design and design not in config["uncertainty"]:
+            known = ", ".join(config["uncertainty"])
+            raise InputError(f"config key explainers.{name}", f"no uncertainty '{design}'", f"known are {known}")
     sources = {
         name: {"stand_in": entry["kind"] == "procedural"}
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])

@@ -38,7 +38,8 @@ class Entry:
     Attributes:
         title: as tables head its column.
         make: called with source, seed and the settings of the config.
-        reads: ``embeddings`` if it needs those of the encoder, else ``registrations``.
+        reads: what it needs attached: ``embeddings`` those of the encoder, ``uncertainty/<design>`` the outcomes of
+            that design (:mod:`gpca.designs`); ``registrations`` nothing.
         oracle: it is told the truth about what it explains; an upper bound, to be labelled so in its title.
     """
 
@@ -46,6 +47,11 @@ class Entry:
     make: Callable[..., Explainer]
     reads: str = "registrations"
     oracle: bool = False
+
+    @property
+    def design(self) -> str | None:
+        """The design whose outcomes it reads, if any."""
+        return self.reads.removeprefix("uncertainty/") if self.reads.startswith("uncertainty/") else None
 
 
 def explainers() -> dict[str, Entry]:

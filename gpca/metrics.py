@@ -1,4 +1,4 @@
-"""From predictions to numbers: accuracy over the test rows of every source, explainer and seed, as one tidy table.
+"""From predictions to numbers: over the test rows of every source, explainer and seed, as one tidy table.
 
 An abstained sample counts as wrong, so that an explainer cannot gain by staying silent.
 """
@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.predictions import TIMING_COLUMNS, concepts_of, numbers, read_csv, read_predictions, require_samples
 
 if TYPE_CHECKING:
     import pandas as pd
 
 ALL = "all"  # stands for every concept together in the column `concept`
 COLUMNS = ("table", "source", "method", "metric", "concept", "seed", "value")
-_PREDICTION_COLUMNS = ("sample", "split", "object", "concept_true", "concept_predicted", "abstained")
-_TIMING_COLUMNS = ("sample", "seconds", "icp_seconds")
-_TRUTH = {"true": True, "1": True, "false": False, "0": False}
+PREDICTED_AS, ABSTAINED = "predicted_as_", "abstained"  # metrics of the confusion: predicted_as_<concept or abstained>
+CAUSAL_QUANTILE = 0.95  # of the clean uncertainties: what lies above is not the scatter of clean registrations
+_CAUSAL_COLUMNS = ("sample", "split", "uncertainty_observed", "uncertainty_clean")
 
 
 def accuracy(concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray) -> float:
@@ -45,6 +46,28 @@ def concept_accuracy(
     }
 
 
+def confusion(
+    concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Iterable[str]
+) -> np.ndarray:
+    """Return counts (C, C + 1): rows the true concepts, columns the predicted ones and, last, the abstained."""
+    concepts = list(concepts)
+    columns = [(concept_predicted_S == concept) & ~abstained_S for concept in concepts] + [abstained_S]
+    return np.array([[np.sum(column & (concept_true_S == true)) for column in columns] for true in concepts])
+
+
+def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
+    """Return the largest accuracy over all one-to-one relabellings of the predicted concepts.
+
+    Far above the plain accuracy it shows that an explainer tells the concepts apart but names them wrongly: an
+    artefact of sign or scale. It looks at the truth, so it is an upper bound and never a result: of many balanced
+    guesses it is slightly above 1/C. Solved as an assignment (Kuhn 1955).
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    named_C_C = confusion_C_C1[:, :-1]
+    return float(named_C_C[linear_sum_assignment(named_C_C, maximize=True)].sum() / confusion_C_C1.sum())
+
+
 def mean_interval(values_R: Iterable[float], level: float = 0.95) -> tuple[float, float, float]:
     """Return the mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R.
 
@@ -64,90 +87,103 @@ def mean_interval(values_R: Iterable[float], level: float = 0.95) -> tuple[float
     return mean, mean - half_width, mean + half_width
 
 
-def read_predictions(path: str | Path) -> pd.DataFrame:
-    """Read a prediction file as it is: text, numbers in `score_…` and `variance_…`, `abstained` as bool.
+def read_causal(path: str | Path) -> pd.Series:
+    """Return whether each sample is causal, indexed by (split, sample) as text: something made it uncertain.
+
+    Causal is what has an observed uncertainty above the 95th percentile of the clean ones in the file, which holds
+    those of one source and seed (KL divergences in nats, one row per test sample).
 
     Raises:
-        InputError: missing, empty or unreadable file; missing column; a concept without a score column; a sample
-            twice in one split; a split other than train and test; a score that is not a finite number; a variance
-            that is neither that nor empty.
+        InputError: missing, empty or unreadable file, missing column, a sample twice, an uncertainty not finite.
     """
-    rows = _read_csv(path, _PREDICTION_COLUMNS)
-    concepts = concepts_of(rows)
-    if not concepts:
-        raise InputError(path, "has no column score_<concept>", "make it anew")
-    rows["abstained"] = rows["abstained"].str.lower().map(_TRUTH)
-    if rows["abstained"].isna().any():
-        raise InputError(path, "column 'abstained' holds something other than True and False", "make it anew")
-    rows["abstained"] = rows["abstained"].astype(bool)
-    for column in ("concept_true", "concept_predicted"):
-        known = rows[column].isin(concepts)
-        if column == "concept_predicted":
-            known |= rows["abstained"] & (rows[column] == "")
-        if not known.all():
-            unknown = rows.loc[~known, column].iloc[0]
-            raise InputError(
-                path, f"unknown concept '{unknown}' in '{column}'", f"its concepts are {', '.join(concepts)}"
-            )
-    if not rows["split"].isin(["train", "test"]).all():
-        raise InputError(path, "column 'split' holds something other than train and test", "make it anew")
-    if rows.duplicated(["split", "sample"]).any():
-        raise InputError(path, "holds a sample twice", "make it anew")
-    for column in (name for name in rows.columns if name.startswith(("score_", "variance_"))):
-        # Every explainer that does not abstain has scores; one without variances leaves them empty.
-        needed = ~rows["abstained"] if column.startswith("score_") else rows[column] != ""
-        rows[column] = _numbers(path, rows, column, needed)
-    return rows
+    rows = read_csv(path, _CAUSAL_COLUMNS)
+    require_samples(path, rows)
+    threshold = numbers(path, rows, "uncertainty_clean").quantile(CAUSAL_QUANTILE)
+    return (numbers(path, rows, "uncertainty_observed") > threshold).set_axis(_samples(rows))
 
 
-def concepts_of(predictions: pd.DataFrame) -> list[str]:
-    """Return the concepts that predictions score, in the order of their columns."""
-    return [name.removeprefix("score_") for name in predictions.columns if name.startswith("score_")]
-
-
-def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:
     """Return the tidy metrics (`COLUMNS`) of prediction files named `…/{source}/{explainer}/seed{seed}.csv`.
 
-    Over the test rows of each: `accuracy` and `test_samples` of all concepts and of each, and `abstention_rate`;
-    the column `table` is "attribution". Values are shares in [0, 1] or counts. Rows follow the order of the files.
+    results/README.md lists them; the column `table` is "attribution". Values are shares in [0, 1], counts or means
+    per sample. Rows follow the order of the files. Causal metrics are those of the sources and seeds of
+    `causal_files`, named `…/{source}/{design}/seed{seed}.csv`; they may hold more samples than an explainer explains.
 
     Raises:
-        InputError: no files, a name of another form, or a file that :func:`read_predictions` refuses or that has
-            no test rows.
+        InputError: no files, a name of another form, a file that :func:`read_predictions` or :func:`read_causal`
+            refuses or that has no test rows, a test sample that the causal file of its source and seed lacks.
     """
+    causal = {(source, seed): (path, read_causal(path)) for path in causal_files for source, _, seed in [_key(path)]}
     records = []
     for path in prediction_files:
         source, method, seed = _key(path)
         rows = read_predictions(path)
-        concepts = concepts_of(rows)
         test = rows[rows["split"] == "test"]
         if test.empty:
             raise InputError(path, "holds no test rows", "make it anew")
-        true_S, predicted_S = test["concept_true"].to_numpy(), test["concept_predicted"].to_numpy()
-        abstained_S = test["abstained"].to_numpy()
-        accuracies = {ALL: accuracy(true_S, predicted_S, abstained_S)}
-        accuracies |= concept_accuracy(true_S, predicted_S, abstained_S, concepts)
-        samples = {concept: len(test) if concept == ALL else int(np.sum(true_S == concept)) for concept in accuracies}
-        for metric, of_concept in (
-            ("accuracy", accuracies),
-            ("test_samples", samples),
-            ("abstention_rate", {ALL: float(abstained_S.mean())}),
-        ):
+        metrics = _attribution_metrics(test, concepts_of(rows))
+        if (source, seed) in causal:
+            metrics |= _causal_metrics(path, test, *causal[source, seed])
+        for metric, of_concept in metrics.items():
             records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
     return _tidy(records, "predictions")
+
+
+def _attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, dict[str, float]]:
+    """Return metric -> concept or `ALL` -> value; a concept without samples has none."""
+    judged = _judged(test)
+    counts = confusion(*judged, concepts)
+    samples = {concept: n for concept, n in zip(concepts, counts.sum(axis=1), strict=True) if n}
+    metrics = {
+        "accuracy": {ALL: accuracy(*judged)} | concept_accuracy(*judged, concepts),
+        "test_samples": {ALL: len(test)} | samples,
+        "abstention_rate": {ALL: test["abstained"].mean()},
+        "permuted_accuracy": {ALL: permuted_accuracy(counts)},
+        "icp_calls": {ALL: test["icp_calls"].mean()},
+    }
+    for predicted, column in zip((*concepts, ABSTAINED), counts.T, strict=True):
+        of_concept = dict(zip(concepts, column, strict=True))
+        metrics[PREDICTED_AS + predicted] = {concept: of_concept[concept] for concept in samples}
+    return metrics
+
+
+def _causal_metrics(path, test: pd.DataFrame, causal_path, causal: pd.Series) -> dict[str, dict[str, float]]:
+    keys = _samples(test)
+    if not (known := keys.isin(causal.index)).all():
+        split, sample = keys[~known][0]
+        raise InputError(causal_path, f"lacks {split} sample {sample} of {path}", "make both anew from one config")
+    shown = test[causal[keys].to_numpy()]
+    metrics = {"causal_samples": {ALL: len(shown)}}
+    if len(shown):
+        metrics["causal_accuracy"] = {ALL: accuracy(*_judged(shown))}
+    return metrics
+
+
+def _judged(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return tuple(rows[name].to_numpy() for name in ("concept_true", "concept_predicted", "abstained"))
+
+
+def _samples(rows: pd.DataFrame) -> pd.MultiIndex:
+    import pandas as pd
+
+    return pd.MultiIndex.from_frame(rows[["split", "sample"]])
 
 
 def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
     """Return mean `seconds_per_sample` and `icp_seconds_per_sample`, tidy as :func:`collect`, with table "runtime".
 
-    Apart from the metrics, because times differ from run to run and metrics must not.
+    Means are over the test rows, as in :func:`collect`. Apart from the metrics, because times differ from run to run
+    and metrics must not.
     """
     records = []
     for path in timing_files:
         source, method, seed = _key(path)
-        rows = _read_csv(path, _TIMING_COLUMNS)
+        rows = read_csv(path, TIMING_COLUMNS)
+        test = rows[rows["split"] == "test"]
+        if test.empty:
+            raise InputError(path, "holds no test rows", "make it anew")
         for column in ("seconds", "icp_seconds"):
-            mean = float(_numbers(path, rows, column).mean())
+            mean = float(numbers(path, test, column).mean())
             records.append(("runtime", source, method, f"{column}_per_sample", ALL, seed, mean))
     return _tidy(records, "timings")
 
@@ -158,9 +194,9 @@ def read_metrics(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a seed or value that is not a finite number.
     """
-    rows = _read_csv(path, COLUMNS)
-    rows["seed"] = _numbers(path, rows, "seed").astype(int)
-    rows["value"] = _numbers(path, rows, "value")
+    rows = read_csv(path, COLUMNS)
+    rows["seed"] = numbers(path, rows, "seed").astype(int)
+    rows["value"] = numbers(path, rows, "value")
     return rows
 
 
@@ -178,34 +214,6 @@ def _key(path: str | Path) -> tuple[str, str, int]:
     if len(parts) < 3 or not parts[-1].startswith("seed") or not seed.isdecimal():
         raise InputError(path, "is not named …/{source}/{explainer}/seed{number}.csv", "rename it")
     return parts[-3], parts[-2], int(seed)
-
-
-def _read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
-    import pandas as pd
-
-    try:
-        rows = pd.read_csv(path, dtype=str, keep_default_na=False)
-    except FileNotFoundError as fault:
-        raise InputError(path, "no such file", "make it with snakemake") from fault
-    except pd.errors.EmptyDataError as fault:
-        raise InputError(path, "is empty", "make it anew") from fault
-    except (pd.errors.ParserError, UnicodeDecodeError, OSError) as fault:
-        raise InputError(path, f"is not a readable CSV file ({fault})", "make it anew") from fault
-    missing = [column for column in columns if column not in rows.columns]
-    if missing:
-        raise InputError(path, f"column '{missing[0]}' is missing", "make it anew")
-    if rows.empty:
-        raise InputError(path, "holds no rows", "make it anew")
-    return rows
-
-
-def _numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True) -> pd.Series:
-    import pandas as pd
-
-    numbers = pd.to_numeric(rows[column], errors="coerce").astype(float)
-    if (~np.isfinite(numbers) & needed).any():
-        raise InputError(path, f"column '{column}' holds something that is not a finite number", "make it anew")
-    return numbers
 
 
 def _tidy(records: list[tuple], name: str) -> pd.DataFrame:

@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from gpca.dataset import COLUMNS, SPLITS, Registrations, ragged
+from gpca.environment import require_open3d
 from gpca.objects.canonical import ObjectClouds
 from gpca.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.progress import progress
@@ -53,6 +54,7 @@ def make_registrations(
     Returns:
         the registrations, and the seconds (S,) that ICP took for each.
     """
+    require_open3d()  # loaded here, or the first sample's seconds would hold its import
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
     records = []
     for split, n in progress(samples, f"registrations of {source}, seed {seed}"):

@@ -1,12 +1,9 @@
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from gpca.attribution import Attribution, entropy, read_timings, summarise_draws, write_predictions, write_timings
-from gpca.errors import InputError
-from gpca.metrics import read_predictions
+from gpca.attribution import Attribution, entropy, summarise_draws
 from gpca.perturbation import CONCEPTS
 
 
@@ -68,55 +65,3 @@ def test_the_largest_score_names_the_concept_and_ties_go_to_the_first():
 def test_entropy_is_that_of_the_normalised_scores():
     made = attribution(2, scores_N_C=np.array([[2.0, 2.0, 0.0], [5.0, 0.0, 0.0]]))
     assert made.entropy_N == pytest.approx([np.log(2), 0])
-
-
-def test_the_prediction_file_has_the_columns_and_values_of_the_schema(tmp_path, registrations):
-    made = attribution(len(registrations), abstained_N=np.arange(len(registrations)) == 4)
-    path = tmp_path / "ycb" / "gpca" / "seed0.csv"
-    write_predictions(path, registrations, made)
-    rows = read_predictions(path)
-    assert list(rows.columns) == [
-        *("sample", "split", "object", "concept_true", "concept_predicted"),
-        *("score_noise", "score_pose", "score_overlap", "variance_noise", "variance_pose", "variance_overlap"),
-        *("bald", "entropy", "abstained", "icp_calls"),
-    ]
-    assert rows["sample"].astype(int).tolist() == registrations.sample.tolist()
-    assert rows["object"].tolist() == registrations.object_name.tolist()
-    assert rows["concept_true"].tolist() == registrations.concept.tolist()
-    assert rows["concept_predicted"].tolist() == made.predicted_N.tolist()
-    assert rows.loc[4, "concept_predicted"] == "" and rows["abstained"].sum() == 1
-    assert np.allclose(rows.filter(like="score_"), made.scores_N_C, atol=5.1e-7)
-    assert np.allclose(rows.filter(like="variance_"), made.variances_N_C, atol=5.1e-7)
-    assert np.allclose(rows["bald"].astype(float), made.bald_N, atol=5.1e-7)
-
-
-def test_an_explainer_without_variances_and_bald_leaves_them_empty(tmp_path, registrations):
-    n, path = len(registrations), tmp_path / "seed0.csv"
-    nothing = {"variances_N_C": np.full((n, 3), np.nan), "bald_N": np.full(n, np.nan)}
-    write_predictions(path, registrations, attribution(n, **nothing))
-    rows = read_predictions(path)
-    assert rows.filter(like="variance_").isna().all(axis=None)
-    assert set(rows["bald"]) == {""}
-
-
-def test_the_same_predictions_give_the_same_bytes(tmp_path, registrations):
-    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
-        write_predictions(tmp_path / name, registrations, attribution(len(registrations), seed))
-    first, second, other = ((tmp_path / name).read_bytes() for name in "abc")
-    assert first == second != other
-
-
-def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path):
-    path = tmp_path / "seed0.csv"
-    sample = SimpleNamespace(sample=np.array([3, 3]), split=np.array(["train", "test"]))
-    with pytest.raises(InputError, match="no such file"):
-        read_timings(path, sample)
-    write_timings(path, sample, np.array([0.5, 0.25]), np.array([0.125, 0.0]))
-    seconds, icp_seconds = read_timings(path, sample)
-    assert (seconds.tolist(), icp_seconds.tolist()) == ([0.5, 0.25], [0.125, 0.0])
-    fewer = SimpleNamespace(sample=sample.sample[:1], split=sample.split[:1])
-    other = SimpleNamespace(sample=sample.sample, split=sample.split[::-1])
-    for wrong in (fewer, other):
-        with pytest.raises(InputError, match="does not hold the seconds of these samples") as caught:
-            read_timings(path, wrong)
-        assert str(path) in str(caught.value)

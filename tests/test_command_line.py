@@ -36,6 +36,11 @@ STEP_OPTIONS = {
         "--registration-timings": "icp.csv", "--encoder": "weights.pt", "--out": "embeddings.npz",
         "--timings": "dgcnn.csv",
     },
+    "uncertainty": COMMON | {
+        "--settings": {"starts": 13, "points": 40, "icp": {"max_iterations": 20}}, "--design": "removal", "--seeds": 0,
+        "--registrations": "registrations.npz", "--out": "uncertainty.npz", "--tables": "uncertainty.csv",
+        "--timings": "uncertainty_timings.csv",
+    },
     "explain": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
         "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--input-timings": "dgcnn.csv",
@@ -98,9 +103,17 @@ def test_every_step_runs_by_hand(made):
 
 
 def test_a_step_made_anew_gives_the_same_bytes(folder, made):
-    for step in ("registrations", "train", "embed", "explain"):
+    for step in ("registrations", "train", "embed", "uncertainty", "explain"):
         assert main(arguments(step)) == 0
-    for name in ("registrations.npz", "weights.pt", "curve.csv", "embeddings.npz", "predictions.csv"):
+    for name in (
+        "registrations.npz",
+        "weights.pt",
+        "curve.csv",
+        "embeddings.npz",
+        "uncertainty.npz",
+        "uncertainty.csv",
+        "predictions.csv",
+    ):
         assert (folder / name).read_bytes() == (made / name).read_bytes(), name
 
 
@@ -136,6 +149,15 @@ def written(name, text):
 def untouched(folder):
     pass
 
+
+def lines_kept(name, lines):
+    return lambda folder: (folder / name).write_text("".join((folder / name).open().readlines()[:lines]))
+
+
+SHAP = {
+    "--explainer": "shap_removal", "--settings": {}, "--embeddings": None, "--uncertainty": "uncertainty.npz",
+    "--uncertainty-timings": "uncertainty_timings.csv", "--input-timings": "icp.csv",
+}  # fmt: skip
 
 FAULTS = {
     "objects": [
@@ -176,11 +198,27 @@ FAULTS = {
         (written("weights.pt", "no weights"), {}, r"weights.pt: not the weights of backbone 'dgcnn'"),
         (untouched, settings("embed", options={"k": 8}), r"weights.pt: not the weights of backbone 'dgcnn'"),
         (removed("icp.csv"), {}, r"icp.csv: no such file"),
-        (written("icp.csv", ""), {}, r"icp.csv: is not a file of timings"),
-        (written("icp.csv", 'sample,"split\n1'), {}, r"icp.csv: is not a file of timings"),
+        (written("icp.csv", ""), {}, r"icp.csv: is empty"),
+        (written("icp.csv", 'sample,"split\n1'), {}, r"icp.csv: is not a readable CSV file"),
         (written("icp.csv", "sample,split,seconds,icp_seconds\n0,train,1,1\n"), {}, r"icp.csv: does not hold the sec"),
     ],
+    "uncertainty": [
+        (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
+        (untouched, settings("uncertainty", starts=12), r"setting starts: 12 is less than the minimum of 13"),
+        (untouched, settings("uncertainty", start=13), r"setting start: unknown; did you mean starts\?"),
+        (untouched, settings("uncertainty", floor=0), r"setting floor: 0 is less than or equal to the minimum"),
+        (untouched, settings("uncertainty", samples=4), r"setting samples: 4 is not a multiple of 3"),
+        (untouched, settings("uncertainty", icp={"method": "gicp"}), r"setting method: 'gicp' is not one of"),
+        (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
+    ],
     "explain": [
+        (untouched, SHAP | {"--uncertainty": None}, r"'shap_removal': reads the uncertainty of design 'removal'"),
+        (removed("uncertainty.npz"), SHAP, r"uncertainty.npz: no such file; make it with 'python -m gpca"),
+        (arrays_changed("uncertainty.npz", sample=lambda s: s + 50), SHAP, r"holds other samples than the outcomes"),
+        (arrays_changed("uncertainty.npz", residual=lambda r: r * np.nan), SHAP, r"array 'residual' holds NaN"),
+        (removed("uncertainty_timings.csv"), SHAP, r"uncertainty_timings.csv: no such file"),
+        (lines_kept("uncertainty_timings.csv", 20), SHAP, r"holds 19 rows, not 24 samples × 8 conditions"),
+        (untouched, SHAP | {"--settings": {"worth": "rmse"}}, r"rmse"),
         (untouched, {"--explainer": "shapley"}, r"explainer 'shapley': unknown; known are gpca_paper, gpca"),
         (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
         (untouched, {"--embeddings": ["embeddings.npz"] * 2}, r"--embeddings: 2 file\(s\) for 1 seed\(s\)"),
@@ -189,7 +227,7 @@ FAULTS = {
         (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"holds other samples than the registr"),
         (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
         (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'head_logits' is 24×3, not 23"),
-        (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: is not a file of timings"),
+        (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: column 'split' is missing"),
         (untouched, settings("explain", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
         (untouched, settings("explain", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
         (untouched, {"--predictions": "meshes"}, r"meshes"),

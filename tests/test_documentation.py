@@ -233,9 +233,9 @@ def test_an_explainer(config, added_modules, registrations, tmp_path):
     import numpy as np
     import pandas as pd
 
-    from gpca.attribution import write_predictions
     from gpca.config import check
     from gpca.explainer import explainer_entry
+    from gpca.predictions import write_predictions
 
     added_modules("baselines/nearest_quality.py")
     update_config(config, yaml.safe_load(block("config/config.yaml", "nearest_quality")))

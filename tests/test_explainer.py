@@ -7,6 +7,7 @@ import pytest
 
 import baselines
 from gpca.concept_attribution import GPCA
+from gpca.designs import DESIGNS
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry, explainers
 from gpca.perturbation import CONCEPTS
@@ -47,7 +48,8 @@ def test_gpca_and_the_papers_setting_are_listed_and_read_embeddings():
 def test_every_entry_can_be_headed_and_fed():
     for name, entry in explainers().items():
         assert entry.title, name
-        assert entry.reads in ("registrations", "embeddings"), name
+        assert entry.reads in ("registrations", "embeddings") or entry.design in DESIGNS, name
+        assert ("oracle" in entry.title) == entry.oracle, name
 
 
 def test_an_unknown_explainer_is_refused_with_the_known_ones():

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from gpca.files import whole_file
 
 EMPTY = "–"  # what is drawn where there is no number
+_COLUMN_CHARACTERS, _TEXT_CHARACTERS = 50, 100  # that fill one column and both of a two-column paper
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,25 @@ class Cell:
     seeds: int
     test_samples: int
 
-    def text(self, decimals: int) -> str:
+
+@dataclass(frozen=True)
+class Column:
+    """How one quantity is shown: title, digits after the point, with ± or without.
+
+    `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them.
+    """
+
+    title: str
+    decimals: int = 1
+    interval: bool = True
+    limits: tuple[float, float] = (0.0, 100.0)
+
+    def text(self, cell: Cell) -> str:
         """Return e.g. ``97.7 ± 0.4``."""
-        half_width = EMPTY if math.isnan(self.half_width) else f"{self.half_width:.{decimals}f}"
-        return f"{self.mean:.{decimals}f} ± {half_width}"
+        if not self.interval:
+            return f"{cell.mean:.{self.decimals}f}"
+        half_width = EMPTY if math.isnan(cell.half_width) else f"{cell.half_width:.{self.decimals}f}"
+        return f"{cell.mean:.{self.decimals}f} ± {half_width}"
 
 
 @dataclass(frozen=True)
@@ -38,12 +54,10 @@ class Table:
         row_heads: key -> title of each row label, e.g. ``{"source": "Dataset"}``.
         rows: for each row its labels, key -> title each, one label per row head.
         column_head: key of what the columns are, e.g. ``explainer``.
-        columns: key -> title, in order.
+        columns: key -> :class:`Column`, in order.
         cells: (row number, column key) -> cell; a missing one is drawn as a dash.
         footnotes: what a reader needs to know to judge the numbers.
-        compared: columns among which the best of a row is set in bold; all when empty.
-        decimals: digits after the point in Markdown and LaTeX.
-        limits: the least and the largest possible value; the bounds in the CSV are clipped to them.
+        compared: groups of such keys; within each, the largest printed mean is set in bold.
     """
 
     name: str
@@ -51,24 +65,21 @@ class Table:
     row_heads: Mapping[str, str]
     rows: tuple[tuple[tuple[str, str], ...], ...]
     column_head: str
-    columns: Mapping[str, str]
+    columns: Mapping[str, Column]
     cells: Mapping[tuple[int, str], Cell]
     footnotes: tuple[str, ...] = ()
-    compared: tuple[str, ...] = ()
-    decimals: int = 1
-    limits: tuple[float, float] = (0.0, 100.0)
+    compared: tuple[Sequence[tuple[int, str]], ...] = ()
 
-    def best(self, row: int) -> set[str]:
-        """Return the columns of `row` whose printed mean is the largest; none where fewer than two are compared."""
-        printed = {
-            column: round(self.cells[row, column].mean, self.decimals)
-            for column in (self.compared or self.columns)
-            if (row, column) in self.cells
-        }
-        if len(printed) < 2:
-            return set()
-        best = max(printed.values())
-        return {column for column, value in printed.items() if value == best}
+    def best(self) -> set[tuple[int, str]]:
+        """Return the keys of the cells with the largest printed mean of their group; none of a group of one."""
+        best: set[tuple[int, str]] = set()
+        for group in self.compared:
+            printed = {
+                key: round(self.cells[key].mean, self.columns[key[1]].decimals) for key in group if key in self.cells
+            }
+            if len(printed) > 1:
+                best |= {key for key, mean in printed.items() if mean == max(printed.values())}
+        return best
 
     def write(self, csv_path: str | Path, md_path: str | Path, tex_path: str | Path) -> None:
         """Write the three files, each whole or not at all."""
@@ -79,68 +90,75 @@ class Table:
             csv.writer(file, lineterminator="\n").writerows(self.records())
 
     def records(self) -> list[tuple]:
-        """Return the CSV's rows, head first: one row per cell, in the table's unit, `n_test` over all seeds."""
+        """Return the CSV's rows, head first: one row per cell, in its column's unit, `n_test` over all seeds."""
         heads = (*self.row_heads, self.column_head, "mean", "ci_low", "ci_high", "n_seeds", "n_test")
         records: list[tuple] = [heads]
         for row, labels in enumerate(self.rows):
-            for column in self.columns:
-                cell = self.cells.get((row, column))
+            for name, column in self.columns.items():
+                cell = self.cells.get((row, name))
                 if cell is None:
                     continue
+                least, most = column.limits
                 low, high = (
-                    "" if math.isnan(cell.half_width) else round(min(max(bound, self.limits[0]), self.limits[1]), 6)
+                    "" if math.isnan(cell.half_width) else round(min(max(bound, least), most), 6)
                     for bound in (cell.mean - cell.half_width, cell.mean + cell.half_width)
                 )
                 keys = (key for key, _ in labels)
-                records.append((*keys, column, round(cell.mean, 6), low, high, cell.seeds, cell.test_samples))
+                records.append((*keys, name, round(cell.mean, 6), low, high, cell.seeds, cell.test_samples))
         return records
 
     def markdown(self) -> str:
         """Return a GitHub table, caption above, footnotes below."""
-        heads = [*self.row_heads.values(), *self.columns.values()]
         rule = [":--"] * len(self.row_heads) + ["--:"] * len(self.columns)
         body = self._body(lambda text: text.replace("|", "\\|"), lambda text: f"**{text}**")
-        lines = [" | ".join(row) for row in (heads, rule, *body)]
+        lines = [" | ".join(row) for row in (self._heads(), rule, *body)]
         table = "\n".join(f"| {line} |" for line in lines)
         return "\n\n".join([f"**{self.caption}**", table, *self.footnotes]) + "\n"
 
     def latex(self) -> str:
-        r"""Return a floating table; it needs ``\usepackage{booktabs}`` and spans both columns when it is wide."""
-        plain = [[*self.row_heads.values(), *self.columns.values()], *self._body(str, str)]
+        r"""Return a floating table; it needs ``\usepackage{booktabs}`` and spans both columns when it is wide.
+
+        One that may be wider still is scaled down to the text where it is, which needs ``graphicx`` too.
+        """
+        plain = [self._heads(), *self._body(str, str)]
         characters = sum(2 + max(map(len, column)) for column in zip(*plain, strict=True))
-        float_name = "table" if characters <= 50 else "table*"  # 50 fill a column of a two-column paper
-        heads = [r"\textbf{" + _tex(title) + "}" for title in (*self.row_heads.values(), *self.columns.values())]
+        float_name = "table" if characters <= _COLUMN_CHARACTERS else "table*"
+        scale = characters > _TEXT_CHARACTERS
+        heads = [r"\textbf{" + _tex(title) + "}" for title in self._heads()]
         body = self._body(_tex, lambda text: r"\textbf{" + text + "}")
         return "\n".join(
             [
-                "% needs \\usepackage{booktabs}",
+                rf"% needs \usepackage{{booktabs{', graphicx' * scale}}}",
                 rf"\begin{{{float_name}}}[t]",
                 r"\centering",
                 rf"\caption{{{_tex(self.caption)}}}",
                 rf"\label{{tab:{self.name}}}",
                 r"\small",
+                *([r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"] if scale else []),
                 rf"\begin{{tabular}}{{{'l' * len(self.row_heads)}{'c' * len(self.columns)}}}",
                 r"\toprule",
                 " & ".join(heads) + r" \\",
                 r"\midrule",
                 *(" & ".join(row) + r" \\" for row in body),
                 r"\bottomrule",
-                r"\end{tabular}",
+                r"\end{tabular}" + "}" * scale,
                 *(rf"\par\smallskip{{\footnotesize {_tex(footnote)}}}" for footnote in self.footnotes),
                 rf"\end{{{float_name}}}",
                 "",
             ]
         )
 
+    def _heads(self) -> list[str]:
+        return [*self.row_heads.values(), *(column.title for column in self.columns.values())]
+
     def _body(self, escape, bold) -> list[list[str]]:
-        body = []
+        body, best = [], self.best()
         for row, labels in enumerate(self.rows):
             texts = [escape(title) for _, title in labels]
-            best = self.best(row)
-            for column in self.columns:
-                cell = self.cells.get((row, column))
-                text = escape(cell.text(self.decimals)) if cell else escape(EMPTY)
-                texts.append(bold(text) if column in best else text)
+            for name, column in self.columns.items():
+                cell = self.cells.get((row, name))
+                text = escape(column.text(cell)) if cell else escape(EMPTY)
+                texts.append(bold(text) if (row, name) in best else text)
             body.append(texts)
         return body
 

@@ -8,10 +8,10 @@ from time import perf_counter
 
 import torch
 
-from gpca.attribution import read_timings, write_timings
 from gpca.dataset import Registrations
 from gpca.encoders.training import EncoderSettings, embed, load_model
 from gpca.files import save_arrays
+from gpca.predictions import read_timings, write_timings
 from gpca.provenance import recorded
 from gpca.settings import check_settings
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.attribution import write_timings
 from gpca.objects.canonical import ObjectClouds
+from gpca.predictions import write_timings
 from gpca.provenance import recorded
 from gpca.settings import check_settings
 from gpca.synthesis import RegistrationSettings, make_registrations

@@ -1,24 +1,26 @@
 import csv
 import math
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from gpca.errors import InputError
 from gpca.metrics import COLUMNS
-from gpca.reporting.table import Cell, Table
-from gpca.reporting.tables import table1_single_baselines, table2_per_concept
+from gpca.reporting.table import Cell, Column, Table
+from gpca.reporting.tables import table1_extended, table1_single_baselines, table2_per_concept
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
 STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
-EXPLAINERS = {"shap_additive": "SHAP", "gpca_paper": "GP-CA (paper)", "gpca": "GP-CA"}
+TITLES = {"gpca_paper": "GP-CA (paper)", "gpca": "GP-CA", "shap_additive": "SHAP", "shap_oracle": "SHAP (oracle)"}
+EXPLAINERS = {name: {"title": title, "oracle": name == "shap_oracle"} for name, title in TITLES.items()}
 
 
-def tidy(accuracies):
-    """Metrics from {(source, explainer, concept): accuracies over seeds}, 200 test samples, 50 of each concept."""
+def tidy(accuracies, test_samples=200):
+    """Metrics from {(source, explainer, concept): accuracies over seeds}, by default 200 test samples, 50 of each."""
     records = []
     for (source, explainer, concept), values in accuracies.items():
-        samples = 200 if concept == "all" else 50
+        samples = test_samples if concept == "all" else 50
         for seed, value in enumerate(values):
             records.append(("attribution", source, explainer, "accuracy", concept, seed, value))
             records.append(("attribution", source, explainer, "test_samples", concept, seed, float(samples)))
@@ -39,7 +41,7 @@ def metrics():
     )
 
 
-def test_table1_has_the_explainers_with_predictions_in_config_order(metrics):
+def test_table1_has_the_papers_explainers_with_predictions_in_its_order(metrics):
     markdown = table1_single_baselines(metrics, REAL, EXPLAINERS).markdown()
     assert "| Dataset | SHAP | GP-CA |" in markdown
     # s = 0.01, t_2 = 4.3027: ± 2.48 points; the dash stands where SHAP has no predictions.
@@ -48,6 +50,16 @@ def test_table1_has_the_explainers_with_predictions_in_config_order(metrics):
     assert "Mean over 3 seeds, 200 test samples each" in markdown
     assert "95 % t-interval" in markdown
     assert "stand-in" not in markdown
+    oracle = tidy({("ycb", "shap_oracle", "all"): [0.6, 0.7]})
+    assert table1_single_baselines(pd.concat([metrics, oracle]), REAL, EXPLAINERS).markdown() == markdown
+
+
+def test_table1_says_who_explains_fewer_samples(metrics):
+    both = pd.concat([metrics, tidy({("ycb", "shap_additive", "all"): [0.3, 0.3, 0.4]}, test_samples=60)])
+    both = both[(both["source"] == "ycb") | (both["method"] == "gpca")]
+    footnotes = table1_single_baselines(both, REAL, EXPLAINERS).footnotes
+    assert "60 to 200 test samples each" in footnotes[0]
+    assert footnotes[1] == "Test samples explained: 200 by GP-CA; 60 by SHAP."
 
 
 def test_table2_has_concepts_as_columns_and_only_gpca_as_rows(metrics):
@@ -58,7 +70,7 @@ def test_table2_has_concepts_as_columns_and_only_gpca_as_rows(metrics):
 
 
 def test_stand_ins_are_said_in_title_and_row(metrics):
-    for make in (table1_single_baselines, table2_per_concept):
+    for make in (table1_single_baselines, table1_extended, table2_per_concept):
         table = make(metrics, STAND_INS, EXPLAINERS)
         assert "on procedural stand-ins" in table.caption
         assert "LINEMOD (procedural stand-in)" in table.latex()
@@ -95,11 +107,11 @@ def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
 
 def test_ties_at_the_printed_precision_are_all_bold():
     cells = {(0, "a"): Cell(99.96, 0, 3, 1), (0, "b"): Cell(100.0, 0, 3, 1), (0, "c"): Cell(98, 0, 3, 1)}
-    columns = {"a": "A", "b": "B", "c": "C"}
+    columns = {name: Column(name.upper()) for name in "abc"}
     table = Table("t", "T", {"source": "S"}, ((("x", "X"),),), "column", columns, cells)
-    assert table.best(0) == {"a", "b"}
-    alone = Table("t", "T", {"source": "S"}, ((("x", "X"),),), "column", {"c": "C"}, cells)
-    assert alone.best(0) == set()
+    assert replace(table, compared=(list(cells),)).best() == {(0, "a"), (0, "b")}
+    assert replace(table, compared=([(0, "b"), (0, "c")],)).best() == {(0, "b")}
+    assert replace(table, compared=([(0, "c")], [(1, "a")], [(0, "a"), (1, "a")])).best() == set()
 
 
 def test_latex_is_balanced_and_escaped(metrics):
@@ -126,12 +138,86 @@ def test_latex_spans_both_columns_only_where_it_must(metrics):
 
 
 def test_metrics_without_these_explainers_are_refused(metrics):
-    with pytest.raises(InputError, match="table1_single_baselines"):
-        table1_single_baselines(metrics, REAL, {"sa_local_additive": "SA"})
-    with pytest.raises(InputError, match="table2_per_concept"):
-        table2_per_concept(metrics, REAL, {"shap_additive": "SHAP"})
+    unknown = {"sa_local_additive": {"title": "SA", "oracle": False}}
+    for make in (table1_single_baselines, table1_extended, table2_per_concept):
+        with pytest.raises(InputError, match=make.__name__):
+            make(metrics, REAL, unknown)
 
 
-def test_cell_text_rounds_and_shows_missing_intervals():
-    assert Cell(97.749, 0.449, 5, 1000).text(1) == "97.7 ± 0.4"
-    assert Cell(97.749, math.nan, 1, 200).text(2) == "97.75 ± –"
+def test_column_text_rounds_and_shows_missing_intervals():
+    assert Column("A").text(Cell(97.749, 0.449, 5, 1000)) == "97.7 ± 0.4"
+    assert Column("A", decimals=2).text(Cell(97.749, math.nan, 1, 200)) == "97.75 ± –"
+    assert Column("A", decimals=0, interval=False).text(Cell(400.0, 0.1, 5, 1000)) == "400"
+
+
+def full(source, explainer, accuracies, **metrics):
+    """Metrics of one explainer as the collectors make them, others than the accuracy the same over seeds."""
+    given = {"permuted_accuracy": 0.9, "abstention_rate": 0.125, "icp_calls": 400.0, "seconds_per_sample": 0.25}
+    given |= {"test_samples": 200.0, "causal_samples": 80.0, "causal_accuracy": 0.5} | metrics
+    records = [
+        ("attribution", source, explainer, metric, "all", seed, value)
+        for seed, accuracy in enumerate(accuracies)
+        for metric, value in (given | {"accuracy": accuracy}).items()
+    ]
+    return pd.DataFrame(records, columns=list(COLUMNS))
+
+
+@pytest.fixture
+def everything():
+    return pd.concat(
+        [
+            full("ycb", "gpca", [0.9, 0.9], icp_calls=0.0, seconds_per_sample=0.0204),
+            full("ycb", "shap_additive", [0.3, 0.4], test_samples=60.0, causal_samples=21.0),
+            full("ycb", "shap_oracle", [0.97, 0.97]),
+            full("linemod", "gpca", [0.8, 0.8]),
+        ]
+    )
+
+
+def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
+    table = table1_extended(everything, REAL, EXPLAINERS)
+    lines = table.markdown().splitlines()
+    assert lines[2] == (
+        "| Dataset | Explainer | Accuracy (%) | Relabelled (%) | Causal (%) | n causal "
+        "| Abstained (%) | ICP calls | Seconds | n |"
+    )
+    assert lines[4] == "| LINEMOD | GP-CA | 80.0 ± 0.0 | 90.0 ± 0.0 | 50.0 ± 0.0 | 80 | 12.5 | 400 | 0.250 | 200 |"
+    assert lines[5] == "| YCB | GP-CA | **90.0 ± 0.0** | 90.0 ± 0.0 | 50.0 ± 0.0 | 80 | 12.5 | 0 | 0.020 | 200 |"
+    assert lines[6].startswith("| YCB | SHAP | 35.0 ± 63.5 |")
+    assert lines[6].endswith("| 21 | 12.5 | 400 | 0.250 | 60 |")
+    assert "60 to 200 test samples each" in table.footnotes[0]
+    assert "the one column that differs from run to run" in table.markdown()
+
+
+def test_extended_sets_the_best_rival_in_bold_and_never_an_oracle(everything):
+    table = table1_extended(everything, REAL, EXPLAINERS)
+    assert table.best() == {(1, "accuracy")}
+    assert [labels[1][1] for labels in table.rows if labels[0][0] == "ycb"] == ["GP-CA", "SHAP", "SHAP (oracle)"]
+    assert "oracles apart" in table.markdown()
+    rivals = {name: entry for name, entry in EXPLAINERS.items() if not entry["oracle"]}
+    assert "oracle" not in table1_extended(everything, REAL, rivals).markdown()
+
+
+def test_extended_csv_is_one_line_per_number(everything):
+    records = table1_extended(everything, REAL, EXPLAINERS).records()
+    assert records[0] == ("source", "explainer", "metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test")
+    assert len(records) == 1 + 4 * 8
+    assert ("ycb", "gpca", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 2, 400) in records
+    assert ("ycb", "shap_additive", "causal_accuracy", 50.0, 50.0, 50.0, 2, 42) in records
+    assert ("ycb", "shap_additive", "accuracy", 35.0, 0.0, 98.531024, 2, 120) in records
+    assert ("ycb", "gpca", "icp_calls", 0.0, 0.0, 0.0, 2, 400) in records
+
+
+def test_extended_leaves_out_what_was_not_measured(everything):
+    accuracies = everything[~everything["metric"].str.startswith(("causal", "seconds"))]
+    markdown = table1_extended(accuracies, REAL, EXPLAINERS).markdown()
+    assert "Causal" not in markdown
+    assert "Seconds" not in markdown
+
+
+def test_a_table_that_may_be_wider_than_the_text_is_scaled_down_in_latex(everything):
+    wide = table1_extended(everything, STAND_INS, EXPLAINERS).latex()
+    assert r"\usepackage{booktabs, graphicx}" in wide.splitlines()[0]
+    assert wide.count(r"\resizebox") == wide.count(r"\end{tabular}}") == 1
+    assert wide.count("{") == wide.count("}")
+    assert "resizebox" not in table1_single_baselines(everything, REAL, EXPLAINERS).latex()

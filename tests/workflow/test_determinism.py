@@ -16,7 +16,19 @@ def test_cores_and_interruptions_change_no_byte(smoke, killed_and_continued, suf
     expected, actual = smoke.results(suffix), killed_and_continued.results(suffix)
     assert expected.keys() == actual.keys()
     assert len(expected) >= {".npz": 15, ".pt": 6, ".csv": 21}.get(suffix, 2)
-    assert [name for name in expected if expected[name] != actual[name]] == []
+    assert [name for name in expected if compared(name, expected[name]) != compared(name, actual[name])] == []
+
+
+def compared(name, content):
+    """All of a file but the seconds of table1_extended, which are measured."""
+    if not name.startswith("tables/table1_extended"):
+        return content
+    lines = content.decode().splitlines()
+    if name.endswith(".csv"):
+        return [line for line in lines if ",seconds_per_sample," not in line]
+    rows = [line.split("|" if name.endswith(".md") else "&") for line in lines]
+    column = next(place for row in rows for place, cell in enumerate(row) if "Seconds" in cell)
+    return [[cell for place, cell in enumerate(row) if place != column] for row in rows]
 
 
 def test_a_killed_run_leaves_nothing_behind(killed_and_continued):

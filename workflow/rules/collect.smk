@@ -1,6 +1,11 @@
 rule metrics:
     input:
         predictions=of_all_explainers("predictions"),
+        causal=collect(
+            "results/{{run}}/uncertainty/{source}/causal/seed{seed}.csv",
+            source=SOURCES,
+            seed=SEEDS,
+        ),
         code=code_files("gpca.metrics", "gpca.reporting.script"),
     output:
         "results/{run}/metrics.csv",

@@ -7,7 +7,7 @@ from gpca.encoders.registry import ENCODERS
 from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
-from gpca.reporting.tables import GPCA, title_of
+from gpca.reporting.tables import GPCA, TABLE1, title_of
 
 SEEDS = config["seeds"]
 
@@ -22,6 +22,7 @@ wildcard_constraints:
     source="|".join(SOURCES),
     backbone="|".join(config["encoders"]),
     explainer="|".join(config["explainers"]),
+    design="|".join(config["uncertainty"]),
 
 
 def settings(*keys):
@@ -62,9 +63,10 @@ def encoder_code(step):
 
 
 def explainer_inputs(wildcards):
-    """Embeddings for explainers that read them, and the seconds that were spent before the explainer starts."""
+    """What the explainer reads besides the registrations, and the seconds that were spent before it starts."""
     encoder = config["embedding"]["encoder"]
-    embedded = explainer_entry(wildcards.explainer).reads == "embeddings"
+    entry = explainer_entry(wildcards.explainer)
+    embedded = entry.reads == "embeddings"
     place = f"{wildcards.run}/{{}}/{wildcards.source}"
     inputs = {
         "timings": f"results/{place.format('timings')}/{encoder if embedded else 'icp'}/seed{{seed}}.csv"
@@ -74,30 +76,63 @@ def explainer_inputs(wildcards):
         inputs["embeddings"] = (
             f"results/{place.format('embeddings')}/{folder}/seed{{seed}}.npz"
         )
+    if entry.design:
+        inputs["uncertainty"] = (
+            f"results/{place.format('uncertainty')}/{entry.design}/seed{{seed}}.npz"
+        )
+        inputs["uncertainty_timings"] = (
+            f"results/{place.format('timings')}/uncertainty_{entry.design}/seed{{seed}}.csv"
+        )
     return {name: collect(pattern, seed=SEEDS) for name, pattern in inputs.items()}
 
 
-def of_all_explainers(kind, explainers=None):
+def attached_options(wildcards, input):
+    names = [
+        name
+        for name in ("embeddings", "uncertainty", "uncertainty_timings")
+        if input.get(name)
+    ]
+    return [
+        word
+        for name in names
+        for word in (f"--{name.replace('_', '-')}", *input.get(name))
+    ]
+
+
+def of_all_explainers(kind, explainers=config["explainers"]):
     return collect(
         f"results/{{{{run}}}}/{kind}/{{source}}/{{explainer}}/seed{{seed}}.csv",
         source=SOURCES,
-        explainer=explainers or list(config["explainers"]),
+        explainer=explainers,
         seed=SEEDS,
     )
 
 
-# The explainers that each table shows: asked for alone, a table builds these and nothing else.
+# The explainers that each table shows: asked for alone, a table builds these and nothing else. No table without any.
 TABLE_EXPLAINERS = {
-    "table1_single_baselines": list(config["explainers"]),
-    "table2_per_concept": [name for name in config["explainers"] if name in GPCA],
+    table: shown
+    for table, names in {
+        "table1_single_baselines": TABLE1,
+        "table1_extended": config["explainers"],
+        "table2_per_concept": GPCA,
+    }.items()
+    if (shown := [name for name in config["explainers"] if name in names])
 }
 
 
-def table_predictions(wildcards):
-    return [
-        path.format(run=wildcards.run)
-        for path in of_all_explainers("predictions", TABLE_EXPLAINERS[wildcards.table])
-    ]
+def table_inputs(wildcards):
+    """The predictions of the explainers that it shows, or all that was collected, times included."""
+    if wildcards.table == "table1_extended":
+        files = [
+            f"results/{wildcards.run}/{name}.csv" for name in ("metrics", "timings")
+        ]
+        return {"collected": files}
+    patterns = of_all_explainers("predictions", TABLE_EXPLAINERS[wildcards.table])
+    return {"predictions": [pattern.format(run=wildcards.run) for pattern in patterns]}
 
 
-FIGURES = ["fig3_concepts", *(f"objects_{source}" for source in SOURCES)]
+FIGURES = [
+    "fig3_concepts",
+    "fig_attribution_confusions",
+    *(f"objects_{source}" for source in SOURCES),
+]

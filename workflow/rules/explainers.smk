@@ -29,11 +29,9 @@ rule explain:
     params:
         settings=settings("explainers", "{explainer}"),
         seeds=SEEDS,
-        embeddings=lambda wildcards, input: (
-            ["--embeddings", *input.embeddings] if input.get("embeddings") else []
-        ),
+        attached=attached_options,
     shell:
         "python -m gpca explain --threads {threads} --explainer {wildcards.explainer} "
         "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
-        "--registrations {input.registrations} {params.embeddings} --input-timings {input.timings} "
+        "--registrations {input.registrations} {params.attached} --input-timings {input.timings} "
         "--predictions {output.predictions} --timings {output.timings} 2> {log}"

@@ -51,3 +51,31 @@ rule fig3_concepts:
         title=title_of(SOURCES[config["figures"]["fig3_source"]]),
     script:
         "../scripts/concepts_figure.py"
+
+
+rule fig_attribution_confusions:
+    input:
+        metrics="results/{run}/metrics.csv",
+        code=code_files("gpca.reporting.confusions_figure", "gpca.reporting.script"),
+    output:
+        pdf="results/{run}/figures/fig_attribution_confusions.pdf",
+        png=report(
+            "results/{run}/figures/fig_attribution_confusions.png",
+            category="Figures",
+            labels={"figure": "confusions"},
+        ),
+    log:
+        "results/{run}/logs/figures/fig_attribution_confusions.log",
+    benchmark:
+        "results/{run}/benchmarks/figures/fig_attribution_confusions.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        sources={name: title_of(entry) for name, entry in SOURCES.items()},
+        explainers={name: explainer_entry(name).title for name in config["explainers"]},
+    script:
+        "../scripts/confusions_figure.py"

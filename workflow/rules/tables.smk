@@ -1,6 +1,6 @@
 rule table:
     input:
-        predictions=table_predictions,
+        unpack(table_inputs),
         code=code_files(
             "gpca.metrics", "gpca.reporting.tables", "gpca.reporting.script"
         ),
@@ -29,6 +29,10 @@ rule table:
             name: {"title": entry["title"], "stand_in": entry["stand_in"]}
             for name, entry in SOURCES.items()
         },
-        explainers={name: explainer_entry(name).title for name in config["explainers"]},
+        explainers=lambda wildcards: {
+            name: {"title": entry.title, "oracle": entry.oracle}
+            for name in TABLE_EXPLAINERS[wildcards.table]
+            for entry in [explainer_entry(name)]
+        },
     script:
         "../scripts/table.py"

@@ -1,7 +1,7 @@
-"""Prediction files -> metrics.csv."""
+"""Prediction files, and what is causal among their samples -> metrics.csv."""
 
 from gpca.metrics import collect, write_metrics
 from gpca.reporting.script import job
 
 with job(snakemake):
-    write_metrics(collect(snakemake.input.predictions), snakemake.output[0])
+    write_metrics(collect(snakemake.input.predictions, snakemake.input.causal), snakemake.output[0])

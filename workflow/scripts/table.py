@@ -1,4 +1,6 @@
-"""Predictions, or metrics collected from them -> the table {table} as CSV, Markdown and LaTeX."""
+"""Predictions, or the metrics and timings collected from all of them -> the table {table} as CSV, Markdown, LaTeX."""
+
+import pandas as pd
 
 from gpca.metrics import collect, read_metrics
 from gpca.reporting.script import job
@@ -6,6 +8,9 @@ from gpca.reporting.tables import TABLES
 
 with job(snakemake):
     given = snakemake.input
-    metrics = read_metrics(given.metrics) if "metrics" in given.keys() else collect(given.predictions)  # noqa: SIM118
+    if "collected" in given.keys():  # noqa: SIM118
+        metrics = pd.concat([read_metrics(path) for path in given.collected])
+    else:
+        metrics = collect(given.predictions)
     table = TABLES[snakemake.wildcards.table](metrics, snakemake.params.sources, snakemake.params.explainers)
     table.write(snakemake.output.csv, snakemake.output.md, snakemake.output.tex)

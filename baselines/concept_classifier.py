@@ -1,0 +1,42 @@
+"""A scikit-learn classifier of concepts, for the rivals that learn from a few numbers per registration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.perturbation import CONCEPTS
+
+
+class ConceptClassifier:
+    """A classifier whose score columns are always `CONCEPTS`, whatever concepts its training rows hold.
+
+    Args:
+        classifier: an unfitted scikit-learn classifier or pipeline with ``predict_proba``.
+    """
+
+    def __init__(self, classifier) -> None:
+        self._classifier = classifier
+
+    def fit(self, features_N_F: np.ndarray, concept_N: np.ndarray) -> ConceptClassifier:
+        """Learn from labelled features; fewer than two concepts among the labels raise an InputError."""
+        if len(np.unique(concept_N)) < 2:
+            raise InputError("training registrations", "fewer than two concepts", "give samples of at least two")
+        self._classifier.fit(features_N_F, concept_N)
+        return self
+
+    def scores(self, features_N_F: np.ndarray) -> np.ndarray:
+        """Return probabilities (N, C) in the order of `CONCEPTS`; a concept absent from training has 0."""
+        scores_N_C = np.zeros((len(features_N_F), len(CONCEPTS)))
+        columns = [CONCEPTS.index(concept) for concept in self._classifier.classes_]
+        scores_N_C[:, columns] = self._classifier.predict_proba(features_N_F)
+        return scores_N_C
+
+
+def standardised_regression(inverse_regularisation: float):
+    """Return an unfitted multinomial logistic regression on standardised features (L2, scikit-learn's C)."""
+    from sklearn.linear_model import LogisticRegression
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    return make_pipeline(StandardScaler(), LogisticRegression(C=inverse_regularisation, max_iter=1000))

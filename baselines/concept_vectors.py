@@ -1,0 +1,72 @@
+"""Concept activation vectors (Kim et al. 2018, TCAV), read per sample.
+
+TCAV's score tells how often a whole data set moves along a concept; it says nothing of one sample. What it rests on
+does: the concept activation vector (CAV), the normal of a linear probe that parts one concept from the others
+(TCAV's relative CAV) in the encoder's embedding. A sample is scored by how far it lies along each.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from baselines.attached import attached
+from gpca.attribution import Attribution
+from gpca.dataset import Registrations
+from gpca.errors import InputError
+from gpca.explainer import Entry
+from gpca.perturbation import CONCEPTS
+
+
+class ConceptVectors:
+    """One-vs-rest logistic probes; scores are the softmax over concepts of the standardised projections.
+
+    The embedding is standardised on the training rows. A projection on a unit CAV is the signed distance from the
+    probe's plane up to a constant; it is standardised on the training rows too, so that the concepts compare. The
+    softmax changes no order; it gives a concept without training rows, which has no CAV, the score 0.
+
+    Args:
+        source, seed: not used; the probes are a convex problem and nothing is drawn.
+        inverse_regularisation: scikit-learn's C, of the L2 penalty of the probes.
+    """
+
+    def __init__(self, source: str, seed: int, inverse_regularisation: float = 1.0) -> None:
+        self._inverse_regularisation = inverse_regularisation
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit one probe for each concept among the labels.
+
+        Raises:
+            InputError: fewer than two concepts, or an embedding that is the same for all registrations.
+        """
+        from sklearn.linear_model import LogisticRegression
+        from sklearn.preprocessing import StandardScaler
+
+        embedding_N_d = attached(registrations, "embedding", None)
+        self._known = [concept for concept in CONCEPTS if (registrations.concept == concept).any()]
+        if len(self._known) < 2:
+            raise InputError("training registrations", "fewer than two concepts", "give samples of at least two")
+        if (embedding_N_d == embedding_N_d[0]).all():
+            raise InputError("array 'embedding'", "is the same for all training registrations", "train the encoder")
+        self._embedding_scaler = StandardScaler().fit(embedding_N_d)
+        scaled_N_d = self._embedding_scaler.transform(embedding_N_d)
+        probe = LogisticRegression(C=self._inverse_regularisation, max_iter=1000)
+        normals = [probe.fit(scaled_N_d, registrations.concept == concept).coef_[0] for concept in self._known]
+        self.vectors_K_d = np.array([normal / np.linalg.norm(normal) for normal in normals])
+        self._projection_scaler = StandardScaler().fit(scaled_N_d @ self.vectors_K_d.T)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration by its position along the CAVs."""
+        from scipy.special import softmax
+
+        started = perf_counter()
+        scaled_N_d = self._embedding_scaler.transform(attached(registrations, "embedding", None))
+        positions_N_C = np.full((len(registrations), len(CONCEPTS)), -np.inf)
+        columns = [CONCEPTS.index(concept) for concept in self._known]
+        positions_N_C[:, columns] = self._projection_scaler.transform(scaled_N_d @ self.vectors_K_d.T)
+        scores_N_C = softmax(positions_N_C, axis=1)
+        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+
+
+EXPLAINERS = {"concept_vectors": Entry("Concept activation vectors", ConceptVectors, reads="embeddings")}

@@ -1,0 +1,96 @@
+"""What SHAP and sensitivity analysis over remedies share: scaling without labels, and learning with them.
+
+A remedy may lower the uncertainty of every pair a little, so without labels its values are counted from their mean
+over the training split, in its standard deviations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+
+from baselines.attached import attached
+from baselines.concept_classifier import ConceptClassifier, standardised_regression
+from gpca.attribution import Attribution
+from gpca.dataset import Registrations
+from gpca.errors import InputError
+from gpca.perturbation import CONCEPTS
+
+WORTHS = ("uncertainty", "residual")  # of a condition: KL in nats, or log distance from the target to the source
+
+
+class ScaledValues:
+    """The remedy with the largest scaled value names the concept; no labels are used.
+
+    Args:
+        values: worth (S, 8) of the corners of design ``removal`` -> the values (S, 3) of the remedies.
+        conditions: the corners that it needs, and is charged with.
+        worth: one of `WORTHS`; of both, a drop is counted.
+    """
+
+    def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], worth: str) -> None:
+        if worth not in WORTHS:
+            raise InputError("setting 'worth'", f"unknown '{worth}'", f"known are {', '.join(WORTHS)}")
+        self._values, self._conditions, self._worth = values, conditions, worth
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn mean and standard deviation of each value."""
+        values_N_3 = self._values(-corners(registrations, self._worth))
+        self._mean_3, self._deviation_3 = values_N_3.mean(axis=0), np.maximum(values_N_3.std(axis=0), 1e-9)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration by its scaled values."""
+        started = perf_counter()
+        values_N_3 = self._values(-corners(registrations, self._worth))
+        scores_N_3 = (values_N_3 - self._mean_3) / self._deviation_3
+        return charged(registrations, scores_N_3, self._conditions, started)
+
+
+class LearnedValues:
+    """Logistic regression on the values of the remedies by both worths, with the same labels as GP-CA."""
+
+    def __init__(
+        self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], inverse_regularisation: float
+    ) -> None:
+        self._values, self._conditions = values, conditions
+        self._classifier = ConceptClassifier(standardised_regression(inverse_regularisation))
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit to the labelled registrations."""
+        self._classifier.fit(self._features(registrations), registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration by the classifier's probabilities."""
+        started = perf_counter()
+        scores_N_3 = self._classifier.scores(self._features(registrations))
+        return charged(registrations, scores_N_3, self._conditions, started)
+
+    def _features(self, registrations: Registrations) -> np.ndarray:
+        return np.hstack([self._values(-corners(registrations, worth)) for worth in WORTHS])
+
+
+def corners(registrations: Registrations, worth: str) -> np.ndarray:
+    """Return that worth of the 8 corners (S, 8): corner b has feature i present where bit i of b is set."""
+    return attached(registrations, worth, None)[:, :8]
+
+
+def charged(registrations: Registrations, scores_N_3: np.ndarray, conditions: list[int], started: float) -> Attribution:
+    """Make an attribution that cost these conditions and the time since `started`.
+
+    Where all three scores are equal, nothing sets a concept apart, and none is named.
+    """
+    own_seconds = (perf_counter() - started) / len(registrations)
+    cost = {
+        name: attached(registrations, name, None)[:, conditions].sum(axis=1)
+        for name in ("seconds", "icp_seconds", "icp_calls")
+    }
+    return Attribution.of_scores(
+        CONCEPTS,
+        scores_N_3,
+        seconds=cost["seconds"] + own_seconds,
+        icp_seconds=cost["icp_seconds"],
+        icp_calls=cost["icp_calls"],
+        abstained_N=np.ptp(scores_N_3, axis=1) == 0,
+    )

@@ -1,0 +1,104 @@
+"""Three plain numbers of a registration and an ordinary classifier: the rival that a referee asks for first.
+
+Noise moves the aligned source off the target's surface, so the forward residual (source to target) grows; a missing
+part leaves target points without a partner, so the backward residual (target to source) grows; a poor pose does both,
+and spreads the Monte-Carlo poses of ICP. Like GP-CA it learns from the labels of the training split.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from baselines.attached import attached
+from baselines.concept_classifier import ConceptClassifier, standardised_regression
+from gpca.attribution import Attribution
+from gpca.dataset import Registrations
+from gpca.explainer import Entry
+from gpca.perturbation import CONCEPTS
+from gpca.seeds import seed_of
+
+# In diameters. A residual below it is that of a cloud registered to itself; its logarithm has to stay finite.
+RESIDUAL_FLOOR = 1e-6
+FLOOR = 1e-6  # variance, as that of the uncertainty itself: a thousandth of a radian or of the diameter, squared
+OBSERVED = 0  # the condition of the uncertainty design in which the observed pair is left as it is
+
+
+class Residuals:
+    """A classifier on log forward residual, log backward residual and the log-determinant of the pose covariance.
+
+    Reads ``covariance`` (S, K, 6, 6), ``icp_calls``, ``seconds`` and ``icp_seconds`` (S, K), of which only the
+    observed condition is used and charged.
+
+    Args:
+        classifier: an unfitted scikit-learn classifier.
+        floor: ε, added to the variances so that a pair whose runs all end at one pose has a determinant.
+    """
+
+    def __init__(self, classifier, floor: float) -> None:
+        self._classifier = ConceptClassifier(classifier)
+        self._floor = floor
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit the classifier to the labelled registrations."""
+        self._classifier.fit(features(registrations, self._floor), registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration by the classifier's probabilities."""
+        started = perf_counter()
+        scores_N_C = self._classifier.scores(features(registrations, self._floor))
+        seconds = (perf_counter() - started) / len(registrations)
+        return Attribution.of_scores(
+            CONCEPTS,
+            scores_N_C,
+            seconds=_observed(registrations, "seconds") + seconds,
+            icp_seconds=_observed(registrations, "icp_seconds"),
+            icp_calls=_observed(registrations, "icp_calls"),
+        )
+
+
+def features(registrations: Registrations, floor: float) -> np.ndarray:
+    """Return (N, 3): log forward and log backward residual (of diameters), log-determinant of covariance plus floor.
+
+    Raises:
+        InputError: no covariance is attached, or it holds NaN.
+    """
+    from gpca.uncertainty import log_determinant
+
+    log_determinant_N = log_determinant(attached(registrations, "covariance", None, 6, 6)[:, OBSERVED], floor)
+    pairs = [(registrations.cloud(i), registrations.target(i)) for i in range(len(registrations))]
+    forward_N = [log_residual(source, target) for source, target in pairs]
+    backward_N = [log_residual(target, source) for source, target in pairs]
+    return np.column_stack([forward_N, backward_N, log_determinant_N])
+
+
+def log_residual(from_P_3: np.ndarray, to_Q_3: np.ndarray) -> float:
+    """Return the log of the RMS distance from each point of one cloud to the nearest of the other."""
+    from scipy.spatial import cKDTree
+
+    distances_P, _ = cKDTree(to_Q_3).query(from_P_3)
+    return float(np.log(max(np.sqrt(np.mean(distances_P**2)), RESIDUAL_FLOOR)))
+
+
+def _observed(registrations: Registrations, name: str) -> np.ndarray:
+    return attached(registrations, name, None)[:, OBSERVED]
+
+
+def residuals_logistic(source: str, seed: int, inverse_regularisation: float = 1.0, floor: float = FLOOR) -> Residuals:
+    """Make the rival with logistic regression."""
+    return Residuals(standardised_regression(inverse_regularisation), floor)
+
+
+def residuals_forest(source: str, seed: int, trees: int = 200, floor: float = FLOOR) -> Residuals:
+    """Make the rival with a random forest."""
+    from sklearn.ensemble import RandomForestClassifier
+
+    random_state = seed_of(source, seed, "residuals_forest") % 2**32
+    return Residuals(RandomForestClassifier(n_estimators=trees, random_state=random_state), floor)
+
+
+EXPLAINERS = {
+    "residuals_logistic": Entry("Residuals (logistic regression)", residuals_logistic, reads="uncertainty/removal"),
+    "residuals_forest": Entry("Residuals (random forest)", residuals_forest, reads="uncertainty/removal"),
+}

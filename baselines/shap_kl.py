@@ -1,0 +1,70 @@
+"""SHAP over the registration's uncertainty (Lundberg & Lee 2017; Qin et al. 2024), under four protocols.
+
+The three features are the concepts: noise, pose, overlap. A coalition's worth is the uncertainty with those features
+present, and the concept with the largest Shapley value is named. The protocols differ in what a feature is
+(docs/baselines.md): a knob turned on top of the observed pair (additive, the paper's), the true perturbation of a
+clean pair (oracle), or a remedy applied to the observed pair (removal; supervised: with labels).
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from baselines.remedies import LearnedValues, ScaledValues, charged, corners
+from gpca.attribution import Attribution
+from gpca.dataset import Registrations
+from gpca.explainer import Entry
+
+ALL_CORNERS = list(range(8))
+
+
+def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
+    """Return the Shapley values (N, 3) of N games, given the worth of all 8 coalitions of each.
+
+    With three features ``shap.KernelExplainer`` enumerates the coalitions, so these are the exact values
+    φ_i = Σ_S |S|! (2 − |S|)! / 3! (v(S ∪ i) − v(S)). The N games are one model of N outputs: the coalitions are the
+    same for all, and their regression is solved once.
+    """
+    import shap
+
+    def worth(present_M_3: np.ndarray) -> np.ndarray:
+        return worth_N_8[:, np.rint(present_M_3).astype(int) @ (1, 2, 4)].T
+
+    explainer = shap.KernelExplainer(worth, np.zeros((1, 3)))
+    return np.reshape(explainer.shap_values(np.ones((1, 3)), l1_reg=False, silent=True), (3, -1)).T
+
+
+class KnobSHAP:
+    """SHAP over knobs (designs ``additive`` and ``oracle``): the knob with the largest value names the concept."""
+
+    def __init__(self, source: str, seed: int) -> None:
+        """Take no settings: those of the runs are the design's."""
+
+    def fit(self, registrations: Registrations) -> None:
+        """Nothing is learned."""
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration by the Shapley values of its uncertainty, in nats."""
+        started = perf_counter()
+        return charged(registrations, shapley_values(corners(registrations, "uncertainty")), ALL_CORNERS, started)
+
+
+def shap_removal(source: str, seed: int, worth: str = "uncertainty") -> ScaledValues:
+    """Make the explainer that names the remedy which lowers the worth most."""
+    return ScaledValues(shapley_values, ALL_CORNERS, worth)
+
+
+def shap_supervised(source: str, seed: int, inverse_regularisation: float = 1.0) -> LearnedValues:
+    """Make the explainer that learns from the remedies' Shapley values."""
+    return LearnedValues(shapley_values, ALL_CORNERS, inverse_regularisation)
+
+
+EXPLAINERS = {
+    "shap_additive": Entry("SHAP", KnobSHAP, reads="uncertainty/additive"),
+    "shap_oracle": Entry("SHAP (oracle)", KnobSHAP, reads="uncertainty/oracle", oracle=True),
+    "shap_removal": Entry("SHAP, remedies", shap_removal, reads="uncertainty/removal"),
+    "shap_removal_residual": Entry("SHAP, remedies, residual", shap_removal, reads="uncertainty/removal"),
+    "shap_supervised": Entry("SHAP, remedies, learned", shap_supervised, reads="uncertainty/removal"),
+}

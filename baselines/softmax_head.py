@@ -1,0 +1,32 @@
+"""The encoder's own softmax head, which GP-CA drops: what the Gaussian process adds is measured against it."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+from baselines.attached import attached
+from gpca.attribution import Attribution
+from gpca.dataset import Registrations
+from gpca.explainer import Entry
+from gpca.perturbation import CONCEPTS
+
+
+class SoftmaxHead:
+    """Scores are the softmax of the head's logits, averaged over the draws from a cloud as the embedding is."""
+
+    def __init__(self, source: str, seed: int) -> None:
+        pass
+
+    def fit(self, registrations: Registrations) -> None:
+        """Do nothing: the head was trained with the encoder, on the same training rows."""
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration."""
+        from scipy.special import softmax
+
+        started = perf_counter()
+        scores_N_C = softmax(attached(registrations, "head_logits", len(CONCEPTS)), axis=1)
+        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+
+
+EXPLAINERS = {"softmax_head": Entry("Softmax head", SoftmaxHead, reads="embeddings")}

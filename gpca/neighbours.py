@@ -1,0 +1,253 @@
+"""Nearest neighbours among the points of one target cloud, compiled, for the inner loop of ICP.
+
+Space is cut into voxels. The first point that falls into one has the target points nearest to the voxel's centre
+listed; every later point there, in whichever iteration and from whichever initial pose, finds its neighbour among
+those. A list says how far it is complete; where that does not suffice, the point is searched by itself, so the
+neighbour is always the true one (of two equally near ones, within single precision, either).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+LISTED = 16  # target points per voxel; a full vector register of single-precision numbers
+MOST_LISTS = 1 << 16  # beyond that, points in new voxels are searched by themselves
+
+# Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
+# in these loops takes longer than the search. Functions compiled so cannot make arrays; they are given room to work.
+OPTIONS = {"cache": True, "_nrt": False, "error_model": "numpy", "fastmath": {"contract", "nsz", "nnan", "reassoc"}}
+
+
+class Target(NamedTuple):
+    """Points sorted into cubic cells, and the voxels' lists, which the searches fill.
+
+    Attributes:
+        points: (P, 3) in the order of their cells; a neighbour is a row of it.
+        starts: of each cell's points, and the end of the last.
+        low: (3,) corner of the cells; the voxels begin `distance` before it.
+        cell, cells: edge of a cell, number along each axis.
+        voxel, voxels: the same of the voxels.
+        list_of_voxel: row of its list, -1 before it has one.
+        listed, offsets: (lists, LISTED) points, (lists, 3, LISTED) their positions from the voxel's centre.
+        reach: every point that is not in the list is at least so far from the centre.
+        used: (1,) number of lists.
+        distance: farther points are no neighbours; unit of the points.
+    """
+
+    points: np.ndarray
+    starts: np.ndarray
+    low: np.ndarray
+    cell: float
+    cells: np.ndarray
+    voxel: float
+    voxels: np.ndarray
+    list_of_voxel: np.ndarray
+    listed: np.ndarray
+    offsets: np.ndarray
+    reach: np.ndarray
+    used: np.ndarray
+    distance: float
+
+
+def make_target(points: np.ndarray, distance: float) -> Target:
+    """Sort points (P, 3) for searches within `distance`, in the unit of the points."""
+    low, high = points.min(axis=0).astype(np.float64), points.max(axis=0)
+    extent = max(float((high - low).max()), 1e-9)
+    # The points lie on a surface: their number grows with the square of the extent, not with its cube.
+    spacing = extent / np.sqrt(len(points))
+    cell = 1.5 * spacing
+    cells = np.floor((high - low) / cell).astype(np.int64) + 1
+    cell_P = np.ravel_multi_index(tuple(np.floor((points - low) / cell).astype(np.int64).T), tuple(cells))
+    order = np.argsort(cell_P, kind="stable")
+    voxel = max(1.5 * spacing, (extent + 2 * distance) / 128)
+    voxels = np.floor((high - low + 2 * distance) / voxel).astype(np.int64) + 1
+    lists = min(MOST_LISTS, int(np.prod(voxels)))
+    return Target(
+        points=np.ascontiguousarray(points[order], np.float64),
+        starts=np.searchsorted(cell_P[order], np.arange(np.prod(cells) + 1)),
+        low=low,
+        cell=cell,
+        cells=cells,
+        voxel=voxel,
+        voxels=voxels,
+        list_of_voxel=np.full(int(np.prod(voxels)), -1, np.int32),
+        listed=np.empty((lists, LISTED), np.int32),
+        offsets=np.empty((lists, 3, LISTED), np.float32),
+        reach=np.empty(lists),
+        used=np.zeros(1, np.int64),
+        distance=float(distance),
+    )
+
+
+@njit(forceinline=True, **OPTIONS)
+def nearest(
+    x,
+    y,
+    z,
+    room,
+    points,
+    starts,
+    low,
+    cell,
+    cells,
+    voxel,
+    voxels,
+    list_of_voxel,
+    listed,
+    offsets,
+    reach,
+    used,
+    distance,
+):
+    """Return the row of the target's point nearest to (x, y, z), -1 where none is within the distance, and a radius.
+
+    Nowhere within that radius around (x, y, z) is another point nearer, or, after -1, any point within the distance.
+    `room` (LISTED,) float64 is space to work in; the rest are the fields of :class:`Target`.
+    """
+    per = 1.0 / voxel
+    i_voxel = (x - low[0] + distance) * per
+    j_voxel = (y - low[1] + distance) * per
+    k_voxel = (z - low[2] + distance) * per
+    if (
+        not (i_voxel >= 0 and j_voxel >= 0 and k_voxel >= 0)
+        or i_voxel >= voxels[0]
+        or j_voxel >= voxels[1]
+        or k_voxel >= voxels[2]
+    ):
+        return -1, 0.0
+    i, j, k = int(i_voxel), int(j_voxel), int(k_voxel)
+    centre_x = low[0] - distance + (i + 0.5) * voxel
+    centre_y = low[1] - distance + (j + 0.5) * voxel
+    centre_z = low[2] - distance + (k + 0.5) * voxel
+    flat = (i * voxels[1] + j) * voxels[2] + k
+    row = list_of_voxel[flat]
+    if row < 0 and used[0] < len(listed):
+        row = used[0]
+        used[0] += 1
+        list_of_voxel[flat] = row
+        reach[row] = _list_nearest(
+            points,
+            starts,
+            low,
+            cell,
+            cells,
+            distance + voxel,
+            centre_x,
+            centre_y,
+            centre_z,
+            listed[row],
+            offsets[row],
+            room,
+        )
+    if row >= 0:
+        dx, dy, dz = np.float32(x - centre_x), np.float32(y - centre_y), np.float32(z - centre_z)
+        chosen, first_square, second_square = _two_closest(offsets, row, dx, dy, dz)
+        complete = reach[row] - np.sqrt(dx * dx + dy * dy + dz * dz)
+        # What is not listed may be the second nearest; the squares are of single precision.
+        first, second = np.sqrt(first_square), min(np.sqrt(second_square), complete)
+        if first < distance and first <= complete:
+            return listed[row, chosen], max(0.0, 0.5 * (second - first) - 1e-5 * distance)
+        if min(first, complete) >= distance:
+            return -1, max(0.0, min(first, complete) - distance - 1e-5 * distance)
+    return _search(points, starts, low, cell, cells, distance, x, y, z), 0.0
+
+
+@njit(forceinline=True, **OPTIONS)
+def _two_closest(offsets, row, dx, dy, dz):
+    # Without a branch: which point is the nearest cannot be foreseen, and a wrong guess costs more than the rest.
+    first, second, chosen = np.float32(np.inf), np.float32(np.inf), 0
+    for slot in range(LISTED):
+        a, b, c = offsets[row, 0, slot] - dx, offsets[row, 1, slot] - dy, offsets[row, 2, slot] - dz
+        square = a * a + b * b + c * c
+        second = min(second, max(first, square))
+        chosen = slot if square < first else chosen
+        first = min(first, square)
+    return chosen, first, second
+
+
+@njit(**OPTIONS)
+def _list_nearest(points, starts, low, cell, cells, radius, x, y, z, listed, offsets, squares):
+    """List the points nearest to a voxel's centre; return how far the list is complete."""
+    window = 1
+    while True:
+        squares[:] = radius * radius
+        listed[:] = -1
+        i_low, i_high = _cells_around(x, low[0], cell, cells[0], window)
+        j_low, j_high = _cells_around(y, low[1], cell, cells[1], window)
+        k_low, k_high = _cells_around(z, low[2], cell, cells[2], window)
+        for i in range(i_low, i_high):
+            for j in range(j_low, j_high):
+                first, last = _points_of(starts, cells, i, j, k_low, k_high)
+                for p in range(first, last):
+                    square = _square(points, p, x, y, z)
+                    if square < squares[LISTED - 1]:
+                        slot = LISTED - 1
+                        while slot > 0 and squares[slot - 1] > square:
+                            squares[slot] = squares[slot - 1]
+                            listed[slot] = listed[slot - 1]
+                            slot -= 1
+                        squares[slot] = square
+                        listed[slot] = p
+        reached = _reached(low, cell, x, y, z, window)
+        if reached * reached >= squares[LISTED - 1]:
+            break
+        window += 1
+    for slot in range(LISTED):
+        p = listed[slot]
+        offsets[0, slot] = points[p, 0] - x if p >= 0 else np.inf
+        offsets[1, slot] = points[p, 1] - y if p >= 0 else np.inf
+        offsets[2, slot] = points[p, 2] - z if p >= 0 else np.inf
+    return np.sqrt(squares[LISTED - 1])
+
+
+@njit(**OPTIONS)
+def _search(points, starts, low, cell, cells, radius, x, y, z):
+    """Search the cells around a point, in a growing window."""
+    window = 1
+    while True:
+        best, index = radius * radius, -1
+        i_low, i_high = _cells_around(x, low[0], cell, cells[0], window)
+        j_low, j_high = _cells_around(y, low[1], cell, cells[1], window)
+        k_low, k_high = _cells_around(z, low[2], cell, cells[2], window)
+        for i in range(i_low, i_high):
+            for j in range(j_low, j_high):
+                first, last = _points_of(starts, cells, i, j, k_low, k_high)
+                for p in range(first, last):
+                    square = _square(points, p, x, y, z)
+                    if square < best:
+                        best, index = square, p
+        reached = _reached(low, cell, x, y, z, window)
+        if reached * reached >= best:
+            return index
+        window += 1
+
+
+@njit(forceinline=True, **OPTIONS)
+def _square(points, p, x, y, z):
+    return (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2
+
+
+@njit(**OPTIONS)
+def _cells_around(x, low, cell, cells, window):
+    i = int(np.floor((x - low) / cell))
+    return max(0, i - window), min(cells, i + window + 1)
+
+
+@njit(forceinline=True, **OPTIONS)
+def _points_of(starts, cells, i, j, k_low, k_high):
+    """Cells along the last axis follow each other, so their points are one piece."""
+    if k_low >= k_high:
+        return 0, 0
+    row = (i * cells[1] + j) * cells[2]
+    return starts[row + k_low], starts[row + k_high]
+
+
+@njit(**OPTIONS)
+def _reached(low, cell, x, y, z, window):
+    """Everything outside the window is at least so far away: its cells, and the way to the own cell's nearest wall."""
+    a, b, c = (x - low[0]) % cell, (y - low[1]) % cell, (z - low[2]) % cell
+    wall = min(min(min(a, cell - a), min(b, cell - b)), min(c, cell - c))
+    return window * cell + wall

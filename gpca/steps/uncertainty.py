@@ -1,0 +1,45 @@
+"""Step ``uncertainty``: registrations -> ``uncertainty/{source}/{design}/seed{seed}.npz``, by Monte-Carlo ICP."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.dataset import Registrations
+from gpca.designs import DESIGNS
+from gpca.evaluation import design_rows, evaluate_design
+from gpca.outcomes import write_seconds
+from gpca.provenance import recorded
+from gpca.registration import ICPSettings
+from gpca.settings import check_settings
+from gpca.steps import per_seed
+from gpca.uncertainty import UncertaintySettings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names, one of each per seed; ``--settings`` are those of the design and of ICP."""
+    parser.add_argument("--design", required=True, choices=sorted(DESIGNS))
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+")
+    parser.add_argument("--out", required=True, type=Path, nargs="+")
+    parser.add_argument("--tables", required=True, type=Path, nargs="+", help="CSV of the uncertainties, to be read")
+    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSV of the seconds of every condition")
+
+
+def run(options: Namespace) -> None:
+    """Run the design's conditions for the registrations that it covers, seed by seed."""
+    given = dict(options.settings)
+    icp = given.pop("icp", {})
+    check_settings(given, "uncertainty", "*")
+    check_settings(icp, "registrations", "icp")
+    samples = given.pop("samples", None)
+    settings = UncertaintySettings(**given, icp=ICPSettings(**icp))
+    for seed, registrations_path, out, table, timings in per_seed(options, "registrations", "out", "tables", "timings"):
+        with recorded([out, table, timings], [registrations_path], options.settings, seed=seed):
+            registrations = Registrations.load(registrations_path)
+            chosen = registrations.subset(design_rows(registrations, options.design, samples))
+            outcomes, *seconds = evaluate_design(options.design, chosen, options.source, seed, settings)
+            outcomes.save(out)
+            outcomes.write_table(table, DESIGNS[options.design].conditions)
+            write_seconds(timings, outcomes, *seconds)

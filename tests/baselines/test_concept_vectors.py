@@ -1,0 +1,80 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from baselines.concept_vectors import ConceptVectors
+from gpca.errors import InputError
+from gpca.explainer import explainer_entry
+from gpca.perturbation import CONCEPTS
+
+
+@pytest.fixture(scope="module")
+def embedded(registrations):
+    """Registrations whose embedding tells the concept, on axes of very different scale."""
+    random = np.random.default_rng(0)
+    concept_S = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
+    h = 2 * random.normal(size=(3, 6))[concept_S] + random.normal(size=(len(concept_S), 6))
+    return replace(registrations, attached={"embedding": h * 10.0 ** np.arange(-2, 4)})
+
+
+def fitted(registrations, **settings):
+    explainer = explainer_entry("concept_vectors").make("tiny", 0, **settings)
+    explainer.fit(registrations.subset(registrations.rows("train")))
+    return explainer
+
+
+def test_the_vectors_and_the_order_of_the_scores_equal_an_independent_computation(embedded):
+    explainer = fitted(embedded, inverse_regularisation=0.5)
+    train, test = (embedded.subset(embedded.rows(split)) for split in ("train", "test"))
+    mean, deviation = train.embedding.mean(axis=0), train.embedding.std(axis=0)
+    scaled = (train.embedding - mean) / deviation
+    positions = []
+    for concept, vector in zip(CONCEPTS, explainer.vectors_K_d, strict=True):
+        sign = np.where(train.concept == concept, 1, -1)
+
+        def loss(w_b, sign=sign):
+            return 0.5 * w_b[:-1] @ w_b[:-1] + 0.5 * np.logaddexp(0, -sign * (scaled @ w_b[:-1] + w_b[-1])).sum()
+
+        normal = minimize(loss, np.zeros(7), tol=1e-10).x[:-1]
+        normal /= np.linalg.norm(normal)
+        assert vector == pytest.approx(normal, abs=2e-3)
+        projections = scaled @ normal
+        positions.append(((test.embedding - mean) / deviation @ normal - projections.mean()) / projections.std())
+    log_scores = np.log(explainer.explain(test).scores_N_C)
+    positions = np.column_stack(positions)
+    assert log_scores - log_scores[:, :1] == pytest.approx(positions - positions[:, :1], abs=0.02)
+
+
+def test_it_names_the_concept_and_needs_no_label_and_no_other_sample(embedded):
+    explainer = fitted(embedded)
+    attribution = explainer.explain(embedded.without_labels())
+    assert np.mean(attribution.predicted_N == embedded.concept) > 0.9
+    rows = np.array([7, 50, 3])
+    assert explainer.explain(embedded.subset(rows)).scores_N_C == pytest.approx(attribution.scores_N_C[rows], abs=1e-12)
+
+
+@pytest.mark.parametrize("absent", CONCEPTS)
+def test_a_concept_absent_from_training_scores_0(embedded, absent):
+    explainer = fitted(embedded.subset(np.flatnonzero(embedded.concept != absent)))
+    attribution = explainer.explain(embedded)
+    seen = embedded.concept != absent
+    assert (attribution.scores_N_C[:, CONCEPTS.index(absent)] == 0).all()
+    assert np.mean(attribution.predicted_N[seen] == embedded.concept[seen]) > 0.9
+
+
+def test_an_embedding_that_tells_nothing_is_refused(embedded):
+    train = embedded.subset(embedded.rows("train"))
+    for h, fault in (
+        (np.full((36, 4), np.nan), "holds NaN"),
+        (np.zeros((36, 0)), "has shape"),
+        (np.ones((36, 4)), "is the same for all training registrations"),
+    ):
+        with pytest.raises(InputError, match=f"array 'embedding': {fault}"):
+            ConceptVectors("tiny", 0).fit(replace(train, attached={"embedding": h}))
+
+
+def test_one_concept_alone_is_refused(embedded):
+    with pytest.raises(InputError, match="fewer than two concepts"):
+        ConceptVectors("tiny", 0).fit(embedded.subset(np.flatnonzero(embedded.concept == "noise")))

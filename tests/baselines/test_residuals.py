@@ -1,0 +1,109 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from baselines.residuals import FLOOR, RESIDUAL_FLOOR, features, log_residual
+from gpca.dataset import ragged
+from gpca.errors import InputError
+from gpca.explainer import explainer_entry
+from gpca.perturbation import CONCEPTS
+from gpca.settings import check_settings
+
+RIVALS = ("residuals_logistic", "residuals_forest")
+
+
+@pytest.fixture(scope="module")
+def attached(registrations):
+    """With a covariance of two conditions, the first of which is wide for a poor pose."""
+    n = len(registrations)
+    random = np.random.default_rng(0)
+    width_S_2 = 1e-4 * random.uniform(0.5, 2, size=(n, 2))
+    width_S_2[registrations.concept == "pose", 0] *= 30
+    numbers = random.uniform(size=(4, n, 2))
+    arrays = dict(zip(("residual", "seconds", "icp_seconds", "icp_calls"), numbers, strict=True))
+    arrays["icp_calls"] = np.column_stack([np.arange(n) + 50, np.full(n, 7)])
+    return replace(registrations, attached=arrays | {"covariance": width_S_2[..., None, None] * np.eye(6)})
+
+
+def fitted(name, registrations):
+    explainer = explainer_entry(name).make("tiny", 0)
+    explainer.fit(registrations.subset(registrations.rows("train")))
+    return explainer
+
+
+def with_clouds(registrations, clouds, targets):
+    covariance = {"covariance": np.tile(1e-4 * np.eye(6), (len(clouds), 1, 1, 1))}
+    return replace(registrations.subset(np.arange(len(clouds))), **ragged(clouds, targets), attached=covariance)
+
+
+def test_a_residual_is_the_log_of_the_rms_distance_to_the_nearest_point():
+    line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    off = np.array([[0.0, 0.3, 0], [2, 0, 0.4]])
+    assert log_residual(off, line) == pytest.approx(np.log(np.sqrt((0.3**2 + 0.4**2) / 2)))
+    assert log_residual(line, off) == pytest.approx(np.log(np.sqrt((0.3**2 + 1 + 0.3**2 + 0.4**2) / 3)))
+    assert log_residual(line, line) == np.log(RESIDUAL_FLOOR)
+
+
+def test_noise_is_seen_forwards_and_a_missing_part_backwards(registrations):
+    random = np.random.default_rng(0)
+    target = random.uniform(size=(600, 3)) * [1, 1, 0]
+    same = random.uniform(size=(600, 3)) * [1, 1, 0]
+    clouds = [same, same + 0.2 * random.normal(size=(600, 3)), same[same[:, 0] < 0.5]]
+    (clean, noisy, cropped) = features(with_clouds(registrations, clouds, [target] * 3), FLOOR)
+    assert noisy[0] > clean[0] + 1
+    assert cropped[1] > clean[1] + 1
+    assert abs(cropped[0] - clean[0]) < 0.3
+
+
+def test_the_third_feature_is_the_log_determinant_of_the_observed_condition_above_the_floor(attached):
+    expected = 6 * np.log(attached.attached["covariance"][:, 0, 0, 0] + 1e-5)
+    assert features(attached, 1e-5)[:, 2] == pytest.approx(expected)
+
+
+def test_a_pair_whose_runs_all_end_at_one_pose_has_a_finite_feature(attached):
+    same = np.zeros_like(attached.attached["covariance"])
+    assert features(replace(attached, attached={"covariance": same}), FLOOR)[:, 2] == pytest.approx(6 * np.log(FLOOR))
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_they_name_the_concept_and_need_no_label_and_no_other_sample(name, attached):
+    assert explainer_entry(name).reads == "uncertainty/removal"
+    explainer = fitted(name, attached)
+    attribution = explainer.explain(attached.without_labels())
+    test = attached.rows("test")
+    assert np.mean(attribution.predicted_N[test] == attached.concept[test]) > 0.8
+    rows = np.array([7, 50, 3])
+    assert explainer.explain(attached.subset(rows)).scores_N_C == pytest.approx(attribution.scores_N_C[rows], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_the_observed_condition_is_charged(name, attached):
+    attribution = fitted(name, attached).explain(attached)
+    assert np.array_equal(attribution.icp_calls_N, attached.attached["icp_calls"][:, 0])
+    assert np.array_equal(attribution.icp_seconds_N, attached.attached["icp_seconds"][:, 0])
+    assert (attribution.seconds_N > attached.attached["seconds"][:, 0]).all()
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_a_seed_repeats_every_byte_and_a_concept_absent_from_training_scores_0(name, attached):
+    seen = attached.subset(np.flatnonzero(attached.concept != "noise"))
+    first, again = (fitted(name, seen).explain(attached).scores_N_C for _ in range(2))
+    assert np.array_equal(first, again)
+    assert (first[:, CONCEPTS.index("noise")] == 0).all()
+    assert first.sum(axis=1) == pytest.approx(1)
+
+
+def test_a_covariance_of_nan_or_none_at_all_is_refused(attached):
+    nan = np.full_like(attached.attached["covariance"], np.nan)
+    with pytest.raises(InputError, match="array 'covariance': holds NaN"):
+        features(replace(attached, attached={"covariance": nan}), FLOOR)
+    with pytest.raises(InputError, match="array 'covariance': is not attached"):
+        features(replace(attached, attached={}), FLOOR)
+
+
+def test_the_config_may_set_what_they_take():
+    check_settings({"inverse_regularisation": 0.1, "floor": 1e-5}, "explainers", "residuals_logistic")
+    check_settings({"trees": 20, "floor": 1e-5}, "explainers", "residuals_forest")
+    with pytest.raises(InputError, match="setting floor"):
+        check_settings({"floor": 0}, "explainers", "residuals_forest")
