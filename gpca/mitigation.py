@@ -6,6 +6,7 @@ points to the cause. Nothing here is told what was perturbed.
 
 from __future__ import annotations
 
+from functools import cached_property
 from time import perf_counter
 from typing import NamedTuple
 
@@ -54,24 +55,37 @@ class RemedyRuns:
         self._xi_n_6 = xi_n_6
         self._settings = settings
         self._T_init, self._T_icp = T_target_source_init, T_target_source_icp
-        source = source[random.permutation(len(source))]
-        self._started = perf_counter()
-        trimmed = trim(target, transform(T_target_source_icp, source), settings.icp.correspondence_distance)
-        # Switched off and on: the points, and what is searched among them.
-        self._sources, self._targets = (source, denoise(source)), (target, trimmed)
-        self._trees = [cKDTree(points) for points in self._sources]
-        self._icp = [BatchedICP(points[: settings.points], settings.icp) for points in self._targets]
+        self._source, self._target = source[random.permutation(len(source))], target
 
     def __call__(self, remedies: Remedies) -> Outcome:
-        """Evaluate one combination; the first one is charged with what all share."""
-        started, self._started = min(self._started, perf_counter()), np.inf
-        source = self._sources[remedies.denoise][: self._settings.points]
+        """Evaluate one combination; what several share is worked out, and charged, once."""
+        started = perf_counter()
+        tree, points = self._denoised if remedies.denoise else self._observed
+        icp, target = self._trimmed if remedies.trim else self._whole
         xi_n_6 = BROADER * self._xi_n_6 if remedies.restart else self._xi_n_6
-        runs = run_from_starts(self._icp[remedies.trim], source, self._T_init, xi_n_6)
+        runs = run_from_starts(icp, points[: self._settings.points], self._T_init, xi_n_6)
         if remedies.restart:
             runs = best_of_neighbours(runs, self._settings.icp.correspondence_distance)
-        tree, target = self._trees[remedies.denoise], self._targets[remedies.trim]
         return outcome(runs, tree, target, self._T_icp, self._settings, started)
+
+    @cached_property
+    def _observed(self) -> tuple[cKDTree, np.ndarray]:
+        return cKDTree(self._source), self._source
+
+    @cached_property
+    def _denoised(self) -> tuple[cKDTree, np.ndarray]:
+        points = denoise(self._source)
+        return cKDTree(points), points
+
+    @cached_property
+    def _whole(self) -> tuple[BatchedICP, np.ndarray]:
+        return BatchedICP(self._target[: self._settings.points], self._settings.icp), self._target
+
+    @cached_property
+    def _trimmed(self) -> tuple[BatchedICP, np.ndarray]:
+        aligned = transform(self._T_icp, self._source)
+        points = trim(self._target, aligned, self._settings.icp.correspondence_distance)
+        return BatchedICP(points[: self._settings.points], self._settings.icp), points
 
 
 def denoise(points: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 Space is cut into voxels. The first point that falls into one has the target points nearest to the voxel's centre
 listed; every later point there, in whichever iteration and from whichever initial pose, finds its neighbour among
 those. A list says how far it is complete; where that does not suffice, the point is searched by itself, so the
-neighbour is always the true one (of two equally near ones, within single precision, either).
+neighbour is always the true one.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-LISTED = 16  # target points per voxel; a full vector register of single-precision numbers
+LISTED = 16  # target points per voxel
 MOST_LISTS = 1 << 16  # beyond that, points in new voxels are searched by themselves
 
 # Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
@@ -75,7 +75,7 @@ def make_target(points: np.ndarray, distance: float) -> Target:
         voxels=voxels,
         list_of_voxel=np.full(int(np.prod(voxels)), -1, np.int32),
         listed=np.empty((lists, LISTED), np.int32),
-        offsets=np.empty((lists, 3, LISTED), np.float32),
+        offsets=np.empty((lists, 3, LISTED)),
         reach=np.empty(lists),
         used=np.zeros(1, np.int64),
         distance=float(distance),
@@ -143,22 +143,22 @@ def nearest(
             room,
         )
     if row >= 0:
-        dx, dy, dz = np.float32(x - centre_x), np.float32(y - centre_y), np.float32(z - centre_z)
+        dx, dy, dz = x - centre_x, y - centre_y, z - centre_z
         chosen, first_square, second_square = _two_closest(offsets, row, dx, dy, dz)
         complete = reach[row] - np.sqrt(dx * dx + dy * dy + dz * dz)
-        # What is not listed may be the second nearest; the squares are of single precision.
+        # What is not listed may be the second nearest. The radius leaves room for rounding.
         first, second = np.sqrt(first_square), min(np.sqrt(second_square), complete)
         if first < distance and first <= complete:
-            return listed[row, chosen], max(0.0, 0.5 * (second - first) - 1e-5 * distance)
+            return listed[row, chosen], max(0.0, 0.5 * (second - first) - 1e-9 * distance)
         if min(first, complete) >= distance:
-            return -1, max(0.0, min(first, complete) - distance - 1e-5 * distance)
+            return -1, max(0.0, min(first, complete) - distance - 1e-9 * distance)
     return _search(points, starts, low, cell, cells, distance, x, y, z), 0.0
 
 
 @njit(forceinline=True, **OPTIONS)
 def _two_closest(offsets, row, dx, dy, dz):
     # Without a branch: which point is the nearest cannot be foreseen, and a wrong guess costs more than the rest.
-    first, second, chosen = np.float32(np.inf), np.float32(np.inf), 0
+    first, second, chosen = np.inf, np.inf, 0
     for slot in range(LISTED):
         a, b, c = offsets[row, 0, slot] - dx, offsets[row, 1, slot] - dy, offsets[row, 2, slot] - dz
         square = a * a + b * b + c * c
