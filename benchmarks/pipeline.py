@@ -31,7 +31,17 @@ sys.path.insert(0, str(ROOT))
 from gpca.errors import InputError  # noqa: E402 (the script runs from a plain checkout)
 
 RUN = "benchmark"
-STAGES = ("objects", "registrations", "encoders", "embeddings", "predictions", "collect", "tables", "figures")
+STAGES = (
+    "objects",
+    "registrations",
+    "encoders",
+    "embeddings",
+    "uncertainty",
+    "predictions",
+    "collect",
+    "tables",
+    "figures",
+)
 SIDECAR = ".provenance.json"
 
 

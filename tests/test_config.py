@@ -4,6 +4,7 @@ import pytest
 import yaml
 
 from gpca import config as run_config
+from gpca.designs import DESIGNS
 from gpca.errors import InputError
 from gpca.settings import SCHEMA, check_settings
 
@@ -187,3 +188,18 @@ def test_jobs_inherit_the_hash_of_the_config_and_this_python(monkeypatch):
         hashes.append(os.environ["GPCA_CONFIG_SHA256"])
     assert hashes[0] == hashes[1] != hashes[2]
     assert os.path.dirname(shutil.which("python")) == os.path.dirname(sys.executable)
+
+
+def test_the_schema_knows_every_design_and_no_other():
+    schema = yaml.safe_load(SCHEMA.read_text())
+    assert set(schema["properties"]["uncertainty"]["propertyNames"]["enum"]) == set(DESIGNS)
+
+
+def test_an_explainer_whose_design_is_not_configured_stops_at_load():
+    with pytest.raises(
+        InputError, match=r"config key explainers\.shap_oracle: no uncertainty 'oracle'; known are addit"
+    ):
+        run_config.check(changed("uncertainty.oracle", MISSING))
+    without = changed("uncertainty.oracle", MISSING)
+    del without["explainers"]["shap_oracle"]
+    run_config.check(without)

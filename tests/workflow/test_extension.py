@@ -8,8 +8,9 @@ import pytest
 from gpca.objects.canonical import ObjectClouds
 
 SMOKE = ("--configfile", "config/smoke.yaml")
-ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "explain": 2, "objects_figure": 1}
-COLLECTORS = {"metrics": 1, "timings": 1, "table": 2}
+ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19}
+ROW |= {"objects_figure": 1}
+COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
 
 
 @pytest.fixture
@@ -102,16 +103,16 @@ EXPLAINERS = {"fitness_only": Entry("Fitness only", FitnessOnly)}
 """
 
 
-def test_an_explainer_dropped_into_baselines_becomes_a_column(finished):
+def test_an_explainer_dropped_into_baselines_becomes_a_row(finished):
     (finished.folder / "baselines/fitness_only.py").write_text(EXPLAINER)
     assert not finished.dry_run("all", *SMOKE).jobs
     finished.append("config/smoke.yaml", "  fitness_only: {sharpness: 50.0}\n")
     planned = finished.dry_run("all", *SMOKE)
-    assert planned.jobs == {"explain": 3, "metrics": 1, "timings": 1, "table": 2}
+    assert planned.jobs == COLLECTORS | {"explain": 3, "table": 1}
 
-    finished.snakemake("-j2", "results/smoke/tables/table1_single_baselines.md", *SMOKE)
-    head = (finished.folder / "results/smoke/tables/table1_single_baselines.md").read_text().split("| :--")[0]
-    assert head.rstrip().endswith("| Fitness only |")
+    finished.snakemake("-j2", "results/smoke/tables/table1_extended.md", *SMOKE)
+    table = (finished.folder / "results/smoke/tables/table1_extended.md").read_text()
+    assert table.count("| Fitness only |") == 3
     with (finished.folder / "results/smoke/predictions/ycb/fitness_only/seed0.csv").open() as file:
         predictions = list(csv.DictReader(file))
     assert {row["concept_predicted"] for row in predictions} <= {"noise", "pose", "overlap"}

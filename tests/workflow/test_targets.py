@@ -3,7 +3,9 @@ import json
 import pytest
 
 SMOKE = ("all", "--configfile", "config/smoke.yaml")
-ALL_EXPLAINERS, COLLECTORS = {"explain": 6}, {"metrics": 1, "timings": 1, "table": 2}
+COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
+# Explainers times three sources: those with a GPC, those on embeddings, those on uncertainties, all.
+WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 3 * explainers} for explainers in (4, 4, 13))
 
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
@@ -19,8 +21,9 @@ def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project)
     }  # fmt: skip
     assert not [path for path in planned.outputs if "lazy" in path or "figures" in path]
     table1 = project.dry_run("results/smoke/tables/table1_single_baselines.md", *smoke)
-    assert table1.jobs["explain"] == 9
-    assert "results/smoke/predictions/ycb/lazy/seed1.csv" in table1.outputs
+    assert table1.jobs["explain"] == 12
+    assert table1.jobs["uncertainty"] == 3
+    assert not [path for path in table1.outputs if "lazy" in path or "removal" in path or "figures" in path]
 
 
 def test_a_finished_run_has_nothing_to_do(finished):
@@ -29,14 +32,17 @@ def test_a_finished_run_has_nothing_to_do(finished):
 
 
 EDITS = {
-    "gpca/gpc.py": ALL_EXPLAINERS | COLLECTORS,
+    "gpca/gpc.py": WITH_GPC | COLLECTORS,
+    "gpca/neighbours.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS,
+    "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
     "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1},
-    "gpca/reporting/tables.py": {"table": 2},
-    "gpca/encoders/dgcnn.py": {"encoder": 6, "embeddings": 6} | ALL_EXPLAINERS | COLLECTORS,
+    "gpca/reporting/tables.py": {"table": 3},
+    "gpca/reporting/confusions_figure.py": {"fig_attribution_confusions": 1},
+    "gpca/encoders/dgcnn.py": {"encoder": 6, "embeddings": 6} | ON_EMBEDDINGS | COLLECTORS,
     "gpca/objects/bop.py": {},
     "gpca/objects/shapes/cups.py": {
-        "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "explain": 2,
+        "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
         "objects_figure": 1, "fig3_concepts": 1,
     } | COLLECTORS,
 }  # fmt: skip
