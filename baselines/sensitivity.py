@@ -9,14 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from time import perf_counter
 
 import numpy as np
 
-from baselines.attached import attached
-from baselines.remedies import LearnedValues, ScaledValues, charged
-from gpca.attribution import Attribution
-from gpca.dataset import Registrations
+from baselines.values import KnobValues, LearnedValues, ScaledValues
 from gpca.explainer import Entry
 
 ONE_AT_A_TIME = [0, 1, 2, 4]  # the corners with none or one of the three features present
@@ -33,17 +29,21 @@ def local_derivatives(uncertainty_N_K: np.ndarray) -> np.ndarray:
 def partial_rank_correlations(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray:
     """Return the PRCC (N, 3) of each input with each of N outputs over K settings (Marino et al. 2008, Sec. 2.3).
 
-    The partial correlations are -P_iy / √(P_ii P_yy), P the inverse of the correlation matrix of the ranks. Where an
-    output is constant they are zero.
+    The correlation of what a regression on the ranks of the other inputs leaves of the ranks of the input and of the
+    output; zero where it leaves nothing of the output's, as of a constant.
     """
     from scipy.stats import rankdata
 
     values_N_3 = np.zeros((len(outputs_N_K), inputs_K_3.shape[1]))
-    ranks_K_3 = rankdata(inputs_K_3, axis=0)
-    for values_3, output_K in zip(values_N_3, outputs_N_K, strict=True):
-        if np.ptp(output_K) > 0:
-            precision = np.linalg.pinv(np.corrcoef(ranks_K_3, rankdata(output_K), rowvar=False))
-            values_3[:] = -precision[:-1, -1] / np.sqrt(np.diag(precision)[:-1] * precision[-1, -1])
+    ranks_K_3, ranks_N_K = rankdata(inputs_K_3, axis=0), rankdata(outputs_N_K, axis=1)
+    for i, rank_K in enumerate(ranks_K_3.T):
+        others = np.column_stack([np.ones(len(rank_K)), np.delete(ranks_K_3, i, axis=1)])
+        basis, _ = np.linalg.qr(others)
+        input_K = rank_K - basis @ (basis.T @ rank_K)
+        outputs_left_N_K = ranks_N_K - ranks_N_K @ basis @ basis.T
+        lengths_N = np.linalg.norm(outputs_left_N_K, axis=1)
+        told_N = lengths_N > 1e-9 * np.linalg.norm(ranks_N_K, axis=1)  # the rest is rounding
+        values_N_3[told_N, i] = outputs_left_N_K[told_N] @ input_K / (lengths_N[told_N] * np.linalg.norm(input_K))
     return values_N_3
 
 
@@ -64,41 +64,19 @@ def total_indices(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray
     return values_N_3
 
 
-class KnobSensitivity:
-    """Sensitivities to the knobs of one design: the knob with the largest names the concept.
-
-    Args:
-        sensitivities: uncertainty (N, K) under the design's conditions -> sensitivities (N, 3).
-        conditions: those that it needs, and is charged with; None for all.
-    """
-
-    def __init__(self, sensitivities: Callable[[np.ndarray], np.ndarray], conditions: list[int] | None = None) -> None:
-        self._sensitivities, self._conditions = sensitivities, conditions
-
-    def fit(self, registrations: Registrations) -> None:
-        """Nothing is learned."""
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration by the sensitivities of its uncertainty."""
-        started = perf_counter()
-        uncertainty_N_K = attached(registrations, "uncertainty", None)
-        conditions = self._conditions or list(range(uncertainty_N_K.shape[1]))
-        return charged(registrations, self._sensitivities(uncertainty_N_K), conditions, started)
-
-
-def sa_local_additive(source: str, seed: int) -> KnobSensitivity:
+def sa_local_additive(source: str, seed: int) -> KnobValues:
     """Make the paper's: local derivatives at the observed pair."""
-    return KnobSensitivity(local_derivatives, STEPS)
+    return KnobValues(local_derivatives, STEPS)
 
 
-def sa_prcc_additive(source: str, seed: int) -> KnobSensitivity:
+def sa_prcc_additive(source: str, seed: int) -> KnobValues:
     """Make the one with rank correlations over a Latin hypercube."""
-    return KnobSensitivity(partial(_over_settings, partial_rank_correlations, "latin"))
+    return KnobValues(partial(_over_settings, partial_rank_correlations, "latin"))
 
 
-def sa_sobol_additive(source: str, seed: int) -> KnobSensitivity:
+def sa_sobol_additive(source: str, seed: int) -> KnobValues:
     """Make the one with total indices."""
-    return KnobSensitivity(partial(_over_settings, total_indices, "saltelli"))
+    return KnobValues(partial(_over_settings, total_indices, "saltelli"))
 
 
 def _over_settings(sensitivities: Callable, kind: str, uncertainty_N_K: np.ndarray) -> np.ndarray:

@@ -8,13 +8,9 @@ clean pair (oracle), or a remedy applied to the observed pair (removal; supervis
 
 from __future__ import annotations
 
-from time import perf_counter
-
 import numpy as np
 
-from baselines.remedies import LearnedValues, ScaledValues, charged, corners
-from gpca.attribution import Attribution
-from gpca.dataset import Registrations
+from baselines.values import KnobValues, LearnedValues, ScaledValues
 from gpca.explainer import Entry
 
 ALL_CORNERS = list(range(8))
@@ -36,19 +32,9 @@ def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
     return np.reshape(explainer.shap_values(np.ones((1, 3)), l1_reg=False, silent=True), (3, -1)).T
 
 
-class KnobSHAP:
-    """SHAP over knobs (designs ``additive`` and ``oracle``): the knob with the largest value names the concept."""
-
-    def __init__(self, source: str, seed: int) -> None:
-        """Take no settings: those of the runs are the design's."""
-
-    def fit(self, registrations: Registrations) -> None:
-        """Nothing is learned."""
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration by the Shapley values of its uncertainty, in nats."""
-        started = perf_counter()
-        return charged(registrations, shapley_values(corners(registrations, "uncertainty")), ALL_CORNERS, started)
+def shap_over_knobs(source: str, seed: int) -> KnobValues:
+    """Make the explainer that names the knob which raises the uncertainty most (designs ``additive``, ``oracle``)."""
+    return KnobValues(lambda uncertainty_N_K: shapley_values(uncertainty_N_K[:, :8]), ALL_CORNERS)
 
 
 def shap_removal(source: str, seed: int, worth: str = "uncertainty") -> ScaledValues:
@@ -62,8 +48,8 @@ def shap_supervised(source: str, seed: int, inverse_regularisation: float = 1.0)
 
 
 EXPLAINERS = {
-    "shap_additive": Entry("SHAP", KnobSHAP, reads="uncertainty/additive"),
-    "shap_oracle": Entry("SHAP (oracle)", KnobSHAP, reads="uncertainty/oracle", oracle=True),
+    "shap_additive": Entry("SHAP", shap_over_knobs, reads="uncertainty/additive"),
+    "shap_oracle": Entry("SHAP (oracle)", shap_over_knobs, reads="uncertainty/oracle", oracle=True),
     "shap_removal": Entry("SHAP, remedies", shap_removal, reads="uncertainty/removal"),
     "shap_removal_residual": Entry("SHAP, remedies, residual", shap_removal, reads="uncertainty/removal"),
     "shap_supervised": Entry("SHAP, remedies, learned", shap_supervised, reads="uncertainty/removal"),

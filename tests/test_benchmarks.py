@@ -4,10 +4,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from benchmarks import pipeline
+from benchmarks import floor, pipeline
+from gpca.designs import DESIGNS
 from gpca.errors import InputError
+from gpca.outcomes import Outcomes
+from gpca.perturbation import CONCEPTS
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -122,3 +126,63 @@ def test_a_run_without_records_is_refused(tmp_path):
         pipeline.read_stages(tmp_path)
     with pytest.raises(InputError, match="holds no benchmark files"):
         pipeline.wall_time(tmp_path)
+
+
+def isotropic(registrations, variance_S_K):
+    """The outcomes of conditions whose poses scatter alike in all six directions."""
+    covariance = variance_S_K[..., None, None] * np.eye(6)
+    rest = np.zeros(variance_S_K.shape)
+    return Outcomes(registrations.sample, registrations.split, covariance, rest, rest, rest.astype(bool), rest)
+
+
+def isotropic_divergence(clean, other):
+    return 3 * (clean / other - 1 - np.log(clean / other))
+
+
+@pytest.fixture
+def run_with_uncertainty(tmp_path, registrations):
+    """Two seeds of one source in which the true concept's knob always widens the scatter most.
+
+    Clean pairs scatter by 1e-6 or next to nothing, and by that alone are very unlike where the floor is low. Observed
+    poses scatter by 1e-4, without noise by 1e-6.
+    """
+    test = registrations.subset(registrations.rows("test"))
+    true_S_3 = test.concept[:, None] == np.array(CONCEPTS)
+    knobs_K_3 = np.vstack([(np.arange(8)[:, None] >> np.arange(3)) & 1, 0.1 * np.eye(3)])
+    additive = 1e-6 * 10 ** (np.where(true_S_3, 3, 1) @ knobs_K_3.T)
+    clean_S = np.where(np.arange(len(test)) % 2, 1e-6, 1e-10)
+    causal = np.column_stack([np.full(len(test), 1e-6), clean_S, np.where(true_S_3[:, 0], 1e-6, 1e-4)])
+    assert [variances.shape[1] for variances in (additive, causal)] == [
+        len(DESIGNS[design].conditions) for design in floor.DESIGNS_READ
+    ]
+    for seed in (0, 1):
+        (path := tmp_path / "registrations" / "tiny" / f"seed{seed}.npz").parent.mkdir(parents=True, exist_ok=True)
+        registrations.save(path)
+        for design, variances in (("additive", additive), ("causal", causal)):
+            isotropic(test, variances).save(tmp_path / "uncertainty" / "tiny" / design / path.name)
+    return tmp_path
+
+
+def test_the_floor_decides_who_is_causal(run_with_uncertainty, capsys):
+    assert floor.main([str(run_with_uncertainty)]) == 0
+    printed = capsys.readouterr().out
+    assert "tiny: 2 seed(s), samples 36 (additive), 36 (causal)" in printed
+    (by_floor,) = last_line(printed).values()
+    assert list(by_floor) == ["1e-09", "1e-08", "1e-07", "1e-06", "1e-05", "1e-04", "1e-03"]
+    for name, numbers in by_floor.items():
+        epsilon = float(name)
+        assert numbers["shap_additive"] == numbers["sa_local_additive"] == 1
+        unlike, wide = (isotropic_divergence(1e-6 + epsilon, other + epsilon) for other in (1e-10, 1e-4))
+        assert numbers["clean_95th"] == pytest.approx(unlike, rel=1e-3)
+        assert numbers["clean_median"] == pytest.approx(unlike / 2, rel=1e-3)
+        shares = [numbers["causal"], *(numbers[f"causal_{concept}"] for concept in CONCEPTS)]
+        assert shares == pytest.approx([2 / 3, 0, 1, 1] if wide > unlike else [0, 0, 0, 0], abs=1e-4)
+    assert by_floor["1e-09"]["causal"] < by_floor["1e-06"]["causal"]
+
+
+def test_a_run_without_uncertainty_is_one_line_and_status_2(run_with_uncertainty, tmp_path_factory, capsys):
+    assert floor.main([str(tmp_path_factory.mktemp("empty"))]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    (run_with_uncertainty / "uncertainty" / "tiny" / "causal" / "seed1.npz").unlink()
+    assert floor.main([str(run_with_uncertainty)]) == 2
+    assert "causal/seed1.npz: no such file" in capsys.readouterr().err

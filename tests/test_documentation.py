@@ -109,15 +109,23 @@ def test_every_snakemake_command_can_be_planned(page, command, tmp_path):
     assert plan.returncode == 0, plan.stderr
 
 
-def test_every_number_of_the_protocol_is_that_of_the_config():
+@pytest.mark.parametrize(("page", "fewest"), [("protocol", 15), ("baselines", 7)])
+def test_every_number_of_the_protocol_is_that_of_the_config(page, fewest):
     config = yaml.safe_load((ROOT / "config/config.yaml").read_text())
-    rows = re.findall(r"^\| `([a-z0-9_.]+)` \| `([^`]+)` \|", (ROOT / "docs/protocol.md").read_text(), re.MULTILINE)
-    assert len(rows) > 15
+    rows = re.findall(r"^\| `([a-z0-9_.]+)` \| `([^`]+)` \|", (ROOT / f"docs/{page}.md").read_text(), re.MULTILINE)
+    assert len(rows) >= fewest
     for key, documented in rows:
         value = config
         for part in key.split("."):
             value = value[part]
         assert yaml.safe_load(documented) == value, key
+
+
+def test_every_configured_rival_is_described():
+    explainers = yaml.safe_load((ROOT / "config/config.yaml").read_text())["explainers"]
+    page = (ROOT / "docs/baselines.md").read_text()
+    for name in set(explainers) - {"gpca", "gpca_paper"}:
+        assert f"`{name}`" in page or f"`…{name.removeprefix('shap_removal').removeprefix('sa_local_removal')}`" in page
 
 
 def test_every_key_of_a_source_is_described():

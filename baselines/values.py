@@ -1,7 +1,7 @@
-"""What SHAP and sensitivity analysis over remedies share: scaling without labels, and learning with them.
+"""What SHAP and sensitivity analysis share: from a value per concept and registration to an attribution.
 
-A remedy may lower the uncertainty of every pair a little, so without labels its values are counted from their mean
-over the training split, in its standard deviations.
+Values of knobs are taken as they are. A remedy may lower the uncertainty of every pair a little, so without labels its
+values are counted from their mean over the training split, in standard deviations; with labels a classifier reads them.
 """
 
 from __future__ import annotations
@@ -19,6 +19,28 @@ from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
 
 WORTHS = ("uncertainty", "residual")  # of a condition: KL in nats, or log distance from the target to the source
+
+
+class KnobValues:
+    """The knob with the largest value names the concept; nothing is learned.
+
+    Args:
+        values: uncertainty (S, K) under the conditions of a design -> the values (S, 3) of the knobs.
+        conditions: those that it needs, and is charged with; None for all.
+    """
+
+    def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int] | None = None) -> None:
+        self._values, self._conditions = values, conditions
+
+    def fit(self, registrations: Registrations) -> None:
+        """Nothing is learned."""
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration by the values of its uncertainty."""
+        started = perf_counter()
+        uncertainty_N_K = attached(registrations, "uncertainty", None)
+        conditions = self._conditions or list(range(uncertainty_N_K.shape[1]))
+        return charged(registrations, self._values(uncertainty_N_K), conditions, started)
 
 
 class ScaledValues:

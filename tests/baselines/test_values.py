@@ -1,0 +1,206 @@
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from baselines.sensitivity import ONE_AT_A_TIME, single_drops
+from baselines.shap_kl import ALL_CORNERS
+from baselines.values import WORTHS, ScaledValues, charged, corners
+from gpca.errors import InputError
+from gpca.explainer import explainer_entry, require_settings
+from gpca.perturbation import CONCEPTS
+
+SCALED = ("shap_removal", "sa_local_removal")
+LEARNED = ("shap_supervised", "sa_supervised")
+CHARGED = {"shap_removal": ALL_CORNERS, "shap_supervised": ALL_CORNERS}
+CHARGED |= {"sa_local_removal": ONE_AT_A_TIME, "sa_supervised": ONE_AT_A_TIME}
+
+
+@pytest.fixture(scope="module")
+def attached(registrations):
+    """With the 8 corners of design ``removal``: the remedy of the true concept lowers both worths more than it usually
+    does, but the second remedy lowers them most in every pair.
+    """
+    n = len(registrations)
+    random = np.random.default_rng(0)
+    true_S_3 = registrations.concept[:, None] == np.array(CONCEPTS)
+    usual_3, more_3 = np.array([0.5, 9.0, 1.0]), np.array([1.0, 4.0, 0.3])
+    gain_S_3 = usual_3 + more_3 * (true_S_3 + 0.1 * random.normal(size=(n, 3)))
+    present_8_3 = (np.arange(8)[:, None] >> np.arange(3)) & 1
+    worth_S_8 = 20 - gain_S_3 @ present_8_3.T
+    calls_S_8 = np.arange(n)[:, None] + 2 ** np.arange(8)
+    arrays = {"uncertainty": worth_S_8, "residual": worth_S_8 / 100 - 3, "icp_calls": calls_S_8}
+    return replace(registrations, attached=arrays | {"icp_seconds": 1e-3 * calls_S_8, "seconds": 2e-3 * calls_S_8})
+
+
+def fitted(name, registrations, **settings):
+    explainer = explainer_entry(name).make("tiny", 0, **settings)
+    explainer.fit(registrations.subset(registrations.rows("train")))
+    return explainer
+
+
+def with_arrays(registrations, **arrays):
+    return replace(registrations, attached={**registrations.attached, **arrays})
+
+
+def accuracy(attribution, registrations):
+    test = registrations.rows("test")
+    return np.mean(attribution.predicted_N[test] == registrations.concept[test])
+
+
+@pytest.mark.parametrize("worth", WORTHS)
+@pytest.mark.parametrize("name", SCALED)
+def test_a_remedy_that_helps_every_pair_most_is_not_always_named(name, worth, attached):
+    plain = single_drops(-attached.attached[worth])
+    assert (plain.argmax(axis=1) == 1).all()
+    attribution = fitted(name, attached, worth=worth).explain(attached.without_labels())
+    assert accuracy(attribution, attached) == 1
+
+
+@pytest.mark.parametrize("name", SCALED)
+def test_only_the_chosen_worth_counts(name, attached):
+    other = with_arrays(attached, residual=np.random.default_rng(1).normal(size=(len(attached), 8)))
+    for worth, expected in (("uncertainty", True), ("residual", False)):
+        before = fitted(name, attached, worth=worth).explain(attached).scores_N_C
+        after = fitted(name, other, worth=worth).explain(other).scores_N_C
+        assert np.array_equal(before, after) is expected
+
+
+def test_scores_count_from_the_training_mean_in_training_deviations(attached):
+    drops = single_drops(-attached.attached["uncertainty"])
+    train = drops[attached.rows("train")]
+    scores = fitted("sa_local_removal", attached).explain(attached).scores_N_C
+    assert scores == pytest.approx((drops - train.mean(axis=0)) / train.std(axis=0))
+
+
+@pytest.mark.parametrize("name", SCALED)
+def test_test_rows_do_not_touch_the_scaling(name, attached):
+    train, test = attached.rows("train"), attached.rows("test")
+    scores = fitted(name, attached).explain(attached).scores_N_C
+    uncertainty = attached.attached["uncertainty"].copy()
+    uncertainty[test] = 1000 * uncertainty[test][:, ::-1]
+    changed = with_arrays(attached, uncertainty=uncertainty)
+    scores_changed = fitted(name, changed).explain(changed).scores_N_C
+    assert np.array_equal(scores_changed[train], scores[train])
+    assert not np.isclose(scores_changed[test], scores[test]).any(axis=1).all()
+
+
+def test_a_remedy_without_effect_in_training_scores_a_finite_number(attached):
+    uncertainty = attached.attached["uncertainty"].copy()
+    uncertainty[:, 1] = uncertainty[:, 0]  # the first remedy alone changes nothing
+    still = with_arrays(attached, uncertainty=uncertainty)
+    scores = fitted("sa_local_removal", still).explain(still).scores_N_C
+    assert (scores[:, 0] == 0).all()
+    assert np.isfinite(scores).all()
+
+
+def test_an_unknown_worth_is_refused():
+    with pytest.raises(InputError, match=r"setting 'worth': unknown 'fitness'; known are uncertainty, residual"):
+        ScaledValues(single_drops, ONE_AT_A_TIME, "fitness")
+    with pytest.raises(InputError, match="setting 'worth'"):
+        explainer_entry("shap_removal").make("tiny", 0, worth="")
+
+
+@pytest.mark.parametrize("name", LEARNED)
+def test_learning_separates_the_concepts_by_either_worth(name, attached):
+    nothing = np.random.default_rng(1).normal(size=(len(attached), 8))
+    for registrations in (
+        attached,
+        with_arrays(attached, residual=nothing),
+        with_arrays(attached, uncertainty=nothing),
+    ):
+        attribution = fitted(name, registrations).explain(registrations.without_labels())
+        assert attribution.scores_N_C.sum(axis=1) == pytest.approx(1)
+        assert accuracy(attribution, registrations) > 0.9
+    neither = with_arrays(attached, uncertainty=nothing, residual=nothing)
+    assert accuracy(fitted(name, neither).explain(neither), neither) < 0.8
+
+
+@pytest.mark.parametrize("absent", CONCEPTS)
+@pytest.mark.parametrize("name", LEARNED)
+def test_a_concept_absent_from_training_scores_0(name, absent, attached):
+    seen = attached.concept != absent
+    attribution = fitted(name, attached.subset(np.flatnonzero(seen))).explain(attached)
+    assert (attribution.scores_N_C[:, CONCEPTS.index(absent)] == 0).all()
+    assert np.mean(attribution.predicted_N[seen] == attached.concept[seen]) > 0.9
+
+
+@pytest.mark.parametrize("name", LEARNED)
+def test_learning_from_one_concept_alone_is_refused(name, attached):
+    with pytest.raises(InputError, match="training registrations: fewer than two concepts"):
+        fitted(name, attached.subset(np.flatnonzero(attached.concept == "noise")))
+
+
+@pytest.mark.parametrize("name", (*SCALED, *LEARNED))
+def test_rows_in_another_order_give_the_results_in_that_order(name, attached):
+    explainer = fitted(name, attached)
+    whole = explainer.explain(attached)
+    rows = np.random.default_rng(2).permutation(len(attached))
+    shuffled = explainer.explain(attached.subset(rows))
+    assert shuffled.scores_N_C == pytest.approx(whole.scores_N_C[rows], abs=1e-12)
+    assert np.array_equal(shuffled.predicted_N, whole.predicted_N[rows])
+    assert np.array_equal(shuffled.icp_calls_N, whole.icp_calls_N[rows])
+
+
+@pytest.mark.parametrize("name", (*SCALED, *LEARNED))
+def test_only_the_corners_that_it_needs_are_charged(name, attached):
+    attribution = fitted(name, attached).explain(attached)
+    calls_N = attached.attached["icp_calls"][:, CHARGED[name]].sum(axis=1)
+    assert np.array_equal(attribution.icp_calls_N, calls_N)
+    assert attribution.icp_seconds_N == pytest.approx(1e-3 * calls_N)
+    assert (attribution.seconds_N > 2e-3 * calls_N).all()
+
+
+def test_a_charge_is_that_of_its_conditions_and_the_time_since_the_start_shared_out(attached):
+    n = len(attached)
+    scores = np.random.default_rng(0).normal(size=(n, 3))
+    attribution = charged(attached, scores, [1, 3], perf_counter() - 54.0)
+    assert attribution.icp_calls_N.tolist() == [2 * i + 2 + 8 for i in range(n)]
+    assert attribution.icp_seconds_N == pytest.approx(1e-3 * attribution.icp_calls_N)
+    own = attribution.seconds_N - 2e-3 * attribution.icp_calls_N
+    assert own == pytest.approx(54.0 / n, rel=0.05)
+    assert attribution.concepts == CONCEPTS
+    assert np.array_equal(attribution.scores_N_C, scores)
+
+
+def test_equal_scores_name_no_concept_but_two_equal_largest_do(attached):
+    scores = np.tile([[1.0, 2.0, 3.0]], (len(attached), 1))
+    scores[4], scores[9], scores[11] = 0.0, -2.5, [2.0, 2.0, 0.0]
+    attribution = charged(attached, scores, [0], perf_counter())
+    assert np.flatnonzero(attribution.abstained_N).tolist() == [4, 9]
+    assert attribution.predicted_N[[4, 9, 11]].tolist() == ["", "", CONCEPTS[0]]
+
+
+def test_corners_are_the_first_eight_conditions(attached):
+    eleven = np.arange(len(attached) * 11, dtype=float).reshape(-1, 11)
+    assert np.array_equal(corners(with_arrays(attached, uncertainty=eleven), "uncertainty"), eleven[:, :8])
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [*((name, "uncertainty") for name in (*SCALED, *LEARNED)), *((name, "residual") for name in LEARNED)],
+)
+def test_a_worth_that_is_missing_or_nan_is_refused(name, array, attached):
+    explainer = fitted(name, attached)
+    nan = with_arrays(attached, **{array: np.full((len(attached), 8), np.nan)})
+    without = replace(attached, attached={key: value for key, value in attached.attached.items() if key != array})
+    for registrations, fault in ((nan, "holds NaN"), (without, "is not attached")):
+        with pytest.raises(InputError, match=f"array '{array}': {fault}"):
+            explainer.explain(registrations)
+        with pytest.raises(InputError, match=f"array '{array}': {fault}"):
+            fitted(name, registrations)
+
+
+@pytest.mark.parametrize("missing", ["icp_calls", "icp_seconds", "seconds"])
+def test_a_cost_that_is_missing_is_refused(missing, attached):
+    without = replace(attached, attached={key: value for key, value in attached.attached.items() if key != missing})
+    with pytest.raises(InputError, match=f"array '{missing}': is not attached"):
+        charged(without, np.zeros((len(attached), 3)), [0], perf_counter())
+
+
+@pytest.mark.parametrize("name", (*SCALED, *LEARNED))
+def test_the_config_may_set_what_they_take_and_no_more(name):
+    require_settings(name, {"worth": "residual"} if name in SCALED else {"inverse_regularisation": 0.1})
+    with pytest.raises(InputError, match=f"explainer '{name}'"):
+        require_settings(name, {"inverse_regularisation": 0.1} if name in SCALED else {"worth": "residual"})
