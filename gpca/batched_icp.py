@@ -69,7 +69,7 @@ def _require_cloud(name: str, points: np.ndarray) -> None:
 @njit(cache=True)
 def _align_all(source, target, poses, fitness, rmse, max_iterations):
     room = np.empty(LISTED)
-    moments = np.empty((4, 4))
+    moments, matrices = np.empty((4, 4)), np.empty((8, 4))
     neighbour = np.empty(len(source), np.int64)
     held = np.zeros((len(source), 4))  # where a point's neighbour was searched, and the square of the radius around it
     for n in range(len(poses)):
@@ -78,7 +78,7 @@ def _align_all(source, target, poses, fitness, rmse, max_iterations):
         fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbour, held)
         for _ in range(max_iterations):
             if fitness[n] > 0:
-                _move(pose, moments)
+                _move(pose, moments, matrices)
             old_fitness, old_rmse = fitness[n], rmse[n]
             fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbour, held)
             if abs(old_fitness - fitness[n]) < CONVERGED and abs(old_rmse - rmse[n]) < CONVERGED:
@@ -146,14 +146,70 @@ def _correspond(source, target, pose, moments, room, neighbour, held):
     return count / len(source), np.sqrt(squares / count)
 
 
-@njit(cache=True)
-def _move(pose, moments):
-    """Apply the rigid motion of least squares between corresponding points (Umeyama 1991) to the pose."""
-    q, p = moments[:3, 3].copy(), moments[3, :3].copy()
-    u, _, vt = np.linalg.svd(moments[:3, :3] - np.outer(q, p))
-    if np.linalg.det(u) * np.linalg.det(vt) < 0:
-        u[:, 2] = -u[:, 2]
-    rotation = u @ vt
-    translation = q - rotation @ p
-    pose[:3, 3] = rotation @ pose[:3, 3].copy() + translation
-    pose[:3, :3] = rotation @ pose[:3, :3].copy()
+@njit(**OPTIONS)
+def _move(pose, moments, room):
+    """Apply the rigid motion of least squares between corresponding points to the pose (Horn 1987, by quaternions)."""
+    q0, q1, q2 = moments[0, 3], moments[1, 3], moments[2, 3]
+    p0, p1, p2 = moments[3, 0], moments[3, 1], moments[3, 2]
+    # Sums of Horn's notation: of the products of the source's first and the target's second coordinate.
+    xx, yx, zx = moments[0, 0] - q0 * p0, moments[0, 1] - q0 * p1, moments[0, 2] - q0 * p2
+    xy, yy, zy = moments[1, 0] - q1 * p0, moments[1, 1] - q1 * p1, moments[1, 2] - q1 * p2
+    xz, yz, zz = moments[2, 0] - q2 * p0, moments[2, 1] - q2 * p1, moments[2, 2] - q2 * p2
+    matrix, vectors = room[:4], room[4:]
+    matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3] = xx + yy + zz, yz - zy, zx - xz, xy - yx
+    matrix[1, 1], matrix[1, 2], matrix[1, 3] = xx - yy - zz, xy + yx, zx + xz
+    matrix[2, 2], matrix[2, 3], matrix[3, 3] = yy - xx - zz, yz + zy, zz - xx - yy
+    largest = _largest_eigenvector(matrix, vectors)
+    w, x, y, z = vectors[0, largest], vectors[1, largest], vectors[2, largest], vectors[3, largest]
+    r00, r01, r02 = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    r10, r11, r12 = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    r20, r21, r22 = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    t0, t1, t2 = pose[0, 3] - p0, pose[1, 3] - p1, pose[2, 3] - p2
+    pose[0, 3] = r00 * t0 + r01 * t1 + r02 * t2 + q0
+    pose[1, 3] = r10 * t0 + r11 * t1 + r12 * t2 + q1
+    pose[2, 3] = r20 * t0 + r21 * t1 + r22 * t2 + q2
+    for j in range(3):
+        a, b, c = pose[0, j], pose[1, j], pose[2, j]
+        pose[0, j] = r00 * a + r01 * b + r02 * c
+        pose[1, j] = r10 * a + r11 * b + r12 * c
+        pose[2, j] = r20 * a + r21 * b + r22 * c
+
+
+@njit(**OPTIONS)
+def _largest_eigenvector(matrix, vectors):
+    """Diagonalise a symmetric 4×4 matrix (upper half) by Jacobi rotations; return the largest eigenvalue's column."""
+    for i in range(4):
+        for j in range(4):
+            vectors[i, j] = 1.0 if i == j else 0.0
+    for _ in range(30):
+        off = 0.0
+        for i in range(3):
+            for j in range(i + 1, 4):
+                off += matrix[i, j] * matrix[i, j]
+        if off < 1e-40:
+            break
+        for i in range(3):
+            for j in range(i + 1, 4):
+                if matrix[i, j] == 0.0:
+                    continue
+                theta = (matrix[j, j] - matrix[i, i]) / (2 * matrix[i, j])
+                t = 1 / (abs(theta) + np.sqrt(theta * theta + 1))
+                if theta < 0:
+                    t = -t
+                c = 1 / np.sqrt(t * t + 1)
+                s = t * c
+                matrix[i, i] -= t * matrix[i, j]
+                matrix[j, j] += t * matrix[i, j]
+                matrix[i, j] = 0.0
+                for k in range(4):
+                    if k != i and k != j:
+                        a, b = (min(k, i), max(k, i)), (min(k, j), max(k, j))
+                        u, v = matrix[a], matrix[b]
+                        matrix[a], matrix[b] = c * u - s * v, s * u + c * v
+                    u, v = vectors[k, i], vectors[k, j]
+                    vectors[k, i], vectors[k, j] = c * u - s * v, s * u + c * v
+    largest = 0
+    for i in range(1, 4):
+        if matrix[i, i] > matrix[largest, largest]:
+            largest = i
+    return largest

@@ -36,8 +36,8 @@ class RemedyRuns:
     """Runs of one observed pair under every combination of remedies.
 
     Args:
-        source: (N, 3), in its own frame. target: (Q, 3). Relative to the diameter; all their points, of which ICP sees
-            some and the residual all.
+        source: (N, 3), in its own frame. target: (Q, 3). Relative to the diameter; ICP sees fewer of their points
+            than denoising and the residual do.
         T_target_source_init, T_target_source_icp: initial and found pose.
         xi_n_6: twists of the starts.
     """

@@ -58,7 +58,8 @@ def make_target(points: np.ndarray, distance: float) -> Target:
     extent = max(float((high - low).max()), 1e-9)
     # The points lie on a surface: their number grows with the square of the extent, not with its cube.
     spacing = extent / np.sqrt(len(points))
-    cell = 1.5 * spacing
+    # Not far smaller than the distance, however small the cloud: the searches widen cell by cell.
+    cell = max(1.5 * spacing, distance / 128)
     cells = np.floor((high - low) / cell).astype(np.int64) + 1
     cell_P = np.ravel_multi_index(tuple(np.floor((points - low) / cell).astype(np.int64).T), tuple(cells))
     order = np.argsort(cell_P, kind="stable")

@@ -90,8 +90,10 @@ class Runs:
 
     def degenerate(self, floor: float) -> bool:
         """Whether the covariance says nothing: no run found a correspondence, or all ended at the same pose."""
-        twists_n_6 = log(self.T_target_source_n @ inverse(self.T_target_source_n[0]))
-        return not self.fitness_n.any() or bool(twists_n_6.var(axis=0).sum() < 6 * floor)
+        variance_3_4 = self.T_target_source_n[:, :3].var(axis=0)
+        # To first order a rotation's entries vary twice as much as its vector.
+        spread = variance_3_4[:, :3].sum() / 2 + variance_3_4[:, 3].sum()
+        return not self.fitness_n.any() or bool(spread < 6 * floor)
 
 
 def run_from_starts(icp: BatchedICP, source: np.ndarray, T_target_source_init: np.ndarray, xi_n_6: np.ndarray) -> Runs:
