@@ -100,9 +100,10 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
     remedy = "make it anew with 'python -m gpca uncertainty'"
     if len(rows) != np.prod(shape):
         raise InputError(path, f"holds {len(rows)} rows, not {shape[0]} samples × {shape[1]} conditions", remedy)
-    samples = numbers(path, rows, "sample").to_numpy().reshape(shape)[:, 0]
-    splits = rows["split"].to_numpy().reshape(shape)[:, 0]
-    if not np.array_equal(samples, outcomes.sample) or not np.array_equal(splits, outcomes.split):
-        raise InputError(path, "holds other samples than the outcomes", remedy)
+    expected = {"sample": outcomes.sample[:, None], "split": outcomes.split[:, None], "condition": np.arange(shape[1])}
+    for name, values in expected.items():
+        found = (rows[name] if name == "split" else numbers(path, rows, name)).to_numpy().reshape(shape)
+        if not (found == values).all():
+            raise InputError(path, "holds other samples or conditions than the outcomes", remedy)
     seconds, icp_seconds = (numbers(path, rows, name).to_numpy().reshape(shape) for name in ("seconds", "icp_seconds"))
     return seconds, icp_seconds

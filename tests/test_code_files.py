@@ -59,7 +59,7 @@ STEPS = {
     "registrations": ({"gpca/rigid.py", "gpca/perturbation.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
     "train": ({"gpca/encoders/training.py", "gpca/dataset.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
     "embed": ({"gpca/encoders/training.py", "gpca/attribution.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
-    "uncertainty": ({"gpca/neighbours.py", "gpca/designs.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
+    "uncertainty": ({"gpca/icp_kernels.py", "gpca/designs.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
     "explain": (
         {"gpca/explainer.py", "gpca/attribution.py"},
         {"gpca/gpc.py", "gpca/designs.py", "gpca/encoders/training.py"},

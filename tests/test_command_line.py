@@ -214,7 +214,7 @@ FAULTS = {
     "explain": [
         (untouched, SHAP | {"--uncertainty": None}, r"'shap_removal': reads the uncertainty of design 'removal'"),
         (removed("uncertainty.npz"), SHAP, r"uncertainty.npz: no such file; make it with 'python -m gpca"),
-        (arrays_changed("uncertainty.npz", sample=lambda s: s + 50), SHAP, r"holds other samples than the outcomes"),
+        (arrays_changed("uncertainty.npz", sample=lambda s: s + 50), SHAP, r"holds other samples or conditions"),
         (arrays_changed("uncertainty.npz", residual=lambda r: r * np.nan), SHAP, r"array 'residual' holds NaN"),
         (removed("uncertainty_timings.csv"), SHAP, r"uncertainty_timings.csv: no such file"),
         (lines_kept("uncertainty_timings.csv", 20), SHAP, r"holds 19 rows, not 24 samples × 8 conditions"),

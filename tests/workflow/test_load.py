@@ -20,7 +20,8 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, config, ru
     planned = project.dry_run("all", "--configfile", f"config/{config}.yaml")
     assert planned.jobs["objects"] == 3
     assert planned.jobs["registrations"] == planned.jobs["encoder"] == 3 * seeds
-    assert planned.jobs["explain"] == 3 * 2
+    assert planned.jobs["explain"] == 3 * 19
+    assert planned.jobs["uncertainty"] == 3 * 6
     for name in ("metrics.csv", "timings.csv", "tables/table1_single_baselines.md", "tables/table2_per_concept.tex"):
         assert f"results/{run}/{name}" in planned.outputs
     assert {f"results/{run}/figures/{name}.png" for name in ("fig3_concepts", "objects_ycb")} <= planned.outputs
