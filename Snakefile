@@ -36,15 +36,7 @@ include: "workflow/rules/figures.smk"
 rule all:
     default_target: True
     input:
-        collect(
-            "results/{run}/{file}.csv", run=config["run"], file=["metrics", "timings"]
-        ),
-        collect(
-            "results/{run}/tables/{table}.md",
-            run=config["run"],
-            table=TABLE_EXPLAINERS,
-        ),
-        collect("results/{run}/figures/{figure}.png", run=config["run"], figure=FIGURES),
+        collect("results/{run}/{file}", run=config["run"], file=RESULTS),
 
 
 rule smoke:

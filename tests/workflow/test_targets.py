@@ -33,7 +33,8 @@ def test_a_finished_run_has_nothing_to_do(finished):
 
 EDITS = {
     "gpca/gpc.py": WITH_GPC | COLLECTORS,
-    "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS,
+    # Not Table II: it shows GP-CA alone.
+    "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2},
     "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
     "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1},

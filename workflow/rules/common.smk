@@ -136,3 +136,8 @@ FIGURES = [
     "fig_attribution_confusions",
     *(f"objects_{source}" for source in SOURCES),
 ]
+RESULTS = [
+    *("metrics.csv", "timings.csv"),
+    *(f"tables/{table}.md" for table in TABLE_EXPLAINERS),
+    *(f"figures/{figure}.png" for figure in FIGURES),
+]
