@@ -20,8 +20,7 @@ class ConceptClassifier:
 
     def fit(self, features_N_F: np.ndarray, concept_N: np.ndarray) -> ConceptClassifier:
         """Learn from labelled features; fewer than two concepts among the labels raise an InputError."""
-        if len(np.unique(concept_N)) < 2:
-            raise InputError("training registrations", "fewer than two concepts", "give samples of at least two")
+        known_concepts(concept_N)
         self._classifier.fit(features_N_F, concept_N)
         return self
 
@@ -31,6 +30,14 @@ class ConceptClassifier:
         columns = [CONCEPTS.index(concept) for concept in self._classifier.classes_]
         scores_N_C[:, columns] = self._classifier.predict_proba(features_N_F)
         return scores_N_C
+
+
+def known_concepts(concept_N: np.ndarray) -> list[str]:
+    """Return the concepts among training labels, in the order of `CONCEPTS`; fewer than two raise an InputError."""
+    known = [concept for concept in CONCEPTS if (concept_N == concept).any()]
+    if len(known) < 2:
+        raise InputError("training registrations", "fewer than two concepts", "give samples of at least two")
+    return known
 
 
 def standardised_regression(inverse_regularisation: float):

@@ -12,6 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from baselines.attached import attached
+from baselines.concept_classifier import known_concepts
 from gpca.attribution import Attribution
 from gpca.dataset import Registrations
 from gpca.errors import InputError
@@ -44,9 +45,7 @@ class ConceptVectors:
         from sklearn.preprocessing import StandardScaler
 
         embedding_N_d = attached(registrations, "embedding", None)
-        self._known = [concept for concept in CONCEPTS if (registrations.concept == concept).any()]
-        if len(self._known) < 2:
-            raise InputError("training registrations", "fewer than two concepts", "give samples of at least two")
+        self._known = known_concepts(registrations.concept)
         if (embedding_N_d == embedding_N_d[0]).all():
             raise InputError("array 'embedding'", "is the same for all training registrations", "train the encoder")
         self._embedding_scaler = StandardScaler().fit(embedding_N_d)

@@ -19,8 +19,6 @@ from gpca.explainer import Entry
 from gpca.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
-# In diameters. A residual below it is that of a cloud registered to itself; its logarithm has to stay finite.
-RESIDUAL_FLOOR = 1e-6
 FLOOR = 1e-6  # variance, as that of the uncertainty itself: a thousandth of a radian or of the diameter, squared
 OBSERVED = 0  # the condition of the uncertainty design in which the observed pair is left as it is
 
@@ -77,8 +75,9 @@ def log_residual(from_P_3: np.ndarray, to_Q_3: np.ndarray) -> float:
     """Return the log of the RMS distance from each point of one cloud to the nearest of the other."""
     from scipy.spatial import cKDTree
 
-    distances_P, _ = cKDTree(to_Q_3).query(from_P_3)
-    return float(np.log(max(np.sqrt(np.mean(distances_P**2)), RESIDUAL_FLOOR)))
+    from gpca.uncertainty import log_residual as to_tree
+
+    return to_tree(from_P_3, cKDTree(to_Q_3))
 
 
 def _observed(registrations: Registrations, name: str) -> np.ndarray:

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.errors import InputError
 from gpca.icp_kernels import align_all, make_target
-from gpca.registration import ICP, ICPSettings
+from gpca.registration import ICP, ICPSettings, require_cloud
 
 
 class BatchedICP:
@@ -28,7 +27,7 @@ class BatchedICP:
     """
 
     def __init__(self, target: np.ndarray, settings: ICPSettings, target_normals: np.ndarray | None = None) -> None:
-        _require_cloud("target cloud", target)
+        require_cloud("target cloud", target)
         self._settings = settings
         if settings.method == "point_to_point":
             self._target = make_target(target, settings.correspondence_distance)
@@ -47,7 +46,7 @@ class BatchedICP:
         Raises:
             InputError: fewer than three points, or NaN.
         """
-        _require_cloud("source cloud", source)
+        require_cloud("source cloud", source)
         poses_n = np.array(T_target_source_init_n, np.float64)
         if self._settings.method == "point_to_point":
             fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
@@ -57,8 +56,3 @@ class BatchedICP:
         runs = [self._icp.register(source, pose) for pose in poses_n]
         fitness_n, rmse_n = np.array([(run.fitness, run.inlier_rmse) for run in runs]).T
         return np.array([run.T_target_source for run in runs]), fitness_n, rmse_n
-
-
-def _require_cloud(name: str, points: np.ndarray) -> None:
-    if len(points) < 3 or not np.isfinite(points).all():
-        raise InputError(name, f"{len(points)} points, or NaN among them", "give at least 3 finite points")

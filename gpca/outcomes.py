@@ -10,8 +10,8 @@ import numpy as np
 
 from gpca.dataset import Registrations
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays, whole_file
-from gpca.predictions import numbers, read_csv
+from gpca.files import load_arrays, save_arrays
+from gpca.predictions import numbers, read_csv, write_csv
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,7 @@ class Outcomes:
 
         columns = {"sample": self.sample, "split": self.split}
         columns |= {f"uncertainty_{condition}": self.uncertainty[:, k] for k, condition in enumerate(conditions)}
-        with whole_file(path) as partial:
-            pd.DataFrame(columns).to_csv(partial, index=False, float_format="%.6f", lineterminator="\n")
+        write_csv(path, pd.DataFrame(columns))
 
     def attach_to(
         self, registrations: Registrations, seconds_S_K: np.ndarray, icp_seconds_S_K: np.ndarray
@@ -85,8 +84,7 @@ def write_seconds(path: str | Path, outcomes: Outcomes, seconds_S_K: np.ndarray,
     columns = {name: np.repeat(getattr(outcomes, name), conditions) for name in ("sample", "split")}
     columns |= {"condition": np.tile(np.arange(conditions), len(seconds_S_K))}
     columns |= {"seconds": seconds_S_K.ravel(), "icp_seconds": icp_seconds_S_K.ravel()}
-    with whole_file(path) as partial:
-        pd.DataFrame(columns).to_csv(partial, index=False, float_format="%.6f", lineterminator="\n")
+    write_csv(path, pd.DataFrame(columns))
 
 
 def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.ndarray]:

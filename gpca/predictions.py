@@ -44,7 +44,7 @@ def write_predictions(path: str | Path, registrations: Registrations, attributio
             "icp_calls": attribution.icp_calls_N,
         }
     )
-    _write_csv(path, frame)
+    write_csv(path, frame)
 
 
 def read_predictions(path: str | Path) -> pd.DataFrame:
@@ -93,7 +93,7 @@ def write_timings(
     import pandas as pd
 
     columns = {"sample": registrations.sample, "split": registrations.split}
-    _write_csv(path, pd.DataFrame(columns | {"seconds": seconds_S, "icp_seconds": icp_seconds_S}))
+    write_csv(path, pd.DataFrame(columns | {"seconds": seconds_S, "icp_seconds": icp_seconds_S}))
 
 
 def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, np.ndarray]:
@@ -152,6 +152,7 @@ def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True) -> p
     return values
 
 
-def _write_csv(path, frame) -> None:
+def write_csv(path: str | Path, frame: pd.DataFrame) -> None:
+    """Write a CSV file, whole or not at all, with six decimals."""
     with whole_file(path) as partial:
         frame.to_csv(partial, index=False, float_format="%.6f", lineterminator="\n")

@@ -70,10 +70,7 @@ class ICP:
         Raises:
             InputError: fewer than three points, or NaN.
         """
-        if len(source) < 3 or not np.isfinite(source).all():
-            raise InputError(
-                "source cloud", f"{len(source)} points, or NaN among them", "give at least 3 finite points"
-            )
+        require_cloud("source cloud", source)
         registration = self._o3d.pipelines.registration
         align = registration.registration_icp
         if self._settings.method == "generalized":
@@ -93,3 +90,9 @@ class ICP:
         if normals is not None:
             cloud.normals = self._o3d.utility.Vector3dVector(np.asarray(normals, np.float64))
         return cloud
+
+
+def require_cloud(name: str, points: np.ndarray) -> None:
+    """Raise an InputError unless there are at least three points (N, 3), all of them finite."""
+    if len(points) < 3 or not np.isfinite(points).all():
+        raise InputError(name, f"{len(points)} points, or NaN among them", "give at least 3 finite points")

@@ -139,15 +139,20 @@ def outcome(
         started: the ``perf_counter`` at which the condition's work began.
     """
     best = runs.T_target_source_n[runs.cost_n(settings.icp.correspondence_distance).argmin()]
-    distances_Q, _ = source_tree.query(transform(inverse(best), target))
     return Outcome(
         covariance=runs.covariance(T_ref),
-        residual=float(np.log(max(np.sqrt(np.mean(distances_Q**2)), SMALLEST_RESIDUAL))),
+        residual=log_residual(transform(inverse(best), target), source_tree),
         degenerate=runs.degenerate(settings.floor),
         icp_calls=runs.icp_calls,
         icp_seconds=runs.icp_seconds,
         seconds=perf_counter() - started,
     )
+
+
+def log_residual(points: np.ndarray, tree: cKDTree) -> float:
+    """Return the log of the root mean square distance from each point (N, 3) to the nearest of the tree's."""
+    distances_N, _ = tree.query(points)
+    return float(np.log(max(np.sqrt(np.mean(distances_N**2)), SMALLEST_RESIDUAL)))
 
 
 def divergence(covariance_clean: np.ndarray, covariance: np.ndarray, floor: float) -> np.ndarray:

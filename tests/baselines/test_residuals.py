@@ -3,12 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.residuals import FLOOR, RESIDUAL_FLOOR, features, log_residual
+from baselines.residuals import FLOOR, features, log_residual
 from gpca.dataset import ragged
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry
 from gpca.perturbation import CONCEPTS
 from gpca.settings import check_settings
+from gpca.uncertainty import SMALLEST_RESIDUAL
 
 RIVALS = ("residuals_logistic", "residuals_forest")
 
@@ -42,7 +43,7 @@ def test_a_residual_is_the_log_of_the_rms_distance_to_the_nearest_point():
     off = np.array([[0.0, 0.3, 0], [2, 0, 0.4]])
     assert log_residual(off, line) == pytest.approx(np.log(np.sqrt((0.3**2 + 0.4**2) / 2)))
     assert log_residual(line, off) == pytest.approx(np.log(np.sqrt((0.3**2 + 1 + 0.3**2 + 0.4**2) / 3)))
-    assert log_residual(line, line) == np.log(RESIDUAL_FLOOR)
+    assert log_residual(line, line) == np.log(SMALLEST_RESIDUAL)
 
 
 def test_noise_is_seen_forwards_and_a_missing_part_backwards(registrations):
