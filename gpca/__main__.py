@@ -18,6 +18,9 @@ STEPS = {
     "embed": "registrations and encoder -> embeddings",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
     "explain": "registrations, embeddings or uncertainty -> predictions of one explainer",
+    "without": "registrations -> embeddings by encoders that never saw one of the concepts",
+    "active_learning": "embeddings -> learning curves of every acquisition strategy",
+    "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
 }
 
 

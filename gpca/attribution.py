@@ -88,9 +88,31 @@ def summarise_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     Returns:
         scores_N_C, variances_N_C, bald_N.
     """
-    p_M_N_C = np.exp(logits_M_N_C - logits_M_N_C.max(axis=-1, keepdims=True))
-    p_M_N_C /= p_M_N_C.sum(axis=-1, keepdims=True)
-    scores_N_C = p_M_N_C.mean(axis=0)
-    variances_N_C = np.square(p_M_N_C - scores_N_C).mean(axis=0)
-    bald_N = entropy(scores_N_C) - entropy(p_M_N_C).mean(axis=0)
+    # Classes first: sums over three neighbours are several times as slow as sums of three arrays.
+    logits_C_M_N = np.ascontiguousarray(np.moveaxis(logits_M_N_C, -1, 0))
+    logits_C_M_N = logits_C_M_N - logits_C_M_N.max(axis=0)
+    p_C_M_N = np.exp(logits_C_M_N)
+    total_M_N = p_C_M_N.sum(axis=0)
+    p_C_M_N /= total_M_N
+    scores_C_N = p_C_M_N.mean(axis=1)
+    variances_C_N = np.square(p_C_M_N - scores_C_N[:, None]).mean(axis=1)
+    # H[softmax(f)] = log Σ exp f - Σ p f: one logarithm per draw instead of one per class.
+    entropy_M_N = np.log(total_M_N) - (p_C_M_N * logits_C_M_N).sum(axis=0)
+    return scores_C_N.T, variances_C_N.T, entropy(scores_C_N.T) - entropy_M_N.mean(axis=0)
+
+
+def summarise_marginals(
+    mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int = 32
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Summarise draws mean + deviation · normal of independent latents, as :func:`summarise_draws` does.
+
+    All N points share the M·C numbers, so a point's result does not depend on the others. Blocks of points small
+    enough for the processor's cache are summarised one after the other.
+    """
+    parts = []
+    for start in range(0, max(len(mean_N_C), 1), block):
+        rows = slice(start, start + block)
+        spread_C_M_N = normal_M_C.T[:, :, None] * deviation_N_C[rows].T[:, None]
+        parts.append(summarise_draws(np.moveaxis(mean_N_C[rows].T[:, None] + spread_C_M_N, 0, -1)))
+    scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
     return scores_N_C, variances_N_C, bald_N

@@ -6,6 +6,7 @@ import os
 import sys
 from pathlib import Path
 
+from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry, require_settings
@@ -38,6 +39,11 @@ def check(config: dict) -> dict[str, dict]:
         if design and design not in config["uncertainty"]:
             known = ", ".join(config["uncertainty"])
             raise InputError(f"config key explainers.{name}", f"no uncertainty '{design}'", f"known are {known}")
+    for strategy in config["active_learning"]["strategies"]:
+        if strategy not in (known := {**STRATEGIES, **STREAMS}):
+            raise InputError(
+                "config key active_learning.strategies", f"no strategy '{strategy}'", f"known are {', '.join(known)}"
+            )
     sources = {
         name: {"stand_in": entry["kind"] == "procedural"}
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])

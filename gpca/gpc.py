@@ -1,7 +1,8 @@
 """Multi-class Gaussian process classification by sparse variational inference (paper Sec. III-B), on gpytorch.
 
 One latent GP per concept, inducing inputs shared by all, Cholesky variational posterior, softmax likelihood
-(Hensman et al. 2015). The label space is fixed at construction, so a concept without a label yet has its GP already.
+(Hensman et al. 2015). A class of the label space without a label yet has its GP already. Learnt by gpytorch are
+kernel, inducing inputs and posterior; further labels then move the posterior alone (:mod:`gpca.latents`).
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ import torch
 from sklearn.cluster import KMeans
 from sklearn.preprocessing import StandardScaler
 
-from gpca.attribution import summarise_draws
+from gpca.attribution import summarise_marginals
 from gpca.errors import InputError
+from gpca.gp_prior import Prior
+from gpca.latents import Latents, Projection, Sites, refine
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 
@@ -63,55 +66,105 @@ class GPC:
         self.settings = settings
         self._axes = axes
 
-    def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray) -> GPC:
+    def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
         """Maximise the ELBO (variational parameters, inducing inputs, kernel parameters).
 
         Inputs are standardised, inducing inputs start at k-means centres and the lengthscale at the median distance:
         with gpytorch's default lengthscale an RBF kernel on some hundred dimensions stays at chance.
+
+        Args:
+            h_N_d, labels_N: labelled embeddings.
+            around_R_d: embeddings by which the inputs are standardised and the inducing inputs and the lengthscale
+                initialised, where those to come lie elsewhere than the labelled ones; by default the labelled ones.
         """
-        self._scaler = StandardScaler().fit(h_N_d)
+        around_R_d = h_N_d if around_R_d is None else around_R_d
+        self._scaler = StandardScaler().fit(around_R_d)
+        around_R_d = self._scaled(around_R_d)
         inputs_N_d = self._scaled(h_N_d)
-        targets_N = torch.tensor([self.classes.index(label) for label in labels_N])
+        targets_N = self._targets(labels_N)
         with _torch_seed(*self._axes, "gpc"):
-            self._model = _LatentGPs(_inducing_inputs(inputs_N_d, self.settings, self._axes), len(self.classes))
-            self._model.initialise(KERNELS[self.settings.kernel], _median_distance(inputs_N_d, self._axes))
+            model = _LatentGPs(_inducing_inputs(around_R_d, self.settings, self._axes), len(self.classes))
+            model.initialise(KERNELS[self.settings.kernel], _median_distance(around_R_d, self._axes))
             likelihood = _Softmax(num_classes=len(self.classes), mixing_weights=False)
-            elbo = gpytorch.mlls.VariationalELBO(likelihood, self._model, num_data=len(targets_N))
-            optimiser = torch.optim.Adam(self._model.parameters(), lr=self.settings.learning_rate)
-            self._model.train()
+            elbo = gpytorch.mlls.VariationalELBO(likelihood, model, num_data=len(targets_N))
+            optimiser = torch.optim.Adam(model.parameters(), lr=self.settings.learning_rate)
+            model.train()
             for _ in progress(range(self.settings.iterations), " ".join(map(str, ("GPC", *self._axes)))):
                 optimiser.zero_grad()
-                loss = -elbo(self._model(inputs_N_d), targets_N)
+                loss = -elbo(model(inputs_N_d), torch.from_numpy(targets_N))
                 loss.backward()
                 optimiser.step()
-        self._model.eval()
+        self._prior = Prior.of(model.eval())
+        self._latents = model.latents()
+        self._labelled, self._targets_N, self._sites = self.project(h_N_d), targets_N, None
         return self
 
-    def posterior(self, h_N_d: np.ndarray, block: int = 256) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and standard deviation (N, C) of the latent logits q(f(h)); the latents are independent."""
-        inputs_N_d = self._scaled(h_N_d)
-        means, deviations = [], []
-        with torch.no_grad():
-            for rows in torch.split(inputs_N_d, block):
-                q = self._model(rows)
-                means.append(q.mean)
-                deviations.append(q.variance.clamp_min(0).sqrt())
-        return torch.cat(means).double().numpy(), torch.cat(deviations).double().numpy()
+    def update(
+        self, h_L_d: np.ndarray | Projection, labels_L: np.ndarray, iterations: int = 100, tolerance: float = 1e-3
+    ) -> int:
+        """Learn further labels at fixed kernel and inducing inputs; those of before count as much as ever.
 
-    def attribute(self, h_N_d: np.ndarray, block: int = 128) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        Args:
+            h_L_d: their embeddings, or what :meth:`project` returned for them.
+            labels_L: classes of the label space.
+            iterations, tolerance: see :func:`gpca.latents.refine`.
+
+        Returns:
+            the number of iterations, each a pass over all labels.
+        """
+        self._labelled = self._labelled.followed_by(self.project(h_L_d))
+        self._targets_N = np.concatenate([self._targets_N, self._targets(labels_L)])
+        return self.refine(iterations, tolerance)
+
+    def refine(self, iterations: int = 100, tolerance: float = 1e-3, cold: bool = False) -> int:
+        """Move the posterior to the best one for the labels, kernel and inducing inputs; see :meth:`update`.
+
+        It starts from the posterior of the call before, or from the prior where there was none or when `cold`.
+        """
+        sites = Sites.silent(0, 0) if cold or self._sites is None else self._sites
+        sites = sites.extended(len(self._targets_N), len(self.classes))
+        self._sites, self._latents, done = refine(self._labelled, self._targets_N, sites, iterations, tolerance)
+        return done
+
+    def level(self) -> None:
+        """Give classes without a label the mean kernel of the others, and refit the posterior."""
+        known_C = np.isin(np.arange(len(self.classes)), self._targets_N)
+        self._set_prior(self._prior.levelled(known_C))
+
+    def grow(self, name: str) -> None:
+        """Add a class that the label space never had; its kernel is the geometric mean of the others'.
+
+        The other classes keep kernels, labels and posterior; the new one learns what it is not.
+        """
+        if not name or name in self.classes:
+            raise InputError(f"concept '{name}'", "is empty or known already", f"known are {', '.join(self.classes)}")
+        self.classes = (*self.classes, name)
+        self._set_prior(self._prior.grown())
+
+    def _set_prior(self, prior: Prior) -> None:
+        self._prior = prior
+        self._labelled = prior.project(torch.from_numpy(self._labelled.inputs_N_d))
+        self.refine()
+
+    def project(self, h_N_d: np.ndarray | Projection) -> Projection:
+        """Return what the kernel says of the embeddings, to be computed once where they are asked about repeatedly."""
+        return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
+
+    def posterior(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and standard deviation (N, C) of the latent logits q(f(h)); the latents are independent."""
+        return self._latents.marginals(self.project(h_N_d))
+
+    def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
 
         All points share the same M·C standard normal numbers, so a point's result does not depend on the others;
         per-point marginals suffice, because none of the three uses correlations between points.
         """
-        mean_N_C, deviation_N_C = self.posterior(h_N_d)
-        normal_M_1_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, 1, len(self.classes)))
-        parts = [
-            summarise_draws(mean + deviation * normal_M_1_C)
-            for mean, deviation in zip(_blocks(mean_N_C, block), _blocks(deviation_N_C, block), strict=True)
-        ]
-        scores, variances, bald = (np.concatenate(part) for part in zip(*parts, strict=True))
-        return scores, variances, bald
+        normal_M_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
+        return summarise_marginals(*self.posterior(h_N_d), normal_M_C)
+
+    def _targets(self, labels_N: np.ndarray) -> np.ndarray:
+        return np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
 
     def _scaled(self, h_N_d: np.ndarray) -> torch.Tensor:
         return torch.from_numpy(self._scaler.transform(h_N_d).astype(np.float32))
@@ -147,6 +200,12 @@ class _LatentGPs(gpytorch.models.ApproximateGP):
         """Return the prior over the latents at the inputs."""
         return gpytorch.distributions.MultivariateNormal(self.mean_module(inputs), self.covar_module(inputs))
 
+    def latents(self) -> Latents:
+        """Return the whitened variational posterior."""
+        q = self.variational_strategy.base_variational_strategy._variational_distribution()
+        with torch.no_grad():
+            return Latents(q.mean.double().numpy(), q.covariance_matrix.double().numpy())
+
 
 def _inducing_inputs(inputs_N_d: torch.Tensor, settings: GPCSettings, axes: tuple) -> torch.Tensor:
     clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
@@ -159,10 +218,6 @@ def _median_distance(inputs_N_d: torch.Tensor, axes: tuple, most: int = 1000) ->
     order = generator(*axes, "median").permutation(len(inputs_N_d))[:most]
     median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
     return median if median > 0 else 1.0
-
-
-def _blocks(rows: np.ndarray, size: int) -> list[np.ndarray]:
-    return [rows[start : start + size] for start in range(0, len(rows), size)]
 
 
 @contextmanager

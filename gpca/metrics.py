@@ -113,10 +113,14 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
         InputError: no files, a name of another form, a file that :func:`read_predictions` or :func:`read_causal`
             refuses or that has no test rows, a test sample that the causal file of its source and seed lacks.
     """
-    causal = {(source, seed): (path, read_causal(path)) for path in causal_files for source, _, seed in [_key(path)]}
+    causal = {
+        (source, seed): (path, read_causal(path))
+        for path in causal_files
+        for source, _, seed in [source_method_seed(path)]
+    }
     records = []
     for path in prediction_files:
-        source, method, seed = _key(path)
+        source, method, seed = source_method_seed(path)
         rows = read_predictions(path)
         test = rows[rows["split"] == "test"]
         if test.empty:
@@ -126,7 +130,7 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
             metrics |= _causal_metrics(path, test, *causal[source, seed])
         for metric, of_concept in metrics.items():
             records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
-    return _tidy(records, "predictions")
+    return tidy(records, "predictions")
 
 
 def _attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, dict[str, float]]:
@@ -177,7 +181,7 @@ def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
     """
     records = []
     for path in timing_files:
-        source, method, seed = _key(path)
+        source, method, seed = source_method_seed(path)
         rows = read_csv(path, TIMING_COLUMNS)
         test = rows[rows["split"] == "test"]
         if test.empty:
@@ -185,7 +189,7 @@ def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
         for column in ("seconds", "icp_seconds"):
             mean = float(numbers(path, test, column).mean())
             records.append(("runtime", source, method, f"{column}_per_sample", ALL, seed, mean))
-    return _tidy(records, "timings")
+    return tidy(records, "timings")
 
 
 def read_metrics(path: str | Path) -> pd.DataFrame:
@@ -208,7 +212,7 @@ def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
         metrics.to_csv(partial, index=False, lineterminator="\n")
 
 
-def _key(path: str | Path) -> tuple[str, str, int]:
+def source_method_seed(path: str | Path) -> tuple[str, str, int]:
     parts = Path(path).with_suffix("").parts
     seed = parts[-1].removeprefix("seed") if parts else ""
     if len(parts) < 3 or not parts[-1].startswith("seed") or not seed.isdecimal():
@@ -216,7 +220,7 @@ def _key(path: str | Path) -> tuple[str, str, int]:
     return parts[-3], parts[-2], int(seed)
 
 
-def _tidy(records: list[tuple], name: str) -> pd.DataFrame:
+def tidy(records: list[tuple], name: str) -> pd.DataFrame:
     import pandas as pd
 
     if not records:

@@ -73,6 +73,8 @@ FAULTS = [
     ("explainers.gpca.iteratons", 3, "explainers.gpca.iteratons: unknown; did you mean iterations?"),
     ("sources.ycb.famly", "ycb", "sources.ycb.famly: unknown; did you mean family?"),
     ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
+    ("active_learning.stream.widow", 3, "active_learning.stream.widow: unknown; did you mean window?"),
+    ("active_learning.strategies", ["bold"], "active_learning.strategies: no strategy 'bold'; known are random, "),
     # missing keys
     ("seeds", MISSING, "'seeds' is a required property"),
     ("registrations.icp", MISSING, "registrations: 'icp' is a required property"),
@@ -89,6 +91,9 @@ FAULTS = [
     ("explainers.gpca", [1], "explainers.gpca: [1] is not of type 'object', 'null'"),
     ("seeds", 3, "seeds: 3 is not of type 'array'"),
     # out of range
+    ("active_learning.target", 1.5, "active_learning.target: 1.5 is greater than the maximum of 1"),
+    ("active_learning.held_out", ["weather"], "active_learning.held_out.0: 'weather' is not one of"),
+    ("active_learning.rare_share", 1, "active_learning.rare_share: 1 is "),
     ("registrations.severities.crop", [0.2, 0.99], "registrations.severities.crop.1: 0.99 is greater than the maximum"),
     ("registrations.severities.crop", [0.2], "registrations.severities.crop: [0.2] is too short"),
     ("registrations.severities.noise", [NAN, 0.2], "registrations.severities.noise.0: nan is not of type 'number'"),

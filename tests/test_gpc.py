@@ -59,11 +59,6 @@ def test_a_result_does_not_depend_on_the_other_samples(gpc, rows):
         assert np.abs(whole[rows] - part).max() < 1e-6
 
 
-def test_the_block_size_changes_nothing(gpc):
-    for one, other in zip(gpc.attribute(H_TEST, block=128), gpc.attribute(H_TEST, block=7), strict=True):
-        assert np.array_equal(one, other)
-
-
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0]])
 def test_one_labelled_sample_of_each_class_is_enough_to_tell_them_apart(order):
     # As many samples as classes: gpytorch's own likelihood would read them transposed.

@@ -60,11 +60,16 @@ def save_figure(figure, pdf_path: str | Path, png_path: str | Path) -> None:
 
     Neither file holds a date or a program version, so that drawing the same data again changes no byte.
     """
-    import matplotlib.pyplot as plt
-
     undated_pdf = {"CreationDate": None, "ModDate": None, "Producer": None, "Creator": None}
     with whole_file(pdf_path) as partial:
         figure.savefig(partial, format="pdf", metadata=undated_pdf)
+    save_png(figure, png_path)
+
+
+def save_png(figure, png_path: str | Path, dpi: int = 300) -> None:
+    """Write `figure` as PNG alone, then close it."""
+    import matplotlib.pyplot as plt
+
     with whole_file(png_path) as partial:
-        figure.savefig(partial, format="png", dpi=300, metadata={"Software": None})
+        figure.savefig(partial, format="png", dpi=dpi, metadata={"Software": None})
     plt.close(figure)

@@ -16,30 +16,36 @@ _COLUMN_CHARACTERS, _TEXT_CHARACTERS = 50, 100  # that fill one column and both 
 
 @dataclass(frozen=True)
 class Cell:
-    """Mean over `seeds` repeats, the half-width of its 95 % t-interval (NaN for one seed), test samples in all."""
+    """Mean over `seeds` repeats, the half-width of its 95 % t-interval (NaN for one seed), test samples in all.
+
+    A mean that is `at_least` so large, since some repeats were stopped before they were done, has no interval.
+    """
 
     mean: float
     half_width: float
     seeds: int
     test_samples: int
+    at_least: bool = False
 
 
 @dataclass(frozen=True)
 class Column:
     """How one quantity is shown: title, digits after the point, with ± or without.
 
-    `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them.
+    `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them. Of some
+    quantities, as the labels that were needed, the least is best.
     """
 
     title: str
     decimals: int = 1
     interval: bool = True
     limits: tuple[float, float] = (0.0, 100.0)
+    least_is_best: bool = False
 
     def text(self, cell: Cell) -> str:
-        """Return e.g. ``97.7 ± 0.4``."""
-        if not self.interval:
-            return f"{cell.mean:.{self.decimals}f}"
+        """Return e.g. ``97.7 ± 0.4``, or ``> 52.0``."""
+        if not self.interval or cell.at_least:
+            return f"{'> ' * cell.at_least}{cell.mean:.{self.decimals}f}"
         half_width = EMPTY if math.isnan(cell.half_width) else f"{cell.half_width:.{self.decimals}f}"
         return f"{cell.mean:.{self.decimals}f} ± {half_width}"
 
@@ -57,7 +63,7 @@ class Table:
         columns: key -> :class:`Column`, in order.
         cells: (row number, column key) -> cell; a missing one is drawn as a dash.
         footnotes: what a reader needs to know to judge the numbers.
-        compared: groups of such keys; within each, the largest printed mean is set in bold.
+        compared: groups of such keys; within each, the best printed mean is set in bold.
     """
 
     name: str
@@ -71,14 +77,16 @@ class Table:
     compared: tuple[Sequence[tuple[int, str]], ...] = ()
 
     def best(self) -> set[tuple[int, str]]:
-        """Return the keys of the cells with the largest printed mean of their group; none of a group of one."""
+        """Return the keys of the cells with the best printed mean of their group; none of a group of one."""
         best: set[tuple[int, str]] = set()
         for group in self.compared:
+            cells = {key: self.cells[key] for key in group if key in self.cells}
             printed = {
-                key: round(self.cells[key].mean, self.columns[key[1]].decimals) for key in group if key in self.cells
+                key: round(cell.mean, self.columns[key[1]].decimals) for key, cell in cells.items() if not cell.at_least
             }
-            if len(printed) > 1:
-                best |= {key for key, mean in printed.items() if mean == max(printed.values())}
+            if printed and len(cells) > 1:
+                choose = min if self.columns[next(iter(printed))[1]].least_is_best else max
+                best |= {key for key, mean in printed.items() if mean == choose(printed.values())}
         return best
 
     def write(self, csv_path: str | Path, md_path: str | Path, tex_path: str | Path) -> None:
@@ -91,7 +99,7 @@ class Table:
 
     def records(self) -> list[tuple]:
         """Return the CSV's rows, head first: one row per cell, in its column's unit, `n_test` over all seeds."""
-        heads = (*self.row_heads, self.column_head, "mean", "ci_low", "ci_high", "n_seeds", "n_test")
+        heads = (*self.row_heads, self.column_head, "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
         records: list[tuple] = [heads]
         for row, labels in enumerate(self.rows):
             for name, column in self.columns.items():
@@ -100,11 +108,12 @@ class Table:
                     continue
                 least, most = column.limits
                 low, high = (
-                    "" if math.isnan(cell.half_width) else round(min(max(bound, least), most), 6)
+                    "" if cell.at_least or math.isnan(cell.half_width) else round(min(max(bound, least), most), 6)
                     for bound in (cell.mean - cell.half_width, cell.mean + cell.half_width)
                 )
                 keys = (key for key, _ in labels)
-                records.append((*keys, name, round(cell.mean, 6), low, high, cell.seeds, cell.test_samples))
+                counts = (cell.seeds, cell.test_samples, cell.at_least)
+                records.append((*keys, name, round(cell.mean, 6), low, high, *counts))
         return records
 
     def markdown(self) -> str:

@@ -83,7 +83,7 @@ def test_one_seed_has_no_interval():
     table = table1_single_baselines(tidy({("ycb", "gpca", "all"): [0.5]}), REAL, EXPLAINERS)
     assert "50.0 ± –" in table.markdown()
     assert "Mean over 1 seed, 200 test samples each" in table.markdown()
-    assert table.records()[1] == ("ycb", "gpca", 50.0, "", "", 1, 200)
+    assert table.records()[1] == ("ycb", "gpca", 50.0, "", "", 1, 200, False)
 
 
 def test_different_numbers_of_seeds_are_told():
@@ -200,12 +200,12 @@ def test_extended_sets_the_best_rival_in_bold_and_never_an_oracle(everything):
 
 def test_extended_csv_is_one_line_per_number(everything):
     records = table1_extended(everything, REAL, EXPLAINERS).records()
-    assert records[0] == ("source", "explainer", "metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test")
+    assert records[0] == ("source", "explainer", "metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
     assert len(records) == 1 + 4 * 8
-    assert ("ycb", "gpca", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 2, 400) in records
-    assert ("ycb", "shap_additive", "causal_accuracy", 50.0, 50.0, 50.0, 2, 42) in records
-    assert ("ycb", "shap_additive", "accuracy", 35.0, 0.0, 98.531024, 2, 120) in records
-    assert ("ycb", "gpca", "icp_calls", 0.0, 0.0, 0.0, 2, 400) in records
+    assert ("ycb", "gpca", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 2, 400, False) in records
+    assert ("ycb", "shap_additive", "causal_accuracy", 50.0, 50.0, 50.0, 2, 42, False) in records
+    assert ("ycb", "shap_additive", "accuracy", 35.0, 0.0, 98.531024, 2, 120, False) in records
+    assert ("ycb", "gpca", "icp_calls", 0.0, 0.0, 0.0, 2, 400, False) in records
 
 
 def test_extended_leaves_out_what_was_not_measured(everything):

@@ -22,7 +22,14 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, config, ru
     assert planned.jobs["registrations"] == planned.jobs["encoder"] == 3 * seeds
     assert planned.jobs["explain"] == 3 * 19
     assert planned.jobs["uncertainty"] == 3 * 6
-    for name in ("metrics.csv", "timings.csv", "tables/table1_single_baselines.md", "tables/table2_per_concept.tex"):
+    assert planned.jobs["embeddings_without"] == planned.jobs["active_learning"] == 3 * seeds
+    for name in (
+        "metrics.csv",
+        "timings.csv",
+        "tables/table1_single_baselines.md",
+        "tables/table2_per_concept.tex",
+        "tables/table3_stream.csv",
+    ):
         assert f"results/{run}/{name}" in planned.outputs
     assert {f"results/{run}/figures/{name}.png" for name in ("fig3_concepts", "objects_ycb")} <= planned.outputs
     assert all(path.startswith(f"results/{run}/") for path in planned.outputs)

@@ -4,6 +4,7 @@ import pytest
 
 SMOKE = ("all", "--configfile", "config/smoke.yaml")
 COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
+LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
 # Explainers times three sources: those with a GPC, those on embeddings, those on uncertainties, all.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 3 * explainers} for explainers in (4, 4, 13))
 
@@ -26,26 +27,39 @@ def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project)
     assert not [path for path in table1.outputs if "lazy" in path or "removal" in path or "figures" in path]
 
 
+def test_table3_needs_no_uncertainty_and_no_explainer(project):
+    planned = project.dry_run("results/smoke/tables/table3_active_learning.md", "--configfile", "config/smoke.yaml")
+    assert planned.jobs == {
+        "objects": 3, "registrations": 6, "encoder": 6, "embeddings": 6, "embeddings_without": 6, "active_learning": 6,
+        "active_learning_metrics": 1, "learning_table": 1,
+    }  # fmt: skip
+
+
 def test_a_finished_run_has_nothing_to_do(finished):
     assert not finished.dry_run(*SMOKE).jobs
     assert not finished.dry_run("smoke").jobs
 
 
 EDITS = {
-    "gpca/gpc.py": WITH_GPC | COLLECTORS,
+    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED,
+    "gpca/acquisition.py": {"active_learning": 6} | LEARNED,
+    "gpca/stream.py": {"active_learning": 6} | LEARNED,
+    "gpca/reporting/learning_figure.py": {"active_learning_curves": 1},
     # Not Table II: it shows GP-CA alone.
     "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2},
     "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
     "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1},
-    "gpca/reporting/tables.py": {"table": 3},
+    "gpca/reporting/tables.py": {"table": 3, "learning_table": 3},
     "gpca/reporting/confusions_figure.py": {"fig_attribution_confusions": 1},
-    "gpca/encoders/dgcnn.py": {"encoder": 6, "embeddings": 6} | ON_EMBEDDINGS | COLLECTORS,
+    "gpca/encoders/dgcnn.py": {
+        "encoder": 6, "embeddings": 6, "embeddings_without": 6, "active_learning": 6,
+    } | ON_EMBEDDINGS | COLLECTORS | LEARNED,
     "gpca/objects/bop.py": {},
     "gpca/objects/shapes/cups.py": {
         "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
-        "objects_figure": 1, "fig3_concepts": 1,
-    } | COLLECTORS,
+        "objects_figure": 1, "fig3_concepts": 1, "embeddings_without": 2, "active_learning": 2,
+    } | COLLECTORS | LEARNED,
 }  # fmt: skip
 
 

@@ -2,14 +2,23 @@ import json
 import shlex
 from pathlib import Path
 
+from gpca.acquisition import STRATEGIES as ACQUISITION, STREAMS
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
+from gpca.reporting.learning_tables import LEARNING_TABLES
 from gpca.reporting.tables import GPCA, TABLE1, title_of
 
 SEEDS = config["seeds"]
+EMBEDDING = f"{config['embedding']['encoder']}/{config['embedding']['reduction']}"
+STRATEGIES = config["active_learning"]["strategies"]
+POOL_STRATEGIES = [name for name in STRATEGIES if name in ACQUISITION]
+STRATEGY_TITLES = {
+    name: ACQUISITION[name].title if name in ACQUISITION else STREAMS[name]
+    for name in STRATEGIES
+}
 
 # A kind of source of its own: a rule file that writes results/{run}/objects/<name>.npz and adds itself to SOURCES.
 CONFIGURED_SOURCES = list(SOURCES)
@@ -54,12 +63,14 @@ def data_option(wildcards):
     return f"{option} {shlex.quote(config[key])}" if key and config[key] else ""
 
 
-def encoder_code(step):
-    def files(wildcards):
-        backbone = config["encoders"][wildcards.backbone]["backbone"]
-        return code_files(f"gpca.steps.{step}", ENCODERS[backbone].split(":")[0])
+def encoder_module(encoder):
+    return ENCODERS[config["encoders"][encoder]["backbone"]].split(":")[0]
 
-    return files
+
+def encoder_code(step):
+    return lambda wildcards: code_files(
+        f"gpca.steps.{step}", encoder_module(wildcards.backbone)
+    )
 
 
 def explainer_inputs(wildcards):
@@ -72,9 +83,8 @@ def explainer_inputs(wildcards):
         "timings": f"results/{place.format('timings')}/{encoder if embedded else 'icp'}/seed{{seed}}.csv"
     }
     if embedded:
-        folder = f"{encoder}/{config['embedding']['reduction']}"
         inputs["embeddings"] = (
-            f"results/{place.format('embeddings')}/{folder}/seed{{seed}}.npz"
+            f"results/{place.format('embeddings')}/{EMBEDDING}/seed{{seed}}.npz"
         )
     if entry.design:
         inputs["uncertainty"] = (
@@ -99,11 +109,26 @@ def attached_options(wildcards, input):
     ]
 
 
+SHOWN_SOURCES = {
+    name: {"title": entry["title"], "stand_in": entry["stand_in"]}
+    for name, entry in SOURCES.items()
+}
+
+
 def of_all_explainers(kind, explainers=config["explainers"]):
     return collect(
         f"results/{{{{run}}}}/{kind}/{{source}}/{{explainer}}/seed{{seed}}.csv",
         source=SOURCES,
         explainer=explainers,
+        seed=SEEDS,
+    )
+
+
+def learning_curves(strategies):
+    return collect(
+        "results/{{run}}/active_learning/{source}/{strategy}/seed{seed}.csv",
+        source=SOURCES,
+        strategy=strategies,
         seed=SEEDS,
     )
 
@@ -134,10 +159,11 @@ def table_inputs(wildcards):
 FIGURES = [
     "fig3_concepts",
     "fig_attribution_confusions",
+    "active_learning_curves",
     *(f"objects_{source}" for source in SOURCES),
 ]
 RESULTS = [
-    *("metrics.csv", "timings.csv"),
-    *(f"tables/{table}.md" for table in TABLE_EXPLAINERS),
+    *("metrics.csv", "timings.csv", "active_learning.csv"),
+    *(f"tables/{table}.md" for table in (*TABLE_EXPLAINERS, *LEARNING_TABLES)),
     *(f"figures/{figure}.png" for figure in FIGURES),
 ]

@@ -25,10 +25,7 @@ rule table:
         mem_mb=1000,
         runtime=10,
     params:
-        sources={
-            name: {"title": entry["title"], "stand_in": entry["stand_in"]}
-            for name, entry in SOURCES.items()
-        },
+        sources=SHOWN_SOURCES,
         explainers=lambda wildcards: {
             name: {"title": entry.title, "oracle": entry.oracle}
             for name in TABLE_EXPLAINERS[wildcards.table]

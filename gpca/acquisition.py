@@ -1,0 +1,195 @@
+"""Which samples of a pool are worth a label: one function per strategy, found by name (paper Sec. III-C).
+
+A strategy gets the pool, the batch size B and a random generator, and returns rows of the pool, best first. Entropy,
+margin, BADGE, CoreSet and TypiClust are scikit-activeml's; BALD needs no ensemble here, the GP's posterior is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.errors import InputError
+
+EXPANSION = 4  # K: BALD with k-means clusters the K·B most uncertain samples
+
+
+@dataclass(frozen=True)
+class Pool:
+    """N samples without a label, and what the classifier makes of them.
+
+    Attributes:
+        h_N_d: embeddings, standardised.
+        scores_N_C, bald_N: mean class probabilities (Eq. 4) and BALD in nats (Eq. 7).
+        h_labelled_L_d: embeddings of the samples with a label.
+        truth_N: the true classes, for strategies that are an upper bound.
+    """
+
+    h_N_d: np.ndarray
+    scores_N_C: np.ndarray
+    bald_N: np.ndarray
+    h_labelled_L_d: np.ndarray
+    truth_N: np.ndarray
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """A strategy by name.
+
+    Attributes:
+        title: as tables and figures name it.
+        choose: called with pool, batch size and generator; may return fewer rows, or one twice.
+        oracle: it is told the truth about the pool.
+        needs_scores: it reads what the classifier makes of the pool.
+    """
+
+    title: str
+    choose: Callable[[Pool, int, np.random.Generator], np.ndarray]
+    oracle: bool = False
+    needs_scores: bool = True
+
+
+def require_strategy(name: str) -> Strategy:
+    """Return the strategy of that name; an unknown one raises an InputError that lists the known."""
+    if name not in STRATEGIES:
+        raise InputError(f"strategy '{name}'", "unknown", f"known are {', '.join(STRATEGIES)}")
+    return STRATEGIES[name]
+
+
+def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Return `batch` different rows of the pool, all where it has no more.
+
+    Where a strategy names too few, as some do among identical embeddings, the rest is drawn at random.
+    """
+    wanted = min(batch, len(pool.h_N_d))
+    if wanted == len(pool.h_N_d):
+        return np.arange(wanted)
+    chosen = np.array(list(dict.fromkeys(map(int, require_strategy(name).choose(pool, wanted, random)))), dtype=int)
+    others = np.setdiff1d(np.arange(len(pool.h_N_d)), chosen)
+    return np.concatenate([chosen, random.permutation(others)])[:wanted]
+
+
+def top(values_N: np.ndarray, n: int) -> np.ndarray:
+    """Return the rows of the n largest values, largest first, the first of equals."""
+    return np.argsort(-values_N, kind="stable")[:n]
+
+
+def random_rows(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Draw without looking."""
+    return random.permutation(len(pool.h_N_d))[:batch]
+
+
+def random_stratified(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Draw as many of each true class as can be: what random drawing does with luck."""
+    order = random.permutation(len(pool.h_N_d))
+    place_N = np.empty(len(order))  # of each row within its class, in random order
+    for name in np.unique(pool.truth_N):
+        of_class = order[pool.truth_N[order] == name]
+        place_N[of_class] = np.arange(len(of_class))
+    tie_N = random.permutation(len(order))
+    return np.lexsort([tie_N, place_N])[:batch]
+
+
+def entropy(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
+    """Take the largest predictive entropies H[ŝ]."""
+    from skactiveml.pool import uncertainty_scores
+
+    return top(uncertainty_scores(pool.scores_N_C, method="entropy"), batch)
+
+
+def margin(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
+    """Take the smallest differences of the two largest scores."""
+    from skactiveml.pool import uncertainty_scores
+
+    return top(uncertainty_scores(pool.scores_N_C, method="margin_sampling"), batch)
+
+
+def bald(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
+    """Take the largest BALD (Houlsby et al. 2011)."""
+    return top(pool.bald_N, batch)
+
+
+def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Cluster the B·K largest BALD into B clusters and take the sample nearest to each centroid (the paper).
+
+    Distances to all centroids are settled from the smallest on, so that no sample stands for two clusters.
+    """
+    from sklearn.cluster import KMeans  # here, because the workflow imports this file only for the names
+
+    candidates = top(pool.bald_N, batch * EXPANSION)
+    h_n_d = pool.h_N_d[candidates]
+    clusters = min(batch, len(np.unique(h_n_d, axis=0)))
+    kmeans = KMeans(clusters, n_init=1, random_state=int(random.integers(2**31))).fit(h_n_d)
+    distances_n_B = kmeans.transform(h_n_d)
+    chosen: dict[int, int] = {}
+    for flat in np.argsort(distances_n_B, axis=None, kind="stable"):
+        row, cluster = divmod(int(flat), clusters)
+        if cluster not in chosen and row not in chosen.values():
+            chosen[cluster] = row
+    return candidates[sorted(chosen.values())]
+
+
+def bald_stochastic(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Draw without replacement with probability proportional to BALD: PowerBALD (Kirsch et al. 2023), β = 1.
+
+    By the Gumbel-top-k trick; as good as BatchBALD in their comparison, without its joint entropies.
+    """
+    return top(np.log(np.maximum(pool.bald_N, 1e-12)) + random.gumbel(size=len(pool.bald_N)), batch)
+
+
+def badge(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """k-means++ over the gradients of the last layer for the predicted label (Ash et al. 2020)."""
+    from skactiveml.base import SkactivemlClassifier
+    from skactiveml.pool import Badge
+
+    class Scored(SkactivemlClassifier):  # BADGE asks a classifier for probabilities; ours are known already
+        def fit(self, *_data):
+            return self
+
+        def predict_proba(self, _h_N_d):
+            return pool.scores_N_C
+
+    unlabelled_N = np.full(len(pool.h_N_d), np.nan)
+    strategy = Badge(random_state=int(random.integers(2**31)))
+    return strategy.query(pool.h_N_d, unlabelled_N, Scored(), fit_clf=False, batch_size=batch)
+
+
+def coreset(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Take what is farthest from everything labelled, one after the other (Sener & Savarese 2018)."""
+    from skactiveml.pool import CoreSet
+
+    return _with_labelled(CoreSet(random_state=int(random.integers(2**31))), pool, batch)
+
+
+def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Take the most typical sample of each of the largest clusters without a label (Hacohen et al. 2022)."""
+    from skactiveml.pool import TypiClust
+
+    options = {"n_init": 1, "max_iter": 20}
+    return _with_labelled(TypiClust(random_state=int(random.integers(2**31)), cluster_algo_dict=options), pool, batch)
+
+
+def _with_labelled(strategy, pool: Pool, batch: int) -> np.ndarray:
+    """Query a strategy that looks at where the labelled samples lie, not at what their labels are."""
+    labels = np.concatenate([np.full(len(pool.h_N_d), np.nan), np.zeros(len(pool.h_labelled_L_d))])
+    return strategy.query(np.concatenate([pool.h_N_d, pool.h_labelled_L_d]), labels, batch_size=batch)
+
+
+STRATEGIES = {
+    "random": Strategy("Random", random_rows, needs_scores=False),
+    "random_stratified": Strategy(
+        "Stratified random (told the truth)", random_stratified, oracle=True, needs_scores=False
+    ),
+    "entropy": Strategy("Entropy", entropy),
+    "margin": Strategy("Margin", margin),
+    "bald": Strategy("BALD", bald),
+    "bald_kmeans": Strategy("BALD + k-means (paper)", bald_kmeans),
+    "bald_stochastic": Strategy("PowerBALD", bald_stochastic),
+    "badge": Strategy("BADGE", badge),
+    "coreset": Strategy("CoreSet", coreset, needs_scores=False),
+    "typiclust": Strategy("TypiClust", typiclust, needs_scores=False),
+}
+
+STREAMS = {"stream_random": "Stream, random", "stream_bald": "Stream, BALD over a threshold (paper)"}

@@ -1,0 +1,99 @@
+"""Step ``active_learning``: embeddings -> learning curves of every strategy, for one source and seed."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from gpca.acquisition import STRATEGIES, STREAMS
+from gpca.active_learning import ActiveLearningSettings, Task, initial_gpc, learn, make_task
+from gpca.dataset import Registrations
+from gpca.errors import InputError
+from gpca.files import load_arrays
+from gpca.gpc import GPC, GPCSettings
+from gpca.learning_metrics import POOL_COLUMNS, STREAM_COLUMNS, write_curves
+from gpca.perturbation import CONCEPTS
+from gpca.progress import progress
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.stream import StreamSettings, run_stream
+
+PAPERS = ("random", "bald_kmeans")  # the paper's two strategies, which also meet a rare concept
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is the config's section ``active_learning``."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--registrations", required=True, type=Path)
+    parser.add_argument("--embeddings", required=True, type=Path, help="of an encoder that saw every concept")
+    parser.add_argument("--embeddings-without", required=True, type=Path, help="of encoders that never saw one")
+    parser.add_argument("--strategies", required=True, nargs="+")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSV for each strategy, in their order")
+
+
+def run(options: Namespace) -> None:
+    """Run every strategy in every setting for every concept held out."""
+    torch.set_num_threads(options.threads)
+    check_settings(options.settings, "active_learning")
+    if len(options.out) != len(options.strategies):
+        raise InputError(
+            "--out", f"{len(options.out)} file(s) for {len(options.strategies)} strategies", "give one each"
+        )
+    if unknown := set(options.strategies) - {*STRATEGIES, *STREAMS}:
+        known = ", ".join((*STRATEGIES, *STREAMS))
+        raise InputError(f"strategy '{sorted(unknown)[0]}'", "unknown", f"known are {known}")
+    inputs = [options.registrations, options.embeddings, options.embeddings_without]
+    axes = (options.source, options.seed)
+    with recorded(options.out, inputs, options.settings, seed=options.seed):
+        settings, stream = settings_from(options.settings), StreamSettings(**options.settings.get("stream", {}))
+        curves: dict[str, dict] = {strategy: {} for strategy in options.strategies}
+        for setting, task, gpc in progress(_tasks(options, settings), f"active learning on {options.source}"):
+            for strategy in options.strategies:
+                if strategy in STREAMS and setting == "pretrained":
+                    curve = run_stream(task, gpc, strategy, settings, stream, *axes)
+                elif strategy in STRATEGIES and (setting != "rare" or strategy in PAPERS):
+                    labels = (
+                        options.settings.get("rare_labels", settings.labels) if setting == "rare" else settings.labels
+                    )
+                    curve = learn(task, gpc, strategy, replace(settings, labels=labels), *axes, setting)
+                else:
+                    continue
+                curves[strategy][setting, task.held_out] = curve
+        for strategy, path in zip(options.strategies, options.out, strict=True):
+            write_curves(path, curves[strategy], STREAM_COLUMNS if strategy in STREAMS else POOL_COLUMNS)
+
+
+def settings_from(given: dict) -> ActiveLearningSettings:
+    """Build from the config's section ``active_learning``, of which other parts read the rest."""
+    own = {field.name: given[field.name] for field in fields(ActiveLearningSettings) if field.name in given}
+    return ActiveLearningSettings(**own | ({"gpc": GPCSettings(**own["gpc"])} if "gpc" in own else {}))
+
+
+def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, Task, GPC]]:
+    """Yield setting, task and the GPC that knows two concepts: for each concept held out, and for a rare one."""
+    registrations = Registrations.load(options.registrations)
+    remedy = "python -m gpca without"
+    shapes = {"sample": ("S",), "split": ("S",)}
+    held_out = options.settings.get("held_out", CONCEPTS)
+    seen = load_arrays(options.embeddings, shapes | {"h": ("S", "d")}, "python -m gpca embed")
+    unseen = load_arrays(options.embeddings_without, shapes | {f"h_{c}": ("S", "d") for c in held_out}, remedy)
+    for path, arrays in ((options.embeddings, seen), (options.embeddings_without, unseen)):
+        if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in shapes):
+            raise InputError(path, "holds other samples than the registrations", "make both anew from one config")
+    rare_share = options.settings.get("rare_share")
+    chosen = [("pretrained", c, seen["h"], None) for c in held_out] + [
+        ("unseen", c, unseen[f"h_{c}"], None) for c in held_out
+    ]
+    chosen += [("rare", c, seen["h"], rare_share) for c in held_out if rare_share and c == "overlap"]
+    axes = (options.source, options.seed)
+    for setting, concept, h_S_d, share in chosen:
+        attached = replace(registrations, attached={"embedding": h_S_d})
+        task = make_task(attached, concept, settings, *axes, new_share=share)
+        gpc = initial_gpc(task, settings, *axes, setting)
+        yield setting, task.projected(gpc), gpc
