@@ -13,7 +13,7 @@ PACKAGES = ("gpca", "baselines")
 def code_files(*modules: str) -> list[str]:
     """Return the files of the given modules and of all project modules they import, anywhere in their text.
 
-    Paths are relative to the project's folder, sorted. Modules chosen by name at run time (kinds of source,
+    What is imported only for type checking never runs, so it does not count. Paths are relative to the project's folder, sorted. Modules chosen by name at run time (kinds of source,
     encoders, explainers) are not seen and have to be given.
     """
     found: set[str] = set()
@@ -29,7 +29,11 @@ def code_files(*modules: str) -> list[str]:
 @cache
 def _imports(module: str) -> tuple[str, ...]:
     names: set[str] = set()
-    for node in ast.walk(ast.parse(_file(module).read_text(encoding="utf-8"))):
+    nodes: list[ast.AST] = [ast.parse(_file(module).read_text(encoding="utf-8"))]
+    while nodes:
+        node = nodes.pop()
+        never_runs = isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+        nodes += node.orelse if never_runs else ast.iter_child_nodes(node)
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:

@@ -15,6 +15,10 @@ FILES = {
     "gpca/group/__init__.py": "from gpca.group.one import One\n",
     "gpca/group/one.py": "from baselines.rival import thing\n",
     "gpca/says_so.py": "text = 'from gpca.unrelated import x'  # import gpca.unrelated\n",
+    "gpca/typed.py": (
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from gpca.unrelated import x\n"
+        "else:\n    import gpca.base\n"
+    ),
     "baselines/__init__.py": "",
     "baselines/rival.py": "import numpy\n",
 }
@@ -40,6 +44,7 @@ def project(tmp_path, monkeypatch):
         (["gpca.cyclic"], ["gpca/__init__.py", "gpca/base.py", "gpca/cyclic.py", "gpca/late.py", "gpca/middle.py"]),
         (["gpca.group"], ["baselines/rival.py", "gpca/group/__init__.py", "gpca/group/one.py"]),
         (["gpca.says_so"], ["gpca/says_so.py"]),
+        (["gpca.typed"], ["gpca/base.py", "gpca/typed.py"]),
         (["gpca.unrelated", "gpca.base"], ["gpca/base.py", "gpca/unrelated.py"]),
     ],
 )
