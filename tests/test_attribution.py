@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gpca.attribution import Attribution, entropy, summarise_draws
+from gpca.attribution import Attribution, entropy, summarise_draws, summarise_marginals
 from gpca.perturbation import CONCEPTS
 
 
@@ -65,3 +65,39 @@ def test_the_largest_score_names_the_concept_and_ties_go_to_the_first():
 def test_entropy_is_that_of_the_normalised_scores():
     made = attribution(2, scores_N_C=np.array([[2.0, 2.0, 0.0], [5.0, 0.0, 0.0]]))
     assert made.entropy_N == pytest.approx([np.log(2), 0])
+
+
+def marginals(n, seed=0):
+    random = np.random.default_rng(seed)
+    return random.normal(scale=2, size=(n, 3)), random.uniform(0, 3, size=(n, 3)), random.normal(size=(50, 3))
+
+
+@pytest.mark.parametrize("block", [1, 7, 1000])
+def test_marginals_are_summarised_as_the_draws_they_stand_for(block):
+    mean, deviation, normal = marginals(20)
+    draws = mean + deviation * normal[:, None]
+    for of_draws, of_marginals in zip(
+        summarise_draws(draws), summarise_marginals(mean, deviation, normal, block), strict=True
+    ):
+        assert of_marginals.shape == of_draws.shape
+        assert np.abs(of_marginals - of_draws).max() < 1e-12
+
+
+@pytest.mark.parametrize("block", [1, 7, 1000])
+def test_the_block_size_changes_no_bit(block):
+    whole, parts = summarise_marginals(*marginals(20)), summarise_marginals(*marginals(20), block)
+    for one, other in zip(whole, parts, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_no_points_have_an_empty_summary():
+    shapes = [summary.shape for summary in summarise_marginals(*marginals(0))]
+    assert shapes == [(0, 3), (0, 3), (0,)]
+
+
+def test_marginals_without_deviation_have_the_softmax_of_their_mean_and_no_bald():
+    mean, deviation, normal = marginals(20)
+    scores, variances, bald = summarise_marginals(mean, 0 * deviation, normal)
+    assert scores == pytest.approx(np.exp(mean) / np.exp(mean).sum(axis=1, keepdims=True))
+    assert np.abs(variances).max() < 1e-12
+    assert np.abs(bald).max() < 1e-12

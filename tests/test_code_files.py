@@ -63,7 +63,9 @@ STEPS = {
     "objects": ({"gpca/seeds.py", "gpca/objects/source.py"}, {"gpca/rigid.py", "gpca/gpc.py", "gpca/explainer.py"}),
     "registrations": ({"gpca/rigid.py", "gpca/perturbation.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
     "train": ({"gpca/encoders/training.py", "gpca/dataset.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
-    "embed": ({"gpca/encoders/training.py", "gpca/attribution.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
+    "embed": ({"gpca/encoders/training.py", "gpca/predictions.py"}, {"gpca/gpc.py", "gpca/attribution.py"}),
+    "without": ({"gpca/encoders/training.py"}, {"gpca/gpc.py", "gpca/acquisition.py"}),
+    "active_learning": ({"gpca/latents.py", "gpca/stream.py"}, {"gpca/explainer.py", "gpca/encoders/training.py"}),
     "uncertainty": ({"gpca/icp_kernels.py", "gpca/designs.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
     "explain": (
         {"gpca/explainer.py", "gpca/attribution.py"},
