@@ -6,54 +6,15 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gpca.learning_curves import read_curves
 from gpca.metrics import source_method_seed, tidy
-from gpca.predictions import numbers, read_csv, write_csv
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TABLE = "active_learning/"  # and the setting: what `table` of the tidy rows reads
-POOL_COLUMNS = ("setting", "held_out", "labels", "new_labels", "accuracy", "accuracy_new", "epochs")
-STREAM_COLUMNS = (
-    "setting",
-    "held_out",
-    "arrived",
-    "present",
-    "labels",
-    "new_labels",
-    "running",
-    "accuracy",
-    "accuracy_new",
-)
 RANDOM = "random"  # the strategy that the others are compared with, seed by seed
 RECOGNISED = 0.5  # share of a new concept's test samples named right, from which on it counts as recognised
-
-
-def write_curves(
-    path: str | Path, curves: dict[tuple[str, str], list[dict[str, float]]], columns: Iterable[str]
-) -> None:
-    """Write the curves of one source, strategy and seed, keyed by setting and concept held out."""
-    import pandas as pd
-
-    rows = [
-        {"setting": setting, "held_out": held_out, **step}
-        for (setting, held_out), steps in curves.items()
-        for step in steps
-    ]
-    write_csv(path, pd.DataFrame(rows)[list(columns)])
-
-
-def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
-    """Read what :func:`write_curves` wrote; all columns but the first two are numbers.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, something that is not a finite number.
-    """
-    rows = read_csv(path, ("setting", "held_out", "labels", "accuracy", "accuracy_new"))
-    for column in rows.columns[2:]:
-        # Before the first arrival there is no running accuracy; without test samples of a concept, none of it.
-        rows[column] = numbers(path, rows, column, rows[column] != "")
-    return {key: part.reset_index(drop=True) for key, part in rows.groupby(["setting", "held_out"], sort=False)}
 
 
 def collect_curves(files: Iterable[str | Path], target: float) -> pd.DataFrame:

@@ -186,3 +186,14 @@ def test_a_run_without_uncertainty_is_one_line_and_status_2(run_with_uncertainty
     (run_with_uncertainty / "uncertainty" / "tiny" / "causal" / "seed1.npz").unlink()
     assert floor.main([str(run_with_uncertainty)]) == 2
     assert "causal/seed1.npz: no such file" in capsys.readouterr().err
+
+
+def test_active_learning_compares_equal_bald_and_ends_with_its_numbers(capsys):
+    from benchmarks import active_learning
+
+    active_learning.main(["--pool", "30", "--labels", "12", "--draws", "20", "--repeats", "1"])
+    out = capsys.readouterr().out
+    result = last_line(out)
+    assert list(result) == ["bald_speedup", "select_ms", "retrain_s", "max_abs_error"]
+    assert result["max_abs_error"] < 1e-9
+    assert "BALD of 30 embeddings, 20 draws" in out

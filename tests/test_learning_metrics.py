@@ -4,16 +4,8 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.learning_metrics import (
-    POOL_COLUMNS,
-    STREAM_COLUMNS,
-    area_under_curve,
-    collect_curves,
-    pool_metrics,
-    read_curves,
-    stream_metrics,
-    write_curves,
-)
+from gpca.learning_curves import POOL_COLUMNS, STREAM_COLUMNS, read_curves, write_curves
+from gpca.learning_metrics import area_under_curve, collect_curves, pool_metrics, stream_metrics
 
 
 def pool_curve(*accuracies, batch=4):

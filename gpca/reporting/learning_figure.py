@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.learning_metrics import read_curves
+from gpca.learning_curves import read_curves
 from gpca.metrics import mean_interval, source_method_seed
 from gpca.reporting.style import (
     BLACK,

@@ -16,7 +16,7 @@ from gpca.dataset import Registrations
 from gpca.errors import InputError
 from gpca.files import load_arrays
 from gpca.gpc import GPC, GPCSettings
-from gpca.learning_metrics import POOL_COLUMNS, STREAM_COLUMNS, write_curves
+from gpca.learning_curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import recorded

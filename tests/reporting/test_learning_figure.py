@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.learning_metrics import POOL_COLUMNS, write_curves
+from gpca.learning_curves import POOL_COLUMNS, write_curves
 from gpca.reporting.learning_figure import draw_learning_curves, mean_curves
 from gpca.reporting.query_figure import draw_query
 
