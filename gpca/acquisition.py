@@ -168,7 +168,11 @@ def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray
     from skactiveml.pool import TypiClust
 
     options = {"n_init": 1, "max_iter": 20}
-    return _with_labelled(TypiClust(random_state=int(random.integers(2**31)), cluster_algo_dict=options), pool, batch)
+    strategy = TypiClust(random_state=int(random.integers(2**31)), cluster_algo_dict=options)
+    try:
+        return _with_labelled(strategy, pool, batch)
+    except UnboundLocalError:  # of scikit-activeml 1.0.1, where every cluster holds a labelled sample
+        return np.array([], dtype=int)
 
 
 def _with_labelled(strategy, pool: Pool, batch: int) -> np.ndarray:

@@ -13,8 +13,9 @@ PACKAGES = ("gpca", "baselines")
 def code_files(*modules: str) -> list[str]:
     """Return the files of the given modules and of all project modules they import, anywhere in their text.
 
-    What is imported only for type checking never runs, so it does not count. Paths are relative to the project's folder, sorted. Modules chosen by name at run time (kinds of source,
-    encoders, explainers) are not seen and have to be given.
+    What is imported only for type checking never runs, so it does not count. Paths are relative to the project's
+    folder, sorted. Modules chosen by name at run time (kinds of source, encoders, explainers) are not seen and have to
+    be given.
     """
     found: set[str] = set()
     open_modules = list(modules)
