@@ -63,10 +63,11 @@ def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np
 
     Where a strategy names too few, as some do among identical embeddings, the rest is drawn at random.
     """
+    strategy = require_strategy(name)
     wanted = min(batch, len(pool.h_N_d))
     if wanted == len(pool.h_N_d):
         return np.arange(wanted)
-    chosen = np.array(list(dict.fromkeys(map(int, require_strategy(name).choose(pool, wanted, random)))), dtype=int)
+    chosen = np.array(list(dict.fromkeys(map(int, strategy.choose(pool, wanted, random)))), dtype=int)
     others = np.setdiff1d(np.arange(len(pool.h_N_d)), chosen)
     return np.concatenate([chosen, random.permutation(others)])[:wanted]
 

@@ -80,7 +80,8 @@ def make_task(
         registrations: with embeddings attached.
         held_out: the concept of which no sample is labelled at the start.
         axes: names of the draw (source, seed).
-        new_share: share of the pool that is of that concept; by default all of its training samples are in the pool.
+        new_share: share, below 1, of the pool that is of that concept, or as much of it as there is; by default all of
+            its training samples are in the pool.
 
     Raises:
         InputError: too few training samples.
@@ -93,11 +94,10 @@ def make_task(
     pool = np.setdiff1d(train, initial)
     new = pool[concept_S[pool] == held_out]
     if new_share is not None:
-        old = len(pool) - len(new)
-        kept = round(old * new_share / (1 - new_share))
+        kept = round((len(pool) - len(new)) * new_share / (1 - new_share))
         new_kept = generator(*axes, "rare", held_out).permutation(new)[:kept]
-        pool = np.union1d(np.setdiff1d(pool, new), new_kept)
-    if len(initial) < each * len(known) or len(pool) <= len(new) or not len(new):
+        pool, new = np.setdiff1d(pool, np.setdiff1d(new, new_kept)), new_kept
+    if len(initial) < each * len(known) or len(pool) == len(new) or not len(new):
         raise InputError(
             f"active learning with {settings.initial} labelled samples of {' and '.join(known)}",
             f"leaves no pool of {len(train)} training samples",

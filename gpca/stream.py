@@ -24,7 +24,7 @@ class StreamSettings:
     Attributes:
         arrivals: length of the stream.
         quiet: arrivals before the first of the new concept; after them it is a third of what arrives.
-        budget: share of the arrivals that may be asked about.
+        budget: share of the arrivals that may be asked about; a threshold keeps to it on average.
         window: arrivals whose BALD sets the threshold, and over which the running accuracy is taken.
         every: arrivals between two rows of the result.
     """
@@ -71,7 +71,7 @@ def run_stream(
         gpc: of :func:`gpca.active_learning.initial_gpc`; it is left as it is.
 
     Returns:
-        every so many arrivals: ``arrived``; ``present``, whether the new concept has begun to arrive; ``labels``
+        every so many arrivals: ``arrived``; ``present``, whether the quiet time is over; ``labels``
         asked for, ``new_labels`` of the new concept; ``running`` accuracy over the last `window` arrivals, each judged
         before its label is known; ``accuracy`` and ``accuracy_new`` on the test samples.
     """
@@ -80,7 +80,8 @@ def run_stream(
 
     random = generator(*axes, "stream", task.held_out, strategy)
     if strategy == "stream_random":
-        manager = StreamRandomSampling(budget=stream.budget, random_state=int(random.integers(2**31)))
+        seed = int(random.integers(2**31))
+        manager = StreamRandomSampling(budget=stream.budget, allow_exceeding_budget=False, random_state=seed)
     else:
         manager = BalancedIncrementalQuantileFilter(w=stream.window, w_tol=stream.window, budget=stream.budget)
     gpc = copy(gpc)
