@@ -168,7 +168,7 @@ def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray
     """Take the most typical sample of each of the largest clusters without a label (Hacohen et al. 2022)."""
     from skactiveml.pool import TypiClust
 
-    options = {"n_init": 1, "max_iter": 20}
+    options = {"n_init": 1, "max_iter": 20, "init": "random"}  # k-means++ of that many clusters takes all the time
     strategy = TypiClust(random_state=int(random.integers(2**31)), cluster_algo_dict=options)
     try:
         return _with_labelled(strategy, pool, batch)
