@@ -9,8 +9,9 @@ from gpca.objects.canonical import ObjectClouds
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19}
-ROW |= {"objects_figure": 1}
+ROW |= {"objects_figure": 1, "embeddings_without": 2, "active_learning": 2}
 COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
+LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
 
 
 @pytest.fixture
@@ -32,7 +33,7 @@ def test_a_folder_of_meshes_becomes_a_row_by_one_entry(finished, meshes):
     )
     data_dir = ("--config", f"data_dir={meshes.parent}")
     planned = finished.dry_run("all", *SMOKE, *data_dir)
-    assert planned.jobs == ROW | COLLECTORS
+    assert planned.jobs == ROW | COLLECTORS | LEARNED
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in planned.outputs
 
     path = "results/smoke/objects/my_parts.npz"
@@ -69,7 +70,7 @@ def test_a_rule_of_an_own_source_becomes_a_row(finished):
     (folder / "ball.smk").write_text(RULE)
     (finished.folder / "ball.py").write_text(BALL)
     planned = finished.dry_run("all", *SMOKE)
-    assert planned.jobs == {rule: ROW[rule] for rule in ROW if rule != "objects"} | {"ball": 1} | COLLECTORS
+    assert planned.jobs == {rule: ROW[rule] for rule in ROW if rule != "objects"} | {"ball": 1} | COLLECTORS | LEARNED
     assert "results/smoke/predictions/ball/gpca_paper/seed0.csv" in planned.outputs
     registrations = "results/smoke/registrations/ball/seed0.npz"
     finished.snakemake("-j1", registrations, *SMOKE)

@@ -1,0 +1,110 @@
+"""Other learners on the embeddings that GP-CA reads: what its Gaussian process is worth (paper, Table V).
+
+All learn from the same labelled embeddings, standardised on them, and give probabilities of every concept. The forest
+and the linear SVM are the paper's: scikit-learn's defaults, 50 trees, random_state 42.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+from baselines.attached import attached
+from baselines.concept_classifier import ConceptClassifier, standardised_regression
+from gpca.attribution import Attribution
+from gpca.dataset import Registrations
+from gpca.explainer import Entry
+from gpca.perturbation import CONCEPTS
+
+PAPERS_RANDOM_STATE = 42
+
+
+class Learner:
+    """A scikit-learn classifier on the embeddings; scores are its probabilities."""
+
+    def __init__(self, classifier) -> None:
+        self._classifier = ConceptClassifier(classifier)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit to the labelled embeddings."""
+        self._classifier.fit(attached(registrations, "embedding", None), registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration."""
+        started = perf_counter()
+        scores_N_C = self._classifier.scores(attached(registrations, "embedding", None))
+        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+
+
+def forest(source: str, seed: int, trees: int = 50) -> Learner:
+    """Make a random forest."""
+    from sklearn.ensemble import RandomForestClassifier
+
+    return Learner(_standardised(RandomForestClassifier(n_estimators=trees, random_state=PAPERS_RANDOM_STATE)))
+
+
+def linear_svm(source: str, seed: int) -> Learner:
+    """Make a linear support vector machine."""
+    return Learner(_standardised(_probable_svm("linear")))
+
+
+def rbf_svm(source: str, seed: int) -> Learner:
+    """Make a support vector machine with scikit-learn's default RBF kernel."""
+    return Learner(_standardised(_probable_svm("rbf")))
+
+
+def logistic(source: str, seed: int, inverse_regularisation: float = 1.0) -> Learner:
+    """Make a multinomial logistic regression."""
+    return Learner(standardised_regression(inverse_regularisation))
+
+
+def nearest(source: str, seed: int, neighbours: int = 15) -> Learner:
+    """Make a k-nearest-neighbour classifier; a probability is a share of the neighbours."""
+    from sklearn.neighbors import KNeighborsClassifier
+
+    return Learner(_standardised(KNeighborsClassifier(neighbours)))
+
+
+def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:
+    """Make scikit-learn's Gaussian process classifier: one against the rest, Laplace's approximation, RBF kernel.
+
+    Args:
+        lengthscale: in units of √(2 d), the expected distance of two standardised embeddings. It stays fixed:
+            scikit-learn's optimiser takes minutes.
+    """
+    from sklearn.gaussian_process import GaussianProcessClassifier
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
+    from sklearn.preprocessing import FunctionTransformer
+
+    kernel = ConstantKernel(10.0) * RBF(lengthscale)
+    return Learner(
+        _standardised(FunctionTransformer(_to_unit_distance), GaussianProcessClassifier(kernel, optimizer=None))
+    )
+
+
+def _to_unit_distance(features_N_F):
+    return features_N_F / (2 * features_N_F.shape[1]) ** 0.5
+
+
+def _probable_svm(kernel: str):
+    """Return an SVM whose decision values are turned into probabilities by Platt's sigmoids over five folds."""
+    from sklearn.calibration import CalibratedClassifierCV
+    from sklearn.svm import SVC
+
+    return CalibratedClassifierCV(SVC(kernel=kernel, random_state=PAPERS_RANDOM_STATE), ensemble=False)
+
+
+def _standardised(*steps):
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    return make_pipeline(StandardScaler(), *steps)
+
+
+EXPLAINERS = {
+    "learner_forest": Entry("Random forest on the embedding", forest, reads="embeddings"),
+    "learner_linear_svm": Entry("Linear SVM on the embedding", linear_svm, reads="embeddings"),
+    "learner_rbf_svm": Entry("RBF SVM on the embedding", rbf_svm, reads="embeddings"),
+    "learner_logistic": Entry("Logistic regression on the embedding", logistic, reads="embeddings"),
+    "learner_nearest": Entry("k nearest embeddings", nearest, reads="embeddings"),
+    "learner_laplace_gpc": Entry("Laplace GPC on the embedding", laplace_gpc, reads="embeddings"),
+}

@@ -1,0 +1,66 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from baselines.learners import EXPLAINERS
+from gpca.errors import InputError
+from gpca.perturbation import CONCEPTS
+
+
+@pytest.fixture(scope="module")
+def embedded(registrations):
+    """The registrations, with an embedding of 12 dimensions that tells their concepts apart."""
+    random = np.random.default_rng(0)
+    concept_S = [CONCEPTS.index(concept) for concept in registrations.concept]
+    embedding = 2.5 * random.normal(size=(3, 12))[concept_S] + random.normal(size=(len(registrations), 12))
+    return dataclasses.replace(registrations, attached={"embedding": embedding})
+
+
+def explained(name, embedded, train=None, source="tiny", seed=0):
+    learner = EXPLAINERS[name].make(source, seed)
+    learner.fit(embedded.subset(embedded.rows("train") if train is None else train))
+    return learner.explain(embedded.subset(embedded.rows("test")).without_labels())
+
+
+@pytest.mark.parametrize("name", EXPLAINERS)
+def test_separated_concepts_are_told_apart_with_probabilities(name, embedded):
+    attribution = explained(name, embedded)
+    assert np.mean(attribution.predicted_N == embedded.concept[embedded.rows("test")]) > 0.9
+    assert attribution.scores_N_C.sum(axis=1) == pytest.approx(1)
+    assert attribution.scores_N_C.min() >= 0
+    assert (attribution.icp_calls_N == 0).all()
+
+
+@pytest.mark.parametrize("name", EXPLAINERS)
+def test_a_concept_absent_from_training_keeps_its_column(name, embedded):
+    train = embedded.rows("train")
+    scores = explained(name, embedded, train[embedded.concept[train] != "pose"]).scores_N_C
+    assert (scores[:, CONCEPTS.index("pose")] == 0).all()
+    assert scores.sum(axis=1) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("name", EXPLAINERS)
+def test_scale_and_offset_of_the_embedding_do_not_matter(name, embedded):
+    moved = dataclasses.replace(embedded, attached={"embedding": 50 + 1000 * embedded.embedding})
+    difference = explained(name, embedded).scores_N_C - explained(name, moved).scores_N_C
+    assert np.abs(difference).max() < 1e-3
+
+
+@pytest.mark.parametrize("name", EXPLAINERS)
+def test_a_constant_embedding_gives_finite_scores(name, embedded):
+    constant = dataclasses.replace(embedded, attached={"embedding": np.ones((len(embedded), 12))})
+    assert np.isfinite(explained(name, constant).scores_N_C).all()
+
+
+@pytest.mark.parametrize("name", EXPLAINERS)
+def test_the_same_embeddings_give_the_same_scores(name, embedded):
+    assert np.array_equal(explained(name, embedded).scores_N_C, explained(name, embedded, seed=1).scores_N_C)
+
+
+@pytest.mark.parametrize("name", EXPLAINERS)
+def test_a_missing_or_nan_embedding_is_named(name, embedded):
+    with pytest.raises(InputError, match="embedding"):
+        explained(name, dataclasses.replace(embedded, attached={}))
+    with pytest.raises(InputError, match="embedding"):
+        explained(name, dataclasses.replace(embedded, attached={"embedding": embedded.embedding * np.nan}))
