@@ -118,9 +118,14 @@ def test_some_printed_values_cannot_belong_to_the_printed_accuracies():
     # Table V: the forest's area at 98.0 % is larger than any order allows; the GPC's at 99.3 % than a random one.
     assert d.worst_aurc(1 - 0.98) < 0.1145
     assert 1 - 0.993 < 0.0078
-    # ECE 0.223 at 99.3 %: |accuracy - mean confidence| is at most the ECE, so it is at least 0.77, and under-trained.
-    p = confident(np.full(1000, 0.993 - 0.223))
-    assert d.calibration_error(p, np.where(np.arange(1000) < 993, 0, 1)) == pytest.approx(0.223)
+    # ECE 0.223 at 99.3 %: the mean confidence is 0.770 where no bin is over-confident, and at most 0.784, where all
+    # mistakes are made with certainty.
+    right = np.arange(1000) < 993
+    for certain_of_mistakes, mean_confidence in ((False, 0.770), (True, 0.784)):
+        lower = (0.223 - 0.007 * certain_of_mistakes) / (0.993 if certain_of_mistakes else 1)
+        p = np.where(~right & certain_of_mistakes, 1.0, (1 if certain_of_mistakes else 0.993) - lower)
+        assert d.calibration_error(confident(p), np.where(right, 0, 1)) == pytest.approx(0.223)
+        assert p.mean() == pytest.approx(mean_confidence, abs=5e-4)
 
 
 @pytest.mark.parametrize(
