@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from time import perf_counter
 
+import numpy as np
+
 from baselines.attached import attached
 from baselines.concept_classifier import ConceptClassifier, standardised_regression
 from gpca.attribution import Attribution
 from gpca.dataset import Registrations
+from gpca.errors import InputError
 from gpca.explainer import Entry
 from gpca.perturbation import CONCEPTS
 
@@ -42,14 +45,33 @@ def forest(source: str, seed: int, trees: int = 50) -> Learner:
     return Learner(_standardised(RandomForestClassifier(n_estimators=trees, random_state=PAPERS_RANDOM_STATE)))
 
 
+class ProbableSVM(Learner):
+    """A support vector machine; Platt's sigmoids over up to five folds turn its decision values into probabilities."""
+
+    def __init__(self, kernel: str) -> None:
+        self._kernel = kernel
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit to the labelled embeddings; a concept of which there is a single sample raises an InputError."""
+        from sklearn.calibration import CalibratedClassifierCV
+        from sklearn.svm import SVC
+
+        folds = min(5, *np.unique(registrations.concept, return_counts=True)[1])
+        if folds < 2:
+            raise InputError("training registrations", "hold a single sample of a concept", "give at least two")
+        svm = SVC(kernel=self._kernel, random_state=PAPERS_RANDOM_STATE)
+        self._classifier = ConceptClassifier(_standardised(CalibratedClassifierCV(svm, cv=folds, ensemble=False)))
+        super().fit(registrations)
+
+
 def linear_svm(source: str, seed: int) -> Learner:
     """Make a linear support vector machine."""
-    return Learner(_standardised(_probable_svm("linear")))
+    return ProbableSVM("linear")
 
 
 def rbf_svm(source: str, seed: int) -> Learner:
     """Make a support vector machine with scikit-learn's default RBF kernel."""
-    return Learner(_standardised(_probable_svm("rbf")))
+    return ProbableSVM("rbf")
 
 
 def logistic(source: str, seed: int, inverse_regularisation: float = 1.0) -> Learner:
@@ -57,7 +79,7 @@ def logistic(source: str, seed: int, inverse_regularisation: float = 1.0) -> Lea
     return Learner(standardised_regression(inverse_regularisation))
 
 
-def nearest(source: str, seed: int, neighbours: int = 15) -> Learner:
+def nearest(source: str, seed: int, neighbours: int = 5) -> Learner:
     """Make a k-nearest-neighbour classifier; a probability is a share of the neighbours."""
     from sklearn.neighbors import KNeighborsClassifier
 
@@ -83,14 +105,6 @@ def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:
 
 def _to_unit_distance(features_N_F):
     return features_N_F / (2 * features_N_F.shape[1]) ** 0.5
-
-
-def _probable_svm(kernel: str):
-    """Return an SVM whose decision values are turned into probabilities by Platt's sigmoids over five folds."""
-    from sklearn.calibration import CalibratedClassifierCV
-    from sklearn.svm import SVC
-
-    return CalibratedClassifierCV(SVC(kernel=kernel, random_state=PAPERS_RANDOM_STATE), ensemble=False)
 
 
 def _standardised(*steps):

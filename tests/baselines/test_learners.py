@@ -64,3 +64,13 @@ def test_a_missing_or_nan_embedding_is_named(name, embedded):
         explained(name, dataclasses.replace(embedded, attached={}))
     with pytest.raises(InputError, match="embedding"):
         explained(name, dataclasses.replace(embedded, attached={"embedding": embedded.embedding * np.nan}))
+
+
+@pytest.mark.parametrize("name", ["learner_linear_svm", "learner_rbf_svm"])
+def test_few_samples_of_a_concept_are_enough_for_an_svm_but_not_one(name, embedded):
+    train, few = embedded.rows("train"), []
+    for concept in CONCEPTS:
+        few += train[embedded.concept[train] == concept][:3].tolist()
+    assert np.isfinite(explained(name, embedded, np.array(few)).scores_N_C).all()
+    with pytest.raises(InputError, match="hold a single sample of a concept; give at least two"):
+        explained(name, embedded, np.array(few[:7]))
