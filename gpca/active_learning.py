@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numpy as np
 
@@ -132,24 +131,21 @@ def learn(
 
     Returns:
         a step per round, the first before any label: ``labels`` spent, ``new_labels`` of the concept held out,
-        ``accuracy`` on all test samples, ``accuracy_new`` on those of the concept held out, ``epochs`` of the
-        retraining, and the ``seconds`` of selection and retraining, which are for benchmarks.
+        ``accuracy`` on all test samples, ``accuracy_new`` on those of the concept held out, and ``epochs`` of the
+        retraining.
     """
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc = copy(gpc)
     left = np.arange(len(task.pool))
     queried: list[int] = []
-    steps = [_step(task, gpc, queried, 0, 0.0, 0.0)]
+    steps = [_step(task, gpc, queried, epochs=0)]
     while len(queried) < settings.labels and len(left):
-        started = perf_counter()
         pool = _pool_of(task, gpc, left, queried, require_strategy(strategy).needs_scores)
         chosen = left[select(strategy, pool, min(settings.batch, settings.labels - len(queried)), random)]
-        selected = perf_counter()
         epochs = gpc.update(task.pool.h[chosen], task.pool.concept_N[chosen], settings.iterations, settings.tolerance)
-        retrained = perf_counter()
         queried += chosen.tolist()
         left = np.setdiff1d(left, chosen)
-        steps.append(_step(task, gpc, queried, epochs, selected - started, retrained - selected))
+        steps.append(_step(task, gpc, queried, epochs))
     return steps
 
 
@@ -160,7 +156,7 @@ def _pool_of(task: Task, gpc: GPC, left: np.ndarray, queried: list[int], needs_s
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labelled, task.pool.concept_N[left])
 
 
-def _step(task: Task, gpc: GPC, queried: list[int], epochs: int, select_s: float, retrain_s: float) -> dict[str, float]:
+def _step(task: Task, gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
         "labels": len(queried),
@@ -168,8 +164,6 @@ def _step(task: Task, gpc: GPC, queried: list[int], epochs: int, select_s: float
         "accuracy": accuracy,
         "accuracy_new": accuracy_new,
         "epochs": epochs,
-        "select_s": select_s,
-        "retrain_s": retrain_s,
     }
 
 

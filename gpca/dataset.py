@@ -121,6 +121,20 @@ class Registrations:
         return cls(**{name: arrays[name] for name in shapes})
 
 
+def load_embeddings(
+    path: str | Path, registrations: Registrations, shapes: Mapping[str, tuple[int | str, ...]], made_by: str
+) -> dict[str, np.ndarray]:
+    """Read arrays of the registrations from a file of embeddings; see :func:`gpca.files.load_arrays`.
+
+    Raises:
+        InputError: also where the file is of other samples.
+    """
+    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by)
+    if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
+        raise InputError(path, "holds other samples than the registrations", f"make it anew with '{made_by}'")
+    return arrays
+
+
 CLOUDS = ("points", "offsets", "target_points", "target_offsets")
 COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in (*CLOUDS, "attached"))
 

@@ -116,12 +116,12 @@ class GPC:
         self._targets_N = np.concatenate([self._targets_N, self._targets(labels_L)])
         return self.refine(iterations, tolerance)
 
-    def refine(self, iterations: int = 100, tolerance: float = 1e-3, cold: bool = False) -> int:
+    def refine(self, iterations: int = 100, tolerance: float = 1e-3) -> int:
         """Move the posterior to the best one for the labels, kernel and inducing inputs; see :meth:`update`.
 
-        It starts from the posterior of the call before, or from the prior where there was none or when `cold`.
+        It starts from the posterior of the call before, or from the prior where there was none.
         """
-        sites = Sites.silent(0, 0) if cold or self._sites is None else self._sites
+        sites = Sites.silent(0, 0) if self._sites is None else self._sites
         sites = sites.extended(len(self._targets_N), len(self.classes))
         self._sites, self._latents, done = refine(self._labelled, self._targets_N, sites, iterations, tolerance)
         return done

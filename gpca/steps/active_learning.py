@@ -7,14 +7,12 @@ from collections.abc import Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning import ActiveLearningSettings, Task, initial_gpc, learn, make_task
-from gpca.dataset import Registrations
+from gpca.dataset import Registrations, load_embeddings
 from gpca.errors import InputError
-from gpca.files import load_arrays
 from gpca.gpc import GPC, GPCSettings
 from gpca.learning_curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.perturbation import CONCEPTS
@@ -78,14 +76,10 @@ def settings_from(given: dict) -> ActiveLearningSettings:
 def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, Task, GPC]]:
     """Yield setting, task and the GPC that knows two concepts: for each concept held out, and for a rare one."""
     registrations = Registrations.load(options.registrations)
-    remedy = "python -m gpca without"
-    shapes = {"sample": ("S",), "split": ("S",)}
     held_out = options.settings.get("held_out", CONCEPTS)
-    seen = load_arrays(options.embeddings, shapes | {"h": ("S", "d")}, "python -m gpca embed")
-    unseen = load_arrays(options.embeddings_without, shapes | {f"h_{c}": ("S", "d") for c in held_out}, remedy)
-    for path, arrays in ((options.embeddings, seen), (options.embeddings_without, unseen)):
-        if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in shapes):
-            raise InputError(path, "holds other samples than the registrations", "make both anew from one config")
+    seen = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")
+    shapes = {f"h_{c}": ("S", "d") for c in held_out}
+    unseen = load_embeddings(options.embeddings_without, registrations, shapes, "python -m gpca without")
     rare_share = options.settings.get("rare_share")
     chosen = [("pretrained", c, seen["h"], None) for c in held_out] + [
         ("unseen", c, unseen[f"h_{c}"], None) for c in held_out

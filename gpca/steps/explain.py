@@ -6,12 +6,9 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from gpca.dataset import Registrations
+from gpca.dataset import Registrations, load_embeddings
 from gpca.errors import InputError
 from gpca.explainer import Entry, explainer_entry, require_settings
-from gpca.files import load_arrays
 from gpca.outcomes import Outcomes, read_seconds
 from gpca.predictions import read_timings, write_predictions, write_timings
 from gpca.provenance import recorded
@@ -82,9 +79,7 @@ def _load(name: str, entry: Entry, registrations: Path, embeddings, uncertainty,
 def _with_embedding(registrations: Registrations, path: Path | None, explainer: str) -> Registrations:
     if path is None:
         raise InputError(f"explainer '{explainer}'", "reads embeddings", "give them with --embeddings")
-    shapes = {"h": ("S", "d"), "head_logits": ("S", "C"), "sample": ("S",), "split": ("S",)}
-    arrays = load_arrays(path, shapes, made_by="python -m gpca embed")
-    if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-        raise InputError(path, "holds other samples than the registrations", "make it anew with 'python -m gpca embed'")
+    shapes = {"h": ("S", "d"), "head_logits": ("S", "C")}
+    arrays = load_embeddings(path, registrations, shapes, "python -m gpca embed")
     own = {"embedding": arrays["h"], "head_logits": arrays["head_logits"]}
     return replace(registrations, attached={**registrations.attached, **own})

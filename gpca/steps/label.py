@@ -16,9 +16,8 @@ import numpy as np
 import torch
 
 from gpca.attribution import Attribution
-from gpca.dataset import Registrations
+from gpca.dataset import Registrations, load_embeddings
 from gpca.errors import InputError
-from gpca.files import load_arrays
 from gpca.gpc import GPCSettings
 from gpca.labelling import SKIPPED, LabelFile, Question, Session, require_name
 from gpca.perturbation import CONCEPTS
@@ -72,10 +71,7 @@ def run(options: Namespace) -> None:
 
 def _load(options: Namespace) -> tuple[Registrations, np.ndarray]:
     registrations = Registrations.load(options.registrations)
-    shapes = {"h": ("S", "d"), "sample": ("S",), "split": ("S",)}
-    arrays = load_arrays(options.embeddings, shapes, "python -m gpca embed")
-    if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-        raise InputError(options.embeddings, "holds other samples than the registrations", "make it anew from them")
+    arrays = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")
     return registrations, arrays["h"]
 
 
