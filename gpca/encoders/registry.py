@@ -6,7 +6,12 @@ from importlib import import_module
 
 from gpca.errors import InputError
 
-ENCODERS = {"dgcnn": "gpca.encoders.dgcnn:DGCNN"}
+ENCODERS = {
+    "dgcnn": "gpca.encoders.dgcnn:DGCNN",
+    "pointnet": "gpca.encoders.pointnet:PointNet",
+    "pointnet2": "gpca.encoders.pointnet2:PointNet2",
+    "pointnext": "gpca.encoders.pointnext:PointNeXt",
+}
 
 
 def make_encoder(backbone: str, options: dict):
@@ -27,3 +32,8 @@ def require_backbone(backbone: str) -> None:
     """Raise an InputError that names the known backbones unless `backbone` is one of them."""
     if backbone not in ENCODERS:
         raise InputError(f"backbone '{backbone}'", "unknown", f"known are {', '.join(ENCODERS)}")
+
+
+def parameter_count(module) -> int:
+    """Return how many numbers of a torch module are trained."""
+    return sum(parameter.numel() for parameter in module.parameters() if parameter.requires_grad)

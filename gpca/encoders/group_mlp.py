@@ -1,0 +1,142 @@
+"""A PointNet on the points of each group, evaluated once per distinct point instead of once per slot.
+
+A group has k slots. Each slot holds a point j and is mapped by layers of linear map, batch norm and ReLU that all slots
+share; the maximum over the slots is the group's feature (Qi et al. 2017, 2017b). Two equalities save most of it:
+
+- The first linear map W = [Wx | Wf] acts on ``[(p_j - c_g)/r ; f_j]``, so it splits into A_j + C_g with
+  A_j = Wx p_j/r + Wf f_j and C_g = -Wx c_g/r: a matrix product over the points, not over the slots of all groups.
+- A ball with fewer than k points repeats its first one. Repeats do not change the maximum, and batch norm counts them
+  by a weight, so only distinct points are evaluated: in a cloud of 512 points a fifth of the slots, or fewer.
+
+Means and variances are those of all B·M·k slots. The plain form is kept in ``GroupMLP.plain``, for CUDA and for the
+tests; outputs, running statistics and all gradients agree with it.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+
+from gpca.encoders import group_mlp_kernels as kernels
+from gpca.encoders.grouping import Groups, take
+
+
+class GroupMLP(nn.Module):
+    """Layers of linear map, batch norm and ReLU on the slots of each group, then their maximum.
+
+    Args:
+        in_features: of each point, beside its coordinates relative to the group's centre.
+        widths: of the layers.
+        last_relu: False leaves the ReLU after the last batch norm out, where a residual is to be added first.
+    """
+
+    def __init__(self, in_features: int, widths: tuple[int, ...], last_relu: bool = True) -> None:
+        super().__init__()
+        sizes = (3 + in_features, *widths)
+        self.linears = nn.ModuleList(nn.Linear(*pair, bias=False) for pair in zip(sizes, widths, strict=False))
+        self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in widths)
+        self.last_relu = last_relu
+
+    def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
+        """Return the features (B, M, F_out) of the groups from the points' coordinates and features."""
+        if points_B_N_3.device.type != "cpu":
+            return self.plain(points_B_N_3, x_B_N_F, groups)
+        batch, n_groups, _ = groups.centres_B_M_3.shape
+        edges = _Edges(groups, points_B_N_3)
+        y_E_F = self._first_layer(points_B_N_3, x_B_N_F, groups, edges)
+        for norm, linear in zip(self.norms, self.linears[1:], strict=False):
+            y_E_F = self._normalise(norm, y_E_F, edges) @ linear.weight.T
+        z_G_F = self._normalise(self.norms[-1], y_E_F, edges, pool=True)
+        return (z_G_F.relu() if self.last_relu else z_G_F).view(batch, n_groups, -1)
+
+    def plain(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
+        """Return the same with torch operations alone, every slot of every group evaluated."""
+        neighbours_B_M_k = groups.neighbours_B_M_k.long()
+        slots_B_M_k_F = (take(points_B_N_3, neighbours_B_M_k) - groups.centres_B_M_3[:, :, None]) / groups.radius
+        if x_B_N_F is not None:
+            slots_B_M_k_F = torch.cat([slots_B_M_k_F, take(x_B_N_F, neighbours_B_M_k)], dim=-1)
+        z_S_F = slots_B_M_k_F.flatten(0, 2)
+        for layer, (linear, norm) in enumerate(zip(self.linears, self.norms, strict=True), start=1):
+            z_S_F = norm(linear(z_S_F))
+            if layer < len(self.norms) or self.last_relu:
+                z_S_F = z_S_F.relu()
+        return z_S_F.view(*neighbours_B_M_k.shape, -1).amax(dim=2)
+
+    def _first_layer(self, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:
+        inputs = points_B_N_3 / groups.radius
+        inputs = inputs if x_B_N_F is None else torch.cat([inputs, x_B_N_F], dim=-1)
+        weight = self.linears[0].weight
+        a_P_F = inputs.flatten(0, 1) @ weight.T
+        if groups.is_whole:  # around the origin: C is zero
+            return a_P_F
+        c_G_F = groups.centres_B_M_3.flatten(0, 1) @ (weight[:, :3].T / -groups.radius)
+        return _Gather.apply(a_P_F, c_G_F, edges)
+
+    def _normalise(self, norm: nn.BatchNorm1d, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:
+        if not self.training:
+            scale_F = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
+            affine = [x.detach().numpy() for x in (y_E_F, scale_F, norm.bias - scale_F * norm.running_mean)]
+            if pool:
+                return torch.from_numpy(kernels.normalise_max(*affine, edges.ends, edges.batch)[0])
+            return torch.from_numpy(kernels.normalise(*affine, edges.cloud_ends))
+        out, mean_F, variance_F = _Normalise.apply(y_E_F, norm.weight, norm.bias, norm.eps, edges, pool)
+        with torch.no_grad():
+            norm.num_batches_tracked += 1
+            norm.running_mean.lerp_(mean_F, norm.momentum)
+            norm.running_var.lerp_(variance_F * (edges.slots / (edges.slots - 1)), norm.momentum)
+        return out
+
+
+class _Edges:
+    """The distinct pairs of a group and a point of it, as :mod:`gpca.encoders.group_mlp_kernels` describes them."""
+
+    def __init__(self, groups: Groups, points_B_N_3: torch.Tensor) -> None:
+        self.batch, n_points, _ = points_B_N_3.shape
+        neighbours, counts = groups.neighbours_B_M_k.numpy(), groups.counts_B_M.numpy()
+        self.slots = neighbours.size
+        self.point, self.weight, self.ends = kernels.distinct_edges(neighbours, counts, n_points)
+        self.cloud_ends = self.ends[:: counts.shape[1]]
+
+
+class _Gather(torch.autograd.Function):
+    """A_j + C_g for every edge."""
+
+    @staticmethod
+    def forward(ctx, a_P_F, c_G_F, edges):
+        ctx.edges, ctx.n_rows = edges, len(a_P_F)
+        a, c = (x.detach().numpy() for x in (a_P_F, c_G_F))
+        return torch.from_numpy(kernels.gather(a, c, edges.point, edges.ends, edges.batch))
+
+    @staticmethod
+    def backward(ctx, grad_y):
+        edges, grad_y = ctx.edges, grad_y.contiguous().numpy()
+        grads = kernels.gather_backward(grad_y, edges.point, edges.ends, edges.batch, ctx.n_rows)
+        return *(torch.from_numpy(grad) for grad in grads), None
+
+
+class _Normalise(torch.autograd.Function):
+    """Batch norm with the statistics of all slots, then ReLU per edge or, with `pool`, the maximum over each group."""
+
+    @staticmethod
+    def forward(ctx, y_E_F, gamma_F, beta_F, eps, edges, pool):
+        y, gamma, beta = (x.detach().numpy() for x in (y_E_F, gamma_F, beta_F))
+        mean, variance = kernels.moments(y, edges.weight, edges.cloud_ends)
+        inverse_std = (1.0 / (variance + eps) ** 0.5).astype(y.dtype)
+        mean = mean.astype(y.dtype)
+        scale = gamma * inverse_std
+        shift = beta - scale * mean
+        if pool:
+            out, kept = kernels.normalise_max(y, scale, shift, edges.ends, edges.batch)
+        else:
+            out = kept = kernels.normalise(y, scale, shift, edges.cloud_ends)
+        ctx.numpy_arrays = (kept, y, edges.weight, mean, inverse_std, gamma, edges.cloud_ends)
+        ctx.pool = pool
+        mean_F, variance_F = torch.from_numpy(mean), torch.from_numpy(variance.astype(y.dtype))
+        ctx.mark_non_differentiable(mean_F, variance_F)
+        return torch.from_numpy(out), mean_F, variance_F
+
+    @staticmethod
+    def backward(ctx, grad_out, _grad_mean, _grad_variance):
+        backward = kernels.normalise_max_backward if ctx.pool else kernels.normalise_backward
+        grads = backward(grad_out.contiguous().numpy(), *ctx.numpy_arrays)
+        return *(torch.from_numpy(grad) for grad in grads), None, None, None

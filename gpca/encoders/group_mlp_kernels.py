@@ -1,0 +1,218 @@
+"""The passes over the distinct edges of groups behind :mod:`gpca.encoders.group_mlp`, compiled by numba.
+
+Edges e are the distinct pairs of a group and a point of it, group after group and cloud after cloud, so those of cloud
+b are the rows ``cloud_ends[b]`` to ``cloud_ends[b + 1]`` and those of group g the rows ``ends[g]`` to ``ends[g + 1]``.
+All arrays are C-contiguous float32. The loops over clouds run in parallel on the threads that numba is given; every
+floating-point sum is made within one cloud and the clouds are added in order, so the thread count changes no bit.
+Inner loops run over channels, where they vectorise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+_options = {"cache": True, "parallel": True, "fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
+_BLOCK = 64  # rows that are summed in the arrays' own precision before they are added in double
+
+
+@njit(cache=True)
+def distinct_edges(neighbours, counts, n_points):
+    """Return point (E,), the row of each edge's point in all clouds; weight (E,), the slots it fills; ends (G + 1,)."""
+    batch, n_groups, k = neighbours.shape
+    ends = np.zeros(batch * n_groups + 1, np.int64)
+    ends[1:] = np.cumsum(counts.reshape(-1))
+    point = np.empty(ends[-1], np.int64)
+    weight = np.ones(ends[-1], np.float32)
+    for b in range(batch):
+        for m in range(n_groups):
+            g = b * n_groups + m
+            weight[ends[g]] += k - counts[b, m]  # the first one fills the slots that were left
+            for slot in range(counts[b, m]):
+                point[ends[g] + slot] = b * n_points + neighbours[b, m, slot]
+    return point, weight, ends
+
+
+@njit(**_options)
+def gather(a, c, point, ends, batch):
+    """Return y_e = a_j + c_g (E, F) for the edges from group g to point j; a (P, F), c (G, F)."""
+    features = a.shape[1]
+    y = np.empty((len(point), features), a.dtype)
+    groups = len(c) // batch
+    for b in prange(batch):
+        for g in range(b * groups, (b + 1) * groups):
+            for e in range(ends[g], ends[g + 1]):
+                j = point[e]
+                for f in range(features):
+                    y[e, f] = a[j, f] + c[g, f]
+    return y
+
+
+@njit(**_options)
+def gather_backward(grad_y, point, ends, batch, n_rows):
+    """Return the gradients of :func:`gather` with respect to a (P, F) and c (G, F)."""
+    features = grad_y.shape[1]
+    grad_a = np.zeros((n_rows, features), grad_y.dtype)
+    grad_c = np.zeros((len(ends) - 1, features), grad_y.dtype)
+    groups = len(grad_c) // batch
+    for b in prange(batch):
+        for g in range(b * groups, (b + 1) * groups):
+            for e in range(ends[g], ends[g + 1]):
+                j = point[e]
+                for f in range(features):
+                    grad_a[j, f] += grad_y[e, f]
+                    grad_c[g, f] += grad_y[e, f]
+    return grad_a, grad_c
+
+
+@njit(**_options)
+def moments(y, weight, cloud_ends):
+    """Return mean and biased variance (F,), float64, of the rows of y (E, F), each counted `weight` times."""
+    features = y.shape[1]
+    batch = len(cloud_ends) - 1
+    sums = np.zeros((batch, features), np.float64)
+    squares = np.zeros((batch, features), np.float64)
+    for b in prange(batch):
+        for start in range(cloud_ends[b], cloud_ends[b + 1], _BLOCK):
+            total = np.zeros(features, y.dtype)
+            square = np.zeros(features, y.dtype)
+            for e in range(start, min(start + _BLOCK, cloud_ends[b + 1])):
+                w = weight[e]
+                for f in range(features):
+                    total[f] += w * y[e, f]
+                    square[f] += w * y[e, f] * y[e, f]
+            for f in range(features):
+                sums[b, f] += total[f]
+                squares[b, f] += square[f]
+    weights = np.float64(0)
+    for e in range(len(weight)):
+        weights += weight[e]
+    mean = np.zeros(features, np.float64)
+    variance = np.zeros(features, np.float64)
+    for b in range(batch):
+        mean += sums[b] / weights
+        variance += squares[b] / weights
+    return mean, np.maximum(variance - mean * mean, 0.0)
+
+
+@njit(**_options)
+def normalise(y, scale, shift, cloud_ends):
+    """Return ReLU(scale y + shift), (E, F)."""
+    out = np.empty_like(y)
+    zero = y.dtype.type(0)
+    for b in prange(len(cloud_ends) - 1):
+        for e in range(cloud_ends[b], cloud_ends[b + 1]):
+            for f in range(y.shape[1]):
+                out[e, f] = max(y[e, f] * scale[f] + shift[f], zero)
+    return out
+
+
+@njit(**_options)
+def normalise_max(y, scale, shift, ends, batch):
+    """Return the maximum of scale y + shift over each group's edges (G, F), and the edge where it is reached."""
+    features = y.shape[1]
+    groups = (len(ends) - 1) // batch
+    out = np.empty((len(ends) - 1, features), y.dtype)
+    at = np.empty((len(ends) - 1, features), np.int32)
+    for b in prange(batch):
+        for g in range(b * groups, (b + 1) * groups):
+            best, best_at = out[g], at[g]
+            first = ends[g]
+            for f in range(features):
+                best[f], best_at[f] = y[first, f] * scale[f] + shift[f], first
+            for e in range(first + 1, ends[g + 1]):
+                edge = np.int32(e)
+                for f in range(features):
+                    z = y[e, f] * scale[f] + shift[f]
+                    better = z > best[f]
+                    best[f] = z if better else best[f]
+                    best_at[f] = edge if better else best_at[f]
+    return out, at
+
+
+@njit(**_options)
+def normalise_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud_ends):
+    """Gradients of :func:`normalise` where its scale and shift come from :func:`moments`.
+
+    With g_e the gradient that reaches edge e through all of its w_e slots and ŷ the normalised edges, batch norm over
+    W = Σ w slots gives
+
+        ∂L/∂γ = Σ g_e ŷ_e,  ∂L/∂β = Σ g_e,  ∂L/∂y_e = γ/σ [ g_e - w_e (∂L/∂β + ŷ_e ∂L/∂γ)/W ] .
+
+    Returns:
+        grad_y (E, F), grad_gamma (F,), grad_beta (F,).
+    """
+    features = y.shape[1]
+    batch = len(cloud_ends) - 1
+    gamma_parts = np.zeros((batch, features), np.float64)
+    beta_parts = np.zeros((batch, features), np.float64)
+    zero = y.dtype.type(0)
+    for b in prange(batch):
+        for start in range(cloud_ends[b], cloud_ends[b + 1], _BLOCK):
+            total = np.zeros(features, y.dtype)
+            product = np.zeros(features, y.dtype)
+            for e in range(start, min(start + _BLOCK, cloud_ends[b + 1])):
+                for f in range(features):
+                    g = grad_out[e, f] if out[e, f] > zero else zero
+                    total[f] += g
+                    product[f] += g * (y[e, f] - mean[f])
+            for f in range(features):
+                beta_parts[b, f] += total[f]
+                gamma_parts[b, f] += product[f] * inverse_std[f]
+    grad_gamma, grad_beta = _added(gamma_parts), _added(beta_parts)
+    scale, constant, linear = _affine(grad_gamma, grad_beta, weight, mean, inverse_std, gamma)
+    grad_y = np.empty_like(y)
+    for b in prange(batch):
+        for e in range(cloud_ends[b], cloud_ends[b + 1]):
+            w = weight[e]
+            for f in range(features):
+                g = grad_out[e, f] if out[e, f] > zero else zero
+                grad_y[e, f] = scale[f] * g - w * (constant[f] + linear[f] * y[e, f])
+    return grad_y, grad_gamma.astype(y.dtype), grad_beta.astype(y.dtype)
+
+
+@njit(**_options)
+def normalise_max_backward(grad_out, at, y, weight, mean, inverse_std, gamma, cloud_ends):
+    """Gradients of :func:`normalise_max`: those of :func:`normalise_backward` with g zero but at the maxima."""
+    features = y.shape[1]
+    batch = len(cloud_ends) - 1
+    groups = len(at) // batch
+    gamma_parts = np.zeros((batch, features), np.float64)
+    beta_parts = np.zeros((batch, features), np.float64)
+    for b in prange(batch):
+        for g in range(b * groups, (b + 1) * groups):
+            for f in range(features):
+                beta_parts[b, f] += grad_out[g, f]
+                gamma_parts[b, f] += grad_out[g, f] * ((y[at[g, f], f] - mean[f]) * inverse_std[f])
+    grad_gamma, grad_beta = _added(gamma_parts), _added(beta_parts)
+    scale, constant, linear = _affine(grad_gamma, grad_beta, weight, mean, inverse_std, gamma)
+    grad_y = np.empty_like(y)
+    for b in prange(batch):
+        for e in range(cloud_ends[b], cloud_ends[b + 1]):
+            w = weight[e]
+            for f in range(features):
+                grad_y[e, f] = -w * (constant[f] + linear[f] * y[e, f])
+        for g in range(b * groups, (b + 1) * groups):
+            for f in range(features):
+                grad_y[at[g, f], f] += scale[f] * grad_out[g, f]
+    return grad_y, grad_gamma.astype(y.dtype), grad_beta.astype(y.dtype)
+
+
+@njit(cache=True)
+def _added(parts):
+    total = np.zeros(parts.shape[1], np.float64)
+    for b in range(len(parts)):
+        total += parts[b]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _affine(grad_gamma, grad_beta, weight, mean, inverse_std, gamma):
+    """Return scale, constant, linear of the gradient scale g_e - w_e (constant + linear y_e)."""
+    weights = np.float64(0)
+    for e in range(len(weight)):
+        weights += weight[e]
+    scale = gamma * inverse_std
+    linear = scale * inverse_std * grad_gamma / weights
+    constant = scale * grad_beta / weights - linear * mean
+    return scale, constant.astype(gamma.dtype), linear.astype(gamma.dtype)

@@ -1,0 +1,48 @@
+"""PointNet++ with single-scale grouping (Qi et al. 2017b): PointNets on balls, on balls of balls, on the whole."""
+
+from __future__ import annotations
+
+import torch
+from torch import nn
+
+from gpca.encoders.group_mlp import GroupMLP
+from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
+
+
+class PointNet2(nn.Module):
+    """Set abstraction at 512 and 128 centroids, then of the whole cloud: the published network for ModelNet40.
+
+    Its radii of 0.2 and 0.4 are for clouds in the unit sphere, of diameter 2; here the object's diameter is 1, so they
+    are 0.1 and 0.2. A cloud with fewer points than centroids takes each point as one.
+
+    A ball's points are given relative to its centroid, as published, so that the first two levels would not see where
+    on the object a ball lies before the last one tells them; the points' own coordinates go in as features too, as
+    normals or colours do in the published network. That loses nothing and lets every level see the frame.
+
+    Args:
+        width: of the first layer, 64 as published; all others grow with it.
+        centroids: of the first level; the second has a quarter of them.
+        radius: of the first level's balls, in units of the object's diameter; the second's is twice as large.
+        neighbours: points of a ball on the first level, at most; twice as many on the second.
+
+    Attributes:
+        embedding_size: d = 16 · width.
+    """
+
+    def __init__(self, width: int = 64, centroids: int = 512, radius: float = 0.1, neighbours: int = 32) -> None:
+        super().__init__()
+        w = width
+        self.embedding_size = 16 * w
+        self._levels = ((centroids, radius, neighbours), (max(1, centroids // 4), 2 * radius, 2 * neighbours))
+        self.levels = nn.ModuleList([GroupMLP(3, (w, w, 2 * w)), GroupMLP(2 * w, (2 * w, 2 * w, 4 * w))])
+        self.whole = GroupMLP(4 * w, (4 * w, 8 * w, self.embedding_size))
+
+    def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
+        """Return embeddings (B, d) of clouds in the target's frame, in units of the object's diameter."""
+        x_B_N_F = points_B_N_3
+        for layers, (centroids, radius, neighbours) in zip(self.levels, self._levels, strict=True):
+            centres_B_M_3 = take(points_B_N_3, farthest_points(points_B_N_3, centroids))
+            groups = Groups(centres_B_M_3, *ball_query(points_B_N_3, centres_B_M_3, radius, neighbours))
+            x_B_N_F = layers(points_B_N_3, x_B_N_F, groups)
+            points_B_N_3 = centres_B_M_3
+        return self.whole(points_B_N_3, x_B_N_F, Groups.whole(points_B_N_3))[:, 0]
