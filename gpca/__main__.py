@@ -16,6 +16,7 @@ STEPS = {
     "registrations": "canonical clouds -> perturbed pairs aligned by ICP",
     "train": "registrations -> encoder weights",
     "embed": "registrations and encoder -> embeddings",
+    "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
     "explain": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",

@@ -64,6 +64,7 @@ STEPS = {
     "registrations": ({"gpca/rigid.py", "gpca/perturbation.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
     "train": ({"gpca/encoders/training.py", "gpca/dataset.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
     "embed": ({"gpca/encoders/training.py", "gpca/predictions.py"}, {"gpca/gpc.py", "gpca/attribution.py"}),
+    "reduce": ({"gpca/reduction.py", "gpca/seeds.py"}, {"gpca/encoders/training.py", "gpca/dataset.py", "gpca/gpc.py"}),
     "without": ({"gpca/encoders/training.py"}, {"gpca/gpc.py", "gpca/acquisition.py"}),
     "active_learning": ({"gpca/latents.py", "gpca/stream.py"}, {"gpca/explainer.py", "gpca/encoders/training.py"}),
     "uncertainty": ({"gpca/icp_kernels.py", "gpca/designs.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),

@@ -41,6 +41,10 @@ STEP_OPTIONS = {
         "--registration-timings": "icp.csv", "--encoder": "weights.pt", "--out": "embeddings.npz",
         "--timings": "dgcnn.csv",
     },
+    "reduce": COMMON | {
+        "--settings": {"components": 4, "epochs": 5}, "--reduction": "autoencoder", "--seeds": 0,
+        "--embeddings": "embeddings.npz", "--out": "reduced.npz",
+    },
     "uncertainty": COMMON | {
         "--settings": {"starts": 13, "points": 40, "icp": {"max_iterations": 20}}, "--design": "removal", "--seeds": 0,
         "--registrations": "registrations.npz", "--out": "uncertainty.npz", "--tables": "uncertainty.csv",
@@ -126,13 +130,14 @@ def test_every_step_runs_by_hand(made):
 
 
 def test_a_step_made_anew_gives_the_same_bytes(folder, made):
-    for step in ("registrations", "train", "embed", "uncertainty", "explain", "without", "active_learning"):
+    for step in ("registrations", "train", "embed", "reduce", "uncertainty", "explain", "without", "active_learning"):
         assert main(arguments(step)) == 0
     for name in (
         "registrations.npz",
         "weights.pt",
         "curve.csv",
         "embeddings.npz",
+        "reduced.npz",
         "uncertainty.npz",
         "uncertainty.csv",
         "predictions.csv",
@@ -142,6 +147,22 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
         "stream_bald.csv",
     ):
         assert (folder / name).read_bytes() == (made / name).read_bytes(), name
+
+
+def test_reduced_embeddings_are_of_the_same_samples_and_each_seed_has_its_own(folder):
+    given = {"--seeds": [0, 1], "--embeddings": ["embeddings.npz"] * 2, "--out": ["reduced.npz", "other.npz"]}
+    assert main(arguments("reduce", given)) == 0
+    whole, reduced, other = (np.load(folder / name) for name in ("embeddings.npz", "reduced.npz", "other.npz"))
+    assert reduced["h"].shape == (24, 4)
+    assert reduced["h"].dtype == np.float32
+    for name in ("head_logits", "sample", "split"):
+        assert np.array_equal(reduced[name], whole[name])
+    assert not np.array_equal(other["h"], reduced["h"])
+
+
+def test_unreduced_embeddings_are_those_that_were_given(folder):
+    assert main(arguments("reduce", {"--reduction": "none", "--settings": {}})) == 0
+    assert np.array_equal(np.load(folder / "reduced.npz")["h"], np.load(folder / "embeddings.npz")["h"])
 
 
 def settings(step, **changed):
@@ -228,6 +249,17 @@ FAULTS = {
         (written("icp.csv", ""), {}, r"icp.csv: is empty"),
         (written("icp.csv", 'sample,"split\n1'), {}, r"icp.csv: is not a readable CSV file"),
         (written("icp.csv", "sample,split,seconds,icp_seconds\n0,train,1,1\n"), {}, r"icp.csv: does not hold the sec"),
+    ],
+    "reduce": [
+        (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+        (arrays_changed("embeddings.npz", h=lambda h: h * np.nan), {}, r"array 'h' holds NaN"),
+        (arrays_changed("embeddings.npz", h=np.ones_like), {}, r"training embeddings: are all alike"),
+        (arrays_changed("embeddings.npz", split=lambda s: np.full_like(s, "test")), {}, r"holds no training samples"),
+        (untouched, settings("reduce", components=19), r"19 components of 18 training embeddings of 32 numbers; set"),
+        (untouched, settings("reduce", components=0), r"setting components: 0 is less than the minimum of 1"),
+        (untouched, settings("reduce", neighbours=3), r"'autoencoder': no setting 'neighbours'; known are components"),
+        (untouched, {"--reduction": "tsne"}, r"reduction 'tsne': unknown; known are none, pca"),
+        (untouched, {"--seeds": [0, 1]}, r"--embeddings: 1 file\(s\) for 2 seed\(s\); give one for each"),
     ],
     "uncertainty": [
         (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),

@@ -70,6 +70,9 @@ FAULTS = [
     ("registrations.trian", 5, "registrations.trian: unknown; did you mean train?"),
     ("registrations.severities.crops", [0, 0.1], "registrations.severities.crops: unknown; did you mean crop?"),
     ("encoders.dgcnn.options.kk", 3, "encoders.dgcnn.options.kk: unknown; did you mean k?"),
+    ("encoders.pointnet2.options.widht", 3, "encoders.pointnet2.options.widht: unknown; did you mean width?"),
+    ("reductions.tsne", {}, "reductions.tsne: unknown; known are none, pca, umap, autoencoder"),
+    ("reductions.pca.neighbours", 3, "reductions.pca.neighbours: unknown; known are components"),
     ("explainers.gpca.iteratons", 3, "explainers.gpca.iteratons: unknown; did you mean iterations?"),
     ("sources.ycb.famly", "ycb", "sources.ycb.famly: unknown; did you mean family?"),
     ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
@@ -103,6 +106,8 @@ FAULTS = [
     ("encoders.dgcnn.epochs", -1, "encoders.dgcnn.epochs: -1 is less than the minimum of 1"),
     ("encoders.dgcnn.learning_rate", NAN, "encoders.dgcnn.learning_rate: nan is not of type 'number'"),
     ("encoders.dgcnn.weight_decay", float("inf"), "encoders.dgcnn.weight_decay: inf is not of type 'number'"),
+    ("encoders.pointnext.options.radius", 0, "encoders.pointnext.options.radius: 0 is less than or equal to the mini"),
+    ("reductions.umap.neighbours", 1, "reductions.umap.neighbours: 1 is less than the minimum of 2"),
     ("explainers.gpca.iterations", 0, "explainers.gpca.iterations: 0 is less than the minimum of 1"),
     ("explainers.gpca.kernel", "cubic", "explainers.gpca.kernel: 'cubic' is not one of ['rbf', 'matern32']"),
     ("objects.points", 100, "objects.points: 100 is less than the minimum of 256"),
@@ -113,7 +118,7 @@ FAULTS = [
     ("downloads", "", "downloads: '' should be non-empty"),
     # names of what does not exist
     ("encoders.dgcnn.backbone", "dgcn", "encoders.dgcnn.backbone: backbone 'dgcn': unknown; known are dgcnn"),
-    ("embedding.encoder", "pointnet", "embedding.encoder: no encoder 'pointnet'; known are dgcnn"),
+    ("embedding.encoder", "voxelnet", "embedding.encoder: no encoder 'voxelnet'; known are dgcnn"),
     ("explainers.shapley", {}, "explainers.shapley: explainer 'shapley': unknown; known are gpca_paper, gpca"),
     ("figures.fig3_source", "ycbv", "figures.fig3_source: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
     # sources

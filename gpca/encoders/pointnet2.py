@@ -15,9 +15,10 @@ class PointNet2(nn.Module):
     Its radii of 0.2 and 0.4 are for clouds in the unit sphere, of diameter 2; here the object's diameter is 1, so they
     are 0.1 and 0.2. A cloud with fewer points than centroids takes each point as one.
 
-    A ball's points are given relative to its centroid, as published, so that the first two levels would not see where
-    on the object a ball lies before the last one tells them; the points' own coordinates go in as features too, as
-    normals or colours do in the published network. That loses nothing and lets every level see the frame.
+    A ball's points are given relative to its centroid, as published, so the first two levels would not see where on
+    the object a ball lies before the last one tells them. Therefore the points' own coordinates go in as features too,
+    as normals do in the published network. Relative coordinates are divided by the radius, which the published network
+    does not do: beside coordinates ten times as large, training would start nearly blind to the shape within a ball.
 
     Args:
         width: of the first layer, 64 as published; all others grow with it.
@@ -42,7 +43,7 @@ class PointNet2(nn.Module):
         x_B_N_F = points_B_N_3
         for layers, (centroids, radius, neighbours) in zip(self.levels, self._levels, strict=True):
             centres_B_M_3 = take(points_B_N_3, farthest_points(points_B_N_3, centroids))
-            groups = Groups(centres_B_M_3, *ball_query(points_B_N_3, centres_B_M_3, radius, neighbours))
+            groups = Groups(centres_B_M_3, *ball_query(points_B_N_3, centres_B_M_3, radius, neighbours), radius)
             x_B_N_F = layers(points_B_N_3, x_B_N_F, groups)
             points_B_N_3 = centres_B_M_3
         return self.whole(points_B_N_3, x_B_N_F, Groups.whole(points_B_N_3))[:, 0]

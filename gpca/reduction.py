@@ -1,0 +1,171 @@
+"""Dimensionality reductions of embeddings by name (paper, Table VI): none, PCA, UMAP, autoencoder.
+
+Each is fitted on the training embeddings, standardised on them, and is then one fixed function of an embedding: what it
+makes of a row depends on no other row that it is applied to. A new one is a class here and its line in `REDUCTIONS`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.seeds import generator, seed_of
+
+Transform = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class PCA:
+    """Principal component analysis (Jolliffe 2002), by a full singular value decomposition."""
+
+    components: int = 64
+
+    def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
+        """Return the projection on the components; nothing here is random."""
+        from sklearn.decomposition import PCA as SklearnPCA
+
+        return SklearnPCA(self.components, svd_solver="full").fit(z_train_N_d).transform
+
+
+@dataclass(frozen=True)
+class UMAP:
+    """Uniform manifold approximation and projection (McInnes et al. 2018) by umap-learn.
+
+    Attributes:
+        components: two to a hundred by its documentation, which has 10 for a clustering to read. More than a graph of
+            some hundred samples can fill only adds noise, hence fewer than for the others.
+        neighbours: of a sample in the graph; 15 is its usual number.
+    """
+
+    components: int = 16
+    neighbours: int = 15
+
+    def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
+        """Return the transform of new samples, which training samples pass as well.
+
+        The places that the fit gave them are left: a classifier shall meet one function in training and in test.
+        """
+        n = len(z_train_N_d)
+        # Beyond these umap-learn takes fewer neighbours, or starts at random, with no more than a warning.
+        for key, most in (("neighbours", n - 1), ("components", n - 3)):
+            if (value := getattr(self, key)) > most:
+                raise InputError("reduction 'umap'", f"{value} {key} of {n} training embeddings", f"lower {key}")
+        seed = seed_of(*axes, "umap") % 2**32
+        with warnings.catch_warnings(action="ignore"):
+            from umap import UMAP as UmapLearn
+
+            random = {"random_state": seed, "transform_seed": seed, "n_jobs": 1}
+            model = UmapLearn(self.neighbours, self.components, **random).fit(z_train_N_d.astype(np.float32))
+
+        def transform(z_S_d: np.ndarray) -> np.ndarray:
+            # One by one: rows that are transformed together share random numbers, and a threshold on their graph.
+            with warnings.catch_warnings(action="ignore"):
+                rows = [model.transform(z_1_d)[0] for z_1_d in z_S_d.astype(np.float32)[:, None]]
+            return np.array(rows).reshape(len(z_S_d), self.components)
+
+        return transform
+
+
+@dataclass(frozen=True)
+class Autoencoder:
+    """Autoencoder (Hinton & Salakhutdinov 2006) d - 256 - components - 256 - d with GELU; the code itself is linear.
+
+    Trained by Adam (learning rate 1e-3, batches of 32) on the mean squared error of the standardised embeddings.
+    """
+
+    components: int = 64
+    epochs: int = 100
+
+    def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
+        """Train for all epochs and return the encoder."""
+        import torch
+        from torch import nn
+
+        d, hidden, batch_size = z_train_N_d.shape[1], 256, 32
+        z_train_N_d = torch.from_numpy(z_train_N_d.astype(np.float32))
+        with _one_thread(torch), torch.random.fork_rng(devices=[]):
+            torch.manual_seed(seed_of(*axes, "autoencoder"))
+            encoder = nn.Sequential(nn.Linear(d, hidden), nn.GELU(), nn.Linear(hidden, self.components))
+            decoder = nn.Sequential(nn.Linear(self.components, hidden), nn.GELU(), nn.Linear(hidden, d))
+            optimiser = torch.optim.Adam([*encoder.parameters(), *decoder.parameters()], lr=1e-3)
+            for epoch in range(self.epochs):
+                order = generator(*axes, "autoencoder", epoch).permutation(len(z_train_N_d))
+                for rows in np.array_split(order, -(-len(order) // batch_size)):
+                    z_B_d = z_train_N_d[rows]
+                    loss = nn.functional.mse_loss(decoder(encoder(z_B_d)), z_B_d)
+                    optimiser.zero_grad()
+                    loss.backward()
+                    optimiser.step()
+
+        @torch.inference_mode()
+        def transform(z_S_d: np.ndarray) -> np.ndarray:
+            with _one_thread(torch):
+                return encoder(torch.from_numpy(z_S_d.astype(np.float32))).numpy()
+
+        return transform
+
+
+REDUCTIONS = {"none": None, "pca": PCA, "umap": UMAP, "autoencoder": Autoencoder}
+
+
+def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict, *axes: object) -> np.ndarray:
+    """Return the reduced embeddings (S, components), float32; ``none`` returns (S, d) as they are.
+
+    Args:
+        name: a key of `REDUCTIONS`.
+        h_train_N_d: what the reduction is fitted on.
+        h_S_d: what it is applied to.
+        settings: the reduction's fields that differ from their defaults.
+        axes: name the random numbers of UMAP and the autoencoder.
+
+    Raises:
+        InputError: unknown reduction or setting; embeddings with NaN or infinity; training embeddings that are all
+            alike; more components or neighbours than there are training embeddings or numbers in them.
+    """
+    reduction = make_reduction(name, settings)
+    for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
+        if not np.isfinite(h).all():
+            raise InputError(role, "hold NaN or infinity", "make them anew with 'python -m gpca embed'")
+    if reduction is None:
+        return np.asarray(h_S_d, np.float32)
+    n, d = h_train_N_d.shape
+    if reduction.components > min(n, d):
+        fault = f"{reduction.components} components of {n} training embeddings of {d} numbers"
+        raise InputError(f"reduction '{name}'", fault, f"set components to {min(n, d)} or less")
+    if not np.ptp(h_train_N_d, axis=0).any():
+        raise InputError("training embeddings", "are all alike", "train the encoder anew")
+    from sklearn.preprocessing import StandardScaler
+
+    scaler = StandardScaler().fit(h_train_N_d.astype(np.float64))
+    z_train_N_d, z_S_d = (scaler.transform(h.astype(np.float64)) for h in (h_train_N_d, h_S_d))
+    return reduction.fit(z_train_N_d, *axes)(z_S_d).astype(np.float32)
+
+
+def make_reduction(name: str, settings: dict):
+    """Return the reduction with its settings, None for ``none``.
+
+    Raises:
+        InputError: unknown reduction, or a setting that it does not have.
+    """
+    if name not in REDUCTIONS:
+        raise InputError(f"reduction '{name}'", "unknown", f"known are {', '.join(REDUCTIONS)}")
+    known = REDUCTIONS[name].__dataclass_fields__ if REDUCTIONS[name] else {}
+    if unknown := [key for key in settings if key not in known]:
+        raise InputError(f"reduction '{name}'", f"no setting '{unknown[0]}'", f"known are {', '.join(known) or 'none'}")
+    return REDUCTIONS[name](**settings) if REDUCTIONS[name] else None
+
+
+@contextmanager
+def _one_thread(torch) -> Iterator[None]:
+    """Let torch use one thread meanwhile: sums over a batch would depend on their number."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
