@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -31,10 +32,41 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary folder beside `path`; on success it takes the place of `path`, on failure it is removed."""
+    path = Path(path)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    partial.mkdir(parents=True)
+    try:
+        yield partial
+        shutil.rmtree(path, ignore_errors=True)
+        partial.replace(path)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
 def sha256_of_file(path: str | Path) -> str:
     """Return the hexadecimal SHA-256 of a file of any size."""
     with Path(path).open("rb") as content:
         return hashlib.file_digest(content, "sha256").hexdigest()
+
+
+def read_image(path: str | Path, remedy: str) -> np.ndarray:
+    """Return the pixels of an image, (H, W) or (H, W, channels), of the file's own depth.
+
+    Raises:
+        InputError: missing, truncated or unreadable; it ends with the remedy.
+    """
+    from PIL import Image
+
+    if not Path(path).is_file():
+        raise InputError(path, "no such image", remedy)
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image)
+    except Exception as fault:  # Pillow raises errors of many kinds for a damaged file
+        raise InputError(path, "is truncated or no readable image", remedy) from fault
 
 
 def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:

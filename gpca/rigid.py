@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gpca.errors import InputError
+
 
 def transform(T_b_a: np.ndarray, points_a: np.ndarray) -> np.ndarray:
     """Map points (N, 3) from frame a to frame b."""
@@ -34,3 +36,10 @@ def random_direction(random: np.random.Generator) -> np.ndarray:
 def rotation_angle_rad(T_b_a: np.ndarray) -> float:
     """Return the angle of the rotation, in [0, π]."""
     return float(np.arccos(np.clip((np.trace(T_b_a[:3, :3]) - 1) / 2, -1, 1)))
+
+
+def require_rotation(T_b_a: np.ndarray, subject: object, tolerance: float = 1e-3) -> None:
+    """Raise an InputError that names `subject` unless the pose is finite and its upper left part is a rotation."""
+    R = T_b_a[:3, :3]
+    if not np.isfinite(T_b_a).all() or abs(R @ R.T - np.eye(3)).max() > tolerance or np.linalg.det(R) < 0:
+        raise InputError(subject, "the pose is no rigid transform", "give a proper rotation, row by row")

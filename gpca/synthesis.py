@@ -10,7 +10,7 @@ import numpy as np
 from gpca.dataset import COLUMNS, SPLITS, Registrations, ragged
 from gpca.environment import require_open3d
 from gpca.objects.canonical import ObjectClouds
-from gpca.perturbation import CONCEPTS, PERTURBATIONS, Severities
+from gpca.perturbation import CONCEPTS, PERTURBATIONS, Perturbed, Severities
 from gpca.progress import progress
 from gpca.registration import ICP, ICPSettings
 from gpca.rigid import scale_translation, transform
@@ -64,36 +64,44 @@ def make_registrations(
         random = generator(source, seed, "registration", split, n)
         record = _register_one(objects, object_index, concept, settings, random)
         records.append(record | {"sample": n, "split": split})
-    columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
-    clouds = ragged([record["cloud"] for record in records], [record["target"] for record in records])
-    registrations = Registrations(**columns, **clouds)
-    return registrations, np.array([record["icp_seconds"] for record in records])
+    return as_registrations(records)
 
 
 def _register_one(
     objects: ObjectClouds, object_index: int, concept: str, settings: RegistrationSettings, random: np.random.Generator
 ) -> dict:
-    diameter_m = float(objects.diameters_m[object_index])
-    points = objects.points(object_index) / diameter_m
+    points = objects.points(object_index) / float(objects.diameters_m[object_index])
     n_points = min(settings.points, len(points) // 2)
     # Disjoint draws: a point seen in both clouds would have distance zero, and that gives the concept away.
     order = random.permutation(len(points))
     source_rows, target_rows = order[:n_points], order[n_points : 2 * n_points]
-
     perturbed = PERTURBATIONS[concept](points[source_rows], settings.severities, random)
+    return aligned(perturbed, objects, object_index, target_rows, settings.icp) | {"concept": concept}
+
+
+def aligned(
+    perturbed: Perturbed, objects: ObjectClouds, object_index: int, target_rows: np.ndarray, icp_settings: ICPSettings
+) -> dict:
+    """Align a perturbed cloud to points of its object's model, from the identity, and return it as a row's columns.
+
+    Args:
+        perturbed: in diameters, in the frame of the initial pose.
+        target_rows: of the object's canonical cloud.
+    """
+    diameter_m = float(objects.diameters_m[object_index])
+    target = objects.points(object_index)[target_rows] / diameter_m
     T_init = np.eye(4)
     started = perf_counter()
-    icp = ICP(points[target_rows], objects.normals(object_index)[target_rows], settings.icp)
+    icp = ICP(target, objects.normals(object_index)[target_rows], icp_settings)
     registration = icp.register(perturbed.points, T_init)
     icp_seconds = perf_counter() - started
     severity = {name: perturbed.severity.get(name, 0.0) for name in ("noise", "rotation_rad", "translation", "crop")}
     return {
-        "concept": concept,
         "object_index": object_index,
         "object_name": str(objects.names[object_index]),
         "diameter_m": diameter_m,
         "cloud": transform(registration.T_target_source, perturbed.points).astype(np.float32),
-        "target": points[target_rows].astype(np.float32),
+        "target": target.astype(np.float32),
         "T_target_source_true": scale_translation(perturbed.T_target_source_true, diameter_m),
         "T_target_source_init": T_init,
         "T_target_source_icp": scale_translation(registration.T_target_source, diameter_m),
@@ -102,3 +110,10 @@ def _register_one(
         "inlier_rmse": registration.inlier_rmse,
         **{f"severity_{name}": value for name, value in severity.items()},
     }
+
+
+def as_registrations(records: list[dict]) -> tuple[Registrations, np.ndarray]:
+    """Return rows that :func:`aligned` made as registrations, and the seconds (S,) that ICP took for each."""
+    columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
+    clouds = ragged([record["cloud"] for record in records], [record["target"] for record in records])
+    return Registrations(**columns, **clouds), np.array([record["icp_seconds"] for record in records])

@@ -33,8 +33,10 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
     Raises:
         InputError: missing folder, model or models_info.json, or a model whose diameter is not the listed one.
     """
-    models = _models_folder(Path(folder))
-    scale, listed_mm = metres_per(unit), _listed_diameters_mm(models / "models_info.json")
+    models = models_folder(Path(folder))
+    scale = metres_per(unit)
+    info = read_models_info(models / "models_info.json")
+    listed_mm = {number: model["diameter"] for number, model in info.items()}
     ids = sorted(int(path.stem[4:]) for path in models.glob("obj_[0-9]*.ply")) if objects is None else sorted(objects)
     for number in ids:
         path = models / f"obj_{number:06d}.ply"
@@ -54,7 +56,8 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
         yield surface
 
 
-def _models_folder(folder: Path) -> Path:
+def models_folder(folder: Path) -> Path:
+    """Return the folder that holds the models of a dataset's folder, or of one that holds it."""
     if not folder.is_dir():
         raise InputError(folder, "no such folder", "check location and data_dir in the config")
     for candidate in (folder, folder / "models", *sorted(folder.glob("*/models"))):
@@ -63,11 +66,12 @@ def _models_folder(folder: Path) -> Path:
     raise InputError(folder, "the folder holds no models/obj_*.ply", "check location in the config")
 
 
-def _listed_diameters_mm(path: Path) -> dict[int, float]:
+def read_models_info(path: Path) -> dict[int, dict]:
+    """Return what models_info.json lists by object id; InputError where it is missing, damaged or lacks diameters."""
     if not path.is_file():
         raise InputError(path, "no such file", "fetch the models again, or use kind: mesh_folder for plain meshes")
     try:
         info = json.loads(path.read_text(encoding="utf-8"))
-        return {int(number): float(model["diameter"]) for number, model in info.items()}
+        return {int(number): {**model, "diameter": float(model["diameter"])} for number, model in info.items()}
     except (ValueError, KeyError, TypeError, AttributeError) as fault:
         raise InputError(path, "is not a BOP models_info.json", "fetch the models again") from fault

@@ -81,12 +81,23 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
     else:
         if len(faces) == 0 or not np.linalg.norm(_area_vectors(vertices_m, faces), axis=1).sum() > 0:
             raise InputError(subject, "the mesh has no area", "export it anew, with its faces")
-        hull_m, draw = vertices_m[np.unique(faces)], _sampled  # vertices that no face uses are no surface
+        hull_m, draw = _used_vertices(surface), _sampled
     diameter_m = diameter(hull_m, subject)
     _require_size(diameter_m, subject)
     points_m, normals = draw(surface, n_points, seeds.generator(source, surface.name, "surface"))
-    centre_m = (hull_m.min(axis=0) + hull_m.max(axis=0)) / 2
-    return (points_m - centre_m).astype(np.float32), normals.astype(np.float32), diameter_m
+    return (points_m - bounding_centre(surface)).astype(np.float32), normals.astype(np.float32), diameter_m
+
+
+def bounding_centre(surface: Surface) -> np.ndarray:
+    """Return the centre (3,) of a surface's upright bounding box, in metres: the origin of its canonical cloud."""
+    used_m = _used_vertices(surface)
+    return (used_m.min(axis=0) + used_m.max(axis=0)) / 2
+
+
+def _used_vertices(surface: Surface) -> np.ndarray:
+    vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
+    # Vertices that no face uses are no surface.
+    return vertices_m if surface.faces is None else vertices_m[np.unique(surface.faces)]
 
 
 def _require_size(diameter_m: float, subject: str) -> None:

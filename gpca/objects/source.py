@@ -71,17 +71,26 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
         yield from procedural.surfaces(entry["family"])
         return
     module = _module_of(entry["kind"])
+    archives = getattr(module, "READS_ARCHIVES", False)
+    for folder in folders(entry, cache_folder, unpack=not archives):
+        yield from module.from_entry(entry, folder)
+
+
+def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[Path]:
+    """Return where a resolved entry's data is: its location, or what was downloaded, a folder for each archive.
+
+    Raises:
+        InputError: from :mod:`gpca.objects.download` and :mod:`gpca.objects.archive`.
+    """
     if entry["origin"] == "local":
-        yield from module.from_entry(entry, Path(entry["location"]))
-        return
+        return [Path(entry["location"])]
     urls = _as_list(entry.get("urls") or entry.get("url"))
     checksums = _as_list(entry.get("sha256")) or [None] * len(urls)
     files = [
         download.fetch(url, sha256, cache_folder, entry.get("location"))
         for url, sha256 in zip(urls, checksums, strict=True)
     ]
-    for file in files:
-        yield from module.from_entry(entry, file if getattr(module, "READS_ARCHIVES", False) else _unpacked(file))
+    return [_unpacked(file) for file in files] if unpack else files
 
 
 def data_files(entry: dict) -> list[Path]:

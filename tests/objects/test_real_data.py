@@ -27,3 +27,22 @@ def test_real_objects(name, tmp_path):
     clouds = ObjectClouds.load(tmp_path / "objects.npz")
     assert len(clouds) == count
     assert smallest_m < clouds.diameters_m.min() <= clouds.diameters_m.max() < largest_m
+
+
+def test_every_instance_of_the_real_frames_lies_on_its_model(tmp_path):
+    from pathlib import Path
+
+    from gpca.frames.initial_pose import InitialPoseSettings
+    from gpca.frames.reading import Dataset, points_on_model, read_instances, read_models
+
+    read = {}
+    for name in ("ycbv", "lm", "lmo"):
+        dataset = Dataset(name, (Path(DATA_DIR, "bop", name),))
+        frames = dataset.frames()
+        read[name] = (dataset, frames, read_models(dataset, frames))
+    written = (model.surface for _, _, models in read.values() for model in models.values())
+    write_objects(written, "real_rgbd", tmp_path / "objects.npz", n_points=16384)
+    objects = ObjectClouds.load(tmp_path / "objects.npz")
+    instances = read_instances(read, objects, InitialPoseSettings("true_pose"), gap=10)
+    assert len(instances) == sum(len(frame.annotations) for _, frames, _ in read.values() for frame in frames)
+    assert points_on_model(instances, objects).max() < 5e-3

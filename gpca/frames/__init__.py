@@ -1,0 +1,1 @@
+"""Depth frames, real or of a virtual camera: from masks and poses to registrations."""

@@ -1,0 +1,155 @@
+"""A virtual RGB-D camera: ray casting, shading, and the depth noise of a structured-light sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.environment import require_open3d
+
+NOTHING = -1  # of a pixel that sees no mesh
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera with whole coordinates at pixel centres, looking along +z, x right and y down.
+
+    Attributes:
+        width, height: in pixels.
+        focal_px: focal length of both axes.
+    """
+
+    width: int = 640
+    height: int = 480
+    focal_px: float = 570.0
+
+    @property
+    def matrix_3_3(self) -> np.ndarray:
+        """K, with the principal point in the middle of the image."""
+        centre_u, centre_v = (self.width - 1) / 2, (self.height - 1) / 2
+        return np.array([[self.focal_px, 0, centre_u], [0, self.focal_px, centre_v], [0, 0, 1.0]])
+
+    def rays(self) -> np.ndarray:
+        """Return for every pixel (H, W, 3) the direction whose z is 1, so that a ray's length is its depth."""
+        v, u = np.mgrid[: self.height, : self.width]
+        return np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(self.matrix_3_3).T
+
+
+@dataclass(frozen=True)
+class View:
+    """What a camera without noise sees.
+
+    Attributes:
+        depth_m: (H, W), infinite where there is nothing.
+        mesh: (H, W) number of the mesh seen, `NOTHING` where there is none.
+        cosine: (H, W) of the angle between the surface's normal and the direction to the camera, in [0, 1].
+        normals: (H, W, 3) unit normals in the camera's frame, turned to the camera.
+    """
+
+    depth_m: np.ndarray
+    mesh: np.ndarray
+    cosine: np.ndarray
+    normals: np.ndarray
+
+
+class MeshScene:
+    """Meshes in one world frame, ready to be looked at.
+
+    Args:
+        meshes: (vertices (V, 3) in metres, faces (F, 3)) of each.
+    """
+
+    def __init__(self, meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
+        o3d = require_open3d()
+        self._tensor, self._float, self._uint = o3d.core.Tensor, o3d.core.float32, o3d.core.uint32
+        self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+        for vertices_m, faces in meshes:
+            self._scene.add_triangles(
+                self._tensor(np.ascontiguousarray(vertices_m, np.float32)),
+                self._tensor(np.ascontiguousarray(faces, np.uint32)),
+            )
+
+    def silhouette(self, camera: Camera, T_world_camera: np.ndarray) -> np.ndarray:
+        """Return the pixels (H, W) that see something, as booleans."""
+        return np.isfinite(self._cast(camera.rays(), T_world_camera)["t_hit"].numpy())
+
+    def look(self, camera: Camera, T_world_camera: np.ndarray) -> View:
+        """Return what the camera sees from a pose."""
+        rays_H_W_3 = camera.rays()
+        hits = self._cast(rays_H_W_3, T_world_camera)
+        depth_m, mesh = hits["t_hit"].numpy(), hits["geometry_ids"].numpy().astype(np.int64)
+        mesh[~np.isfinite(depth_m)] = NOTHING
+        normals = hits["primitive_normals"].numpy().astype(np.float64) @ T_world_camera[:3, :3]
+        to_camera = -rays_H_W_3 / np.linalg.norm(rays_H_W_3, axis=-1, keepdims=True)
+        cosine = np.sum(normals * to_camera, axis=-1)
+        normals *= np.where(cosine < 0, -1, 1)[..., None]
+        return View(depth_m, mesh, np.abs(cosine), normals)
+
+    def _cast(self, rays_H_W_3: np.ndarray, T_world_camera: np.ndarray):
+        directions = rays_H_W_3 @ T_world_camera[:3, :3].T
+        origins = np.broadcast_to(T_world_camera[:3, 3], directions.shape)
+        rays = np.concatenate([origins, directions], axis=-1).astype(np.float32)
+        return self._scene.cast_rays(self._tensor(rays), nthreads=1)
+
+
+@dataclass(frozen=True)
+class DepthNoise:
+    """Noise of a structured-light depth camera, by Nguyen, Izadi and Lovell (3DIMPVT 2012).
+
+    With the distance z in metres and the angle θ between surface and line of sight:
+
+        axial deviation  σ_z = 0.0012 + 0.0019 (z - 0.4)²  metres, and beyond 60° more: + 0.0001 θ² / (√z (π/2 - θ)²),
+        lateral deviation  σ_L = 0.8 + 0.035 θ / (π/2 - θ)  pixels.
+
+    Lateral noise is a pixel that looks a little beside itself: edges fray. Past `grazing_deg` nothing is measured.
+
+    Attributes:
+        scale: factor of both deviations; 0 is a perfect sensor.
+        grazing_deg: θ of the steepest surface that is measured.
+        dropout: share of pixels that measure nothing anyway.
+    """
+
+    scale: float = 1.0
+    grazing_deg: float = 80.0
+    dropout: float = 0.01
+
+    def measure(self, view: View, random: np.random.Generator) -> np.ndarray:
+        """Return measured depth (H, W) in metres, 0 where nothing was measured."""
+        theta = np.minimum(np.arccos(np.clip(view.cosine, 0, 1)), np.deg2rad(89))
+        height, width = view.depth_m.shape
+        lateral_px = self.scale * (0.8 + 0.035 * theta / (np.pi / 2 - theta))
+        v, u = np.mgrid[:height, :width]
+        shift = random.normal(size=(2, height, width)) * lateral_px
+        v = np.clip(np.rint(v + shift[0]).astype(int), 0, height - 1)
+        u = np.clip(np.rint(u + shift[1]).astype(int), 0, width - 1)
+        z, theta = view.depth_m[v, u], theta[v, u]
+        measured = np.isfinite(z) & (theta < np.deg2rad(self.grazing_deg)) & (random.random(z.shape) >= self.dropout)
+        z = np.where(measured, z, 1.0)
+        steep = 0.0001 * theta**2 / (np.sqrt(z) * (np.pi / 2 - theta) ** 2)
+        axial_m = 0.0012 + 0.0019 * (z - 0.4) ** 2 + np.where(theta > np.deg2rad(60), steep, 0.0)
+        return np.where(measured, z + self.scale * axial_m * random.normal(size=z.shape), 0.0)
+
+
+def shade(view: View, colours_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.ndarray:
+    """Return an image (H, W, 3) uint8 of coloured meshes under a lamp above and an even light; grey where nothing is.
+
+    Lambert's law; colours are in [0, 1].
+    """
+    lamp_world = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
+    lamp_camera = T_world_camera[:3, :3].T @ lamp_world
+    light = 0.45 + 0.55 * np.clip(view.normals @ lamp_camera, 0, 1)
+    colours = np.where((view.mesh == NOTHING)[..., None], 0.55, colours_M_3[view.mesh] * light[..., None])
+    return np.rint(255 * np.clip(colours, 0, 1)).astype(np.uint8)
+
+
+def look_at(eye_m: np.ndarray, target_m: np.ndarray) -> np.ndarray:
+    """Return ``T_world_camera`` of a camera at `eye_m` that looks at `target_m`, the image upright (world z up)."""
+    z = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    T_world_camera[:3, 3] = eye_m
+    return T_world_camera

@@ -1,0 +1,177 @@
+"""The pose that ICP starts from in a frame: an estimator's results, the truth with a declared error, or features.
+
+All return ``T_camera_object``, in metres, with the object's frame at the centre of its bounding box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from gpca.errors import InputError
+from gpca.predictions import read_csv
+from gpca.rigid import inverse, random_direction, require_rotation, transform
+
+RESULTS_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
+FORMS = ("results", "true_pose", "global_registration")
+
+
+@dataclass(frozen=True)
+class InitialPoseSettings:
+    """Where initial poses come from.
+
+    Attributes:
+        form: ``results`` of an estimator, ``true_pose`` with an error, or ``global_registration``.
+        rotation_deg, translation: largest error of ``true_pose``, the angle and in diameters, drawn uniformly.
+        voxel: of the features of ``global_registration``, in diameters.
+        tries: random starts of RANSAC, of which the best is taken.
+    """
+
+    form: str = "global_registration"
+    rotation_deg: float = 5.0
+    translation: float = 0.03
+    voxel: float = 0.05
+    tries: int = 20
+
+    def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise InputError(f"initial pose '{self.form}'", "unknown", f"choose one of {', '.join(FORMS)}")
+
+
+def displaced(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPoseSettings, random) -> np.ndarray:
+    """Return the true pose with a random error of at most the declared size."""
+    T_object_displaced = np.eye(4)
+    angle_rad = np.deg2rad(random.uniform(0, settings.rotation_deg))
+    T_object_displaced[:3, :3] = Rotation.from_rotvec(angle_rad * random_direction(random)).as_matrix()
+    T_object_displaced[:3, 3] = random.uniform(0, settings.translation) * diameter_m * random_direction(random)
+    return T_camera_object @ T_object_displaced
+
+
+class GlobalRegistration:
+    """FPFH features and RANSAC (Rusu et al. 2009; Zhou et al. 2018) through Open3D, the best of several runs.
+
+    A run is judged after point-to-plane ICP from its pose by the share of measured points that lie on the model and
+    the share of the model's points facing the camera that were measured: many poses explain the points, but few
+    also what should be seen. Needs no truth; a stand-in for a pose estimator.
+
+    Args:
+        model: canonical points (Q, 3) of the object and their normals, in metres.
+    """
+
+    def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):
+        from gpca.environment import require_open3d
+
+        self._o3d = require_open3d()
+        self._settings, self._voxel_m = settings, settings.voxel * diameter_m
+        self._model = self._features(self._cloud(points_m, normals))
+
+    def register(self, points_m: np.ndarray, seed: int) -> np.ndarray:
+        """Return ``T_camera_object`` of the measured points (P, 3), which are in the camera's frame.
+
+        The same seed gives the same pose where Open3D runs on one thread (``OMP_NUM_THREADS=1``).
+        """
+        o3d, registration = self._o3d, self._o3d.pipelines.registration
+        cloud = self._cloud(points_m)
+        cloud.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius=2 * self._voxel_m, max_nn=30))
+        cloud.orient_normals_towards_camera_location(np.zeros(3))
+        (source, source_features), (model, model_features) = self._features(cloud), self._model
+        reach_m = 1.5 * self._voxel_m
+        tree, model_m, normals = cKDTree(source.points), np.asarray(model.points), np.asarray(model.normals)
+        best, best_share = np.eye(4), -1.0
+        for number in range(self._settings.tries):
+            o3d.utility.random.seed((seed + number) % 2**31)
+            coarse = registration.registration_ransac_based_on_feature_matching(
+                source,
+                model,
+                source_features,
+                model_features,
+                mutual_filter=False,
+                max_correspondence_distance=reach_m,
+                estimation_method=registration.TransformationEstimationPointToPoint(),
+                ransac_n=3,
+                checkers=[
+                    registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
+                    registration.CorrespondenceCheckerBasedOnDistance(reach_m),
+                    registration.CorrespondenceCheckerBasedOnNormal(np.deg2rad(60)),
+                ],
+                criteria=registration.RANSACConvergenceCriteria(4000, 0.999),
+            )
+            fine = registration.registration_icp(
+                source,
+                model,
+                reach_m,
+                coarse.transformation,
+                registration.TransformationEstimationPointToPlane(),
+                registration.ICPConvergenceCriteria(max_iteration=20),
+            )
+            T_camera_object = inverse(np.array(fine.transformation))
+            seen_m = transform(T_camera_object, model_m)
+            facing = np.sum(seen_m * (normals @ T_camera_object[:3, :3].T), axis=1) < 0
+            share = fine.fitness + np.sum(tree.query(seen_m[facing])[0] < self._voxel_m) / max(1, facing.sum())
+            if share > best_share:
+                best, best_share = T_camera_object, share
+        return best
+
+    def _cloud(self, points_m: np.ndarray, normals: np.ndarray | None = None):
+        cloud = self._o3d.geometry.PointCloud(self._o3d.utility.Vector3dVector(np.asarray(points_m, np.float64)))
+        if normals is not None:
+            cloud.normals = self._o3d.utility.Vector3dVector(np.asarray(normals, np.float64))
+        return cloud
+
+    def _features(self, cloud):
+        thinned = cloud.voxel_down_sample(self._voxel_m)
+        search = self._o3d.geometry.KDTreeSearchParamHybrid(radius=5 * self._voxel_m, max_nn=100)
+        return thinned, self._o3d.pipelines.registration.compute_fpfh_feature(thinned, search)
+
+
+def read_results(path: str | Path, images: set[tuple[int, int]]) -> dict[tuple[int, int, int], list[np.ndarray]]:
+    """Read a results file of the BOP benchmark, as every method for it exports them.
+
+    Args:
+        images: (scene, image) of the dataset.
+
+    Returns:
+        (scene, image, object id) -> poses ``T_camera_model`` in metres, the highest score first.
+
+    Raises:
+        InputError: missing file or column, R without nine numbers or t without three, R that is no rotation, a number
+            that is none, an image that the dataset does not have.
+    """
+    rows = read_csv(path, RESULTS_COLUMNS)
+    found: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
+    for number, row in enumerate(rows.to_dict("records"), start=2):
+        subject = f"{path}: line {number}"
+        try:
+            key = int(row["scene_id"]), int(row["im_id"]), int(row["obj_id"])
+            score = float(row["score"])
+        except ValueError as fault:
+            raise InputError(subject, "scene_id, im_id, obj_id or score is no number", "export it anew") from fault
+        if key[:2] not in images:
+            raise InputError(subject, f"the dataset has no image {key[1]} of scene {key[0]}", "check results or split")
+        T_camera_model = np.eye(4)
+        T_camera_model[:3, :3] = _entries(subject, "R", row["R"], 9).reshape(3, 3)
+        T_camera_model[:3, 3] = _entries(subject, "t", row["t"], 3) / 1000
+        require_rotation(T_camera_model, subject)
+        found.setdefault(key, []).append((score, T_camera_model))
+    return {key: [T for _, T in sorted(poses, key=lambda pose: -pose[0])] for key, poses in found.items()}
+
+
+def _entries(subject: str, column: str, text: str, count: int) -> np.ndarray:
+    try:
+        numbers = np.array(text.replace(",", " ").split(), float)
+    except ValueError as fault:
+        raise InputError(subject, f"{column} holds something other than numbers", "export it anew") from fault
+    if len(numbers) != count:
+        raise InputError(subject, f"{column} has {len(numbers)} entries, not {count}", "separate them by spaces")
+    return numbers
+
+
+def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.ndarray) -> np.ndarray:
+    """Return the pose whose origin is seen nearest to the mask's centre: which of several equal objects is meant."""
+    centre_2 = pixels_P_2.mean(axis=0)
+    seen = [camera_3_3 @ pose[:3, 3] for pose in poses]
+    return poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - centre_2) for p in seen]))]

@@ -1,0 +1,252 @@
+"""Table-top scenes of procedural objects, seen by the virtual camera and written as a BOP dataset."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gpca.errors import InputError
+from gpca.files import whole_folder
+from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at, shade
+from gpca.objects.canonical import canonical_cloud, diameter
+from gpca.objects.surface import Surface
+from gpca.objects.symmetry import found_symmetries
+from gpca.progress import progress
+from gpca.rigid import inverse, transform
+from gpca.seeds import generator
+
+DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
+TABLE_M = 1.2  # edge length of the table
+
+
+@dataclass(frozen=True)
+class SceneSettings:
+    """What is on the table and from where it is seen.
+
+    Attributes:
+        families: of procedural objects.
+        scenes, views: scenes, and frames of each.
+        objects: range of their number in a scene.
+        distance_m: range from the camera to the middle of the objects.
+        elevation_deg: range above the table; the azimuth goes all around.
+        gap_m: least distance between the outlines of two objects on the table.
+        camera: intrinsics.
+        noise: of depth.
+    """
+
+    families: tuple[str, ...] = ("ycb",)
+    scenes: int = 12
+    views: int = 4
+    objects: tuple[int, int] = (4, 8)
+    distance_m: tuple[float, float] = (0.6, 0.9)
+    elevation_deg: tuple[float, float] = (15.0, 50.0)
+    gap_m: float = 0.01
+    camera: Camera = field(default_factory=Camera)
+    noise: DepthNoise = field(default_factory=DepthNoise)
+
+    @classmethod
+    def from_dict(cls, settings: dict) -> SceneSettings:
+        """Build from the config's section ``real_world.scenes``."""
+        settings = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
+        camera, noise = Camera(**settings.pop("camera", {})), DepthNoise(**settings.pop("noise", {}))
+        return cls(camera=camera, noise=noise, **settings)
+
+    def __post_init__(self) -> None:
+        for name in ("objects", "distance_m", "elevation_deg"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise InputError(f"scenes {name}", f"[{low}, {high}] runs downwards", "swap the two")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An object on the table: its number among the models, from 0, and where it stands."""
+
+    model: int
+    T_world_object: np.ndarray
+
+
+def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettings, folder: str | Path) -> None:
+    """Write models and frames in the layout of BOP: models/, test/{scene}/ with depth, rgb, mask, mask_visib, poses.
+
+    Everything random is named by source, scene and view. The folder appears when it is complete.
+    """
+    surfaces = [_centred(surface) for surface in surfaces]
+    with whole_folder(folder) as partial:
+        _write_models(surfaces, source, partial / "models")
+        _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **asdict(settings)})
+        for scene in progress(range(settings.scenes), f"scenes of {source}"):
+            standing = lay_table(surfaces, settings, source, scene)
+            middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
+            views = camera_poses(settings, middle_m, source, scene)
+            _write_scene(partial / f"test/{scene:06d}", surfaces, standing, views, settings, (source, scene))
+
+
+def lay_table(surfaces: list[Surface], settings: SceneSettings, source: str, scene: int) -> list[Placed]:
+    """Stand different objects on the table z = 0, each as it rests by itself, close together but not touching.
+
+    Each takes one of its stable poses, by their probability, turned at random, and comes from a random direction as
+    near to the middle as its convex outline on the table allows.
+    """
+    from shapely import MultiPoint
+    from shapely.affinity import translate
+
+    random = generator(source, "scene", scene)
+    count = min(int(random.integers(settings.objects[0], settings.objects[1] + 1)), len(surfaces))
+    standing, outlines = [], []
+    for model in random.permutation(len(surfaces))[:count]:
+        T_world_object = _resting(surfaces[model], random)
+        flat_m = transform(T_world_object, surfaces[model].vertices_m)[:, :2]
+        outline = MultiPoint(flat_m - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2).convex_hull
+        azimuth = random.uniform(0, 2 * np.pi)
+        ways = (
+            distance_m * np.array([np.cos(azimuth), np.sin(azimuth)]) for distance_m in np.arange(0, TABLE_M, 0.005)
+        )
+        at = next(way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
+        T_world_object[:2, 3] += at - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2
+        outlines.append(translate(outline, *at))
+        standing.append(Placed(int(model), T_world_object))
+    return standing
+
+
+def camera_poses(settings: SceneSettings, middle_m: np.ndarray, source: str, scene: int) -> list[np.ndarray]:
+    """Return ``T_world_camera`` of each view: on a hemisphere about the middle of the objects, all around them."""
+    random = generator(source, "views", scene)
+    turn = random.uniform(0, 2 * np.pi)
+    poses = []
+    for view in range(settings.views):
+        azimuth = turn + 2 * np.pi * (view + random.uniform(-0.3, 0.3)) / settings.views
+        elevation = np.deg2rad(random.uniform(*settings.elevation_deg))
+        flat = np.array([np.cos(azimuth), np.sin(azimuth)]) * np.cos(elevation)
+        target_m = middle_m + np.append(random.uniform(-0.03, 0.03, size=2), 0.0)
+        eye_m = target_m + random.uniform(*settings.distance_m) * np.array([*flat, np.sin(elevation)])
+        poses.append(look_at(eye_m, target_m))
+    return poses
+
+
+def table() -> tuple[np.ndarray, np.ndarray]:
+    """Return the table's top, a square at z = 0, as vertices and faces."""
+    half = TABLE_M / 2
+    return np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]), np.array(
+        [[0, 1, 2], [0, 2, 3]]
+    )
+
+
+def _centred(surface: Surface) -> Surface:
+    centre_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
+    return Surface(surface.name, surface.vertices_m - centre_m, surface.faces)
+
+
+def _resting(surface: Surface, random: np.random.Generator) -> np.ndarray:
+    import trimesh
+
+    mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
+    poses, probabilities = trimesh.poses.compute_stable_poses(mesh, sigma=0.0, threshold=0.0)
+    chosen = poses[random.choice(len(poses), p=probabilities / probabilities.sum())]
+    turn = np.eye(4)
+    turn[:3, :3] = Rotation.from_euler("z", random.uniform(0, 2 * np.pi)).as_matrix()
+    return turn @ chosen
+
+
+def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
+    import trimesh
+
+    folder.mkdir(parents=True)
+    info = {}
+    for number, surface in enumerate(surfaces, start=1):
+        mesh = trimesh.Trimesh(1e3 * surface.vertices_m, surface.faces, process=False)
+        (folder / f"obj_{number:06d}.ply").write_bytes(mesh.export(file_type="ply"))
+        low, high = mesh.bounds
+        cloud_m, _, diameter_m = canonical_cloud(surface, source, 4096)
+        info[number] = {
+            "name": surface.name,
+            "diameter": 1e3 * diameter(surface.vertices_m, surface.name),
+            **{f"min_{axis}": value for axis, value in zip("xyz", low.tolist(), strict=True)},
+            **{f"size_{axis}": value for axis, value in zip("xyz", (high - low).tolist(), strict=True)},
+            **found_symmetries(cloud_m, diameter_m),
+        }
+    _write_json(folder / "models_info.json", info)
+
+
+def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings: SceneSettings, axes: tuple) -> None:
+    meshes = [(transform(p.T_world_object, surfaces[p.model].vertices_m), surfaces[p.model].faces) for p in standing]
+    scene, alone = MeshScene([*meshes, table()]), [MeshScene([mesh]) for mesh in meshes]
+    colours_M_3 = np.array([*(_colour(p.model, len(surfaces)) for p in standing), (0.72, 0.65, 0.55)])
+    for name in ("depth", "rgb", "mask", "mask_visib"):
+        (folder / name).mkdir(parents=True)
+    camera_json, truth_json, info_json = {}, {}, {}
+    for image, T_world_camera in enumerate(views):
+        view = scene.look(settings.camera, T_world_camera)
+        depth_m = settings.noise.measure(view, generator(*axes, "depth", image))
+        write_png(
+            folder / f"depth/{image:06d}.png", np.rint(1e3 * depth_m / DEPTH_SCALE).clip(0, 65535).astype(np.uint16)
+        )
+        write_png(folder / f"rgb/{image:06d}.png", shade(view, colours_M_3, T_world_camera))
+        truth_json[image], info_json[image] = [], []
+        for n, object_ in enumerate(standing):
+            whole = alone[n].silhouette(settings.camera, T_world_camera)
+            visible = view.mesh == n
+            for kind, mask in (("mask", whole), ("mask_visib", visible)):
+                write_png(folder / f"{kind}/{image:06d}_{n:06d}.png", np.where(mask, 255, 0).astype(np.uint8))
+            T_camera_object = inverse(T_world_camera) @ object_.T_world_object
+            truth_json[image].append(_truth(object_.model + 1, T_camera_object))
+            info_json[image].append(_visibility(whole, visible, depth_m))
+        camera_json[image] = {"cam_K": settings.camera.matrix_3_3.ravel().tolist(), "depth_scale": DEPTH_SCALE}
+        camera_json[image] |= _world(T_world_camera)
+    for name, content in (("camera", camera_json), ("gt", truth_json), ("gt_info", info_json)):
+        _write_json(folder / f"scene_{name}.json", content)
+
+
+def _truth(object_id: int, T_camera_object: np.ndarray) -> dict:
+    rotation, translation_mm = T_camera_object[:3, :3].ravel().tolist(), (1e3 * T_camera_object[:3, 3]).tolist()
+    return {"obj_id": object_id, "cam_R_m2c": rotation, "cam_t_m2c": translation_mm}
+
+
+def _world(T_world_camera: np.ndarray) -> dict:
+    T_camera_world = inverse(T_world_camera)
+    return {
+        "cam_R_w2c": T_camera_world[:3, :3].ravel().tolist(),
+        "cam_t_w2c": (1e3 * T_camera_world[:3, 3]).tolist(),
+    }
+
+
+def _visibility(whole: np.ndarray, visible: np.ndarray, depth_m: np.ndarray) -> dict:
+    counts = {
+        "px_count_all": whole.sum(),
+        "px_count_valid": (whole & (depth_m > 0)).sum(),
+        "px_count_visib": visible.sum(),
+    }
+    share = visible.sum() / max(1, whole.sum())
+    return {
+        **{k: int(v) for k, v in counts.items()},
+        "visib_fract": float(share),
+        "bbox_obj": _box(whole),
+        "bbox_visib": _box(visible),
+    }
+
+
+def _box(mask: np.ndarray) -> list[int]:
+    v, u = np.nonzero(mask)
+    return [int(u.min()), int(v.min()), int(np.ptp(u)) + 1, int(np.ptp(v)) + 1] if len(u) else [-1, -1, -1, -1]
+
+
+def _colour(model: int, count: int) -> tuple[float, float, float]:
+    from colorsys import hsv_to_rgb
+
+    return hsv_to_rgb(model * 0.618034 % 1, 0.55 if model % 2 else 0.75, 0.85)
+
+
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    """Write pixels, (H, W) uint8 or uint16 or (H, W, 3) uint8, as a PNG."""
+    from PIL import Image
+
+    Image.fromarray(pixels).save(path)
+
+
+def _write_json(path: Path, content: dict) -> None:
+    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,30 @@
+"""Where configured datasets of frames are: in a local folder, or at the addresses that they are downloaded from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from gpca.objects.source import data_files, resolve
+
+REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
+
+
+def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) -> dict[str, dict]:
+    """Return the resolved entries of the config's section ``real_world.datasets``; reads no data.
+
+    Raises:
+        InputError: as :func:`gpca.objects.source.resolve` raises it.
+    """
+    return {name: resolve(_as_source(name, entry), data_dir) for name, entry in (datasets or {}).items()}
+
+
+def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path]:
+    """Return the files that local datasets are read from, sorted by dataset and name."""
+    return [path for entry in resolve_datasets(datasets, data_dir).values() for path in data_files(entry)]
+
+
+def _as_source(name: str, entry: dict) -> dict:
+    split = entry.get("split", "test")
+    patterns = [f"{split}*/*/*.json", f"{split}*/*/depth/*", f"{split}*/*/mask_visib/*", "models/*"]
+    return {"title": name, "kind": "bop", "files": patterns, **entry}

@@ -1,0 +1,109 @@
+"""Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labelled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.dataset import SPLITS, Registrations
+from gpca.environment import require_open3d
+from gpca.frames.instances import Instances
+from gpca.frames.occlusion import occlude
+from gpca.objects.canonical import ObjectClouds
+from gpca.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
+from gpca.pose_error import pose_error
+from gpca.progress import progress
+from gpca.rigid import inverse, scale_translation, transform
+from gpca.seeds import generator
+from gpca.synthesis import RegistrationSettings, aligned, as_registrations
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+OCCLUDER, HALF_SPACE = "occluder", "half_space"
+JUDGED_POINTS = 1000  # of the model, by which a pose error is measured
+
+
+@dataclass(frozen=True)
+class FrameSettings:
+    """How instances become registrations.
+
+    Attributes:
+        test_share: of the instances, in frames that training does not see.
+        occluders: share of the overlap samples whose points an occluder takes; a half-space takes the others'.
+        registration: numbers of samples, points, severities, ICP.
+    """
+
+    test_share: float = 0.4
+    occluders: float = 0.5
+    registration: RegistrationSettings = field(default_factory=RegistrationSettings)
+
+
+def make_frame_registrations(
+    instances: Instances, objects: ObjectClouds, source: str, seed: int, settings: FrameSettings
+) -> tuple[Registrations, np.ndarray, pd.DataFrame]:
+    """Perturb the clouds of instances about their initial poses, align them by ICP and label them.
+
+    Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; the instances
+    of the split take turns. The source frame is the object's at the initial pose, so that ICP starts at the identity.
+    What is wrong with the initial pose and with the depth itself is in every sample, whatever its label.
+
+    Returns:
+        the registrations, the seconds (S,) of ICP, and a row per sample: where it comes from, and how far the initial
+        and the aligned pose are off, ADD-S for symmetric objects and ADD elsewhere, relative to the diameter.
+    """
+    import pandas as pd
+
+    require_open3d()
+    rows_of = instances.split(source, seed, settings.test_share)
+    samples = [(split, n) for split in SPLITS for n in range(getattr(settings.registration, split))]
+    records, poses = [], []
+    for split, n in progress(samples, f"registrations of {source}, seed {seed}"):
+        deal, place = divmod(n, len(CONCEPTS))
+        turns, row = divmod(deal, len(rows_of[split]))
+        i = int(generator(source, seed, "instances", split, turns).permutation(rows_of[split])[row])
+        concept = str(generator(source, seed, "concepts", split, deal).permutation(CONCEPTS)[place])
+        random = generator(source, seed, "registration", split, n)
+        record, lost_to = _register_one(instances, i, objects, concept, settings, random)
+        record |= {"sample": n, "split": split, "concept": concept}
+        records.append(record)
+        poses.append(_pose_row(instances, i, objects, record) | {"lost_to": lost_to})
+    return *as_registrations(records), pd.DataFrame(poses)
+
+
+def _register_one(
+    instances: Instances, i: int, objects: ObjectClouds, concept: str, settings: FrameSettings, random
+) -> tuple[dict, str]:
+    index = int(instances.object_index[i])
+    diameter_m, given = float(objects.diameters_m[index]), settings.registration
+    T_init_camera = inverse(instances.T_camera_object_init[i])
+    rows = random.permutation(len(instances.cloud_m(i)))[: given.points]
+    target_rows = random.permutation(len(objects.points(index)))[: given.points]
+    points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
+    perturbed, lost_to = None, ""
+    if concept == "overlap":
+        if random.random() < settings.occluders:
+            share = random.uniform(*given.severities.crop)
+            kept_P = occlude(instances, i, instances.pixels_of(i)[rows], share, random)
+            if kept_P is not None:
+                perturbed = Perturbed(points[kept_P], severity={"crop": float(1 - kept_P.mean())})
+        lost_to = HALF_SPACE if perturbed is None else OCCLUDER
+    perturbed = PERTURBATIONS[concept](points, given.severities, random) if perturbed is None else perturbed
+    T_object_init = inverse(instances.T_camera_object_true[i]) @ instances.T_camera_object_init[i]
+    T_true = scale_translation(T_object_init, 1 / diameter_m) @ perturbed.T_target_source_true
+    return aligned(replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, given.icp), lost_to
+
+
+def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict) -> dict:
+    model_m, symmetric = objects.points(record["object_index"])[:JUDGED_POINTS], bool(instances.symmetric[i])
+    T_source_target = inverse(record["T_target_source_true"])
+    errors = {
+        f"{name}_error": pose_error(model_m, record[f"T_target_source_{name}"] @ T_source_target, np.eye(4), symmetric)
+        / record["diameter_m"]
+        for name in ("init", "icp")
+    }
+    shown = {name: record[name] for name in ("sample", "split", "concept")}
+    seen = {name: getattr(instances, name)[i] for name in ("dataset", "scene", "image")}
+    return shown | {"instance": i, **seen, "object": record["object_name"], "symmetric": symmetric, **errors}

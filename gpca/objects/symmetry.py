@@ -1,0 +1,63 @@
+"""Rotations that leave an object's shape as it is: read from a BOP models_info.json, or found on the cloud itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+TOLERANCE = 0.01  # of the diameter
+DISCRETE_DEG = (90.0, 180.0)
+CONTINUOUS_DEG = (25.0, 50.0, 75.0)  # none is a symmetry of a square or hexagonal shape
+
+
+def listed_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None:
+    """Return ``symmetries_discrete`` and ``symmetries_continuous`` of an object, or None where the file lists none.
+
+    The file lists none for an object that has none, and for no object at all where its makers left them out.
+
+    Args:
+        models_info: as :func:`gpca.objects.bop.read_models_info` returns it.
+    """
+    lists = {n: {k: v for k, v in entry.items() if k.startswith("symmetries_")} for n, entry in models_info.items()}
+    return lists.get(object_id, {}) if any(lists.values()) else None
+
+
+def found_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
+    """Return the rotations about the axes of the bounding box that leave the shape as it is, as BOP writes them.
+
+    A rotation changes nothing where the mean distance from a turned point to its nearest one is within `TOLERANCE` of
+    the diameter beyond the points' own spacing. That finds LINEMOD's two symmetric objects on their scans. Shape alone
+    counts: a printed can is symmetric, since registration sees no print.
+
+    Args:
+        points_N_3: a dense cloud of the whole surface, centred on its bounding box.
+        diameter: in the unit of the points.
+
+    Returns:
+        ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with their offset. Keys only
+        where there are some.
+    """
+    points_N_3 = np.asarray(points_N_3, np.float64)
+    tree = cKDTree(points_N_3)
+    spacing = tree.query(points_N_3, k=2)[0][:, 1].mean()
+    limit = TOLERANCE * diameter + spacing
+
+    def fits(axis: np.ndarray, angle_deg: float) -> bool:
+        turned = Rotation.from_rotvec(np.deg2rad(angle_deg) * axis).apply(points_N_3)
+        return tree.query(turned)[0].mean() < limit
+
+    continuous, discrete = [], []
+    for axis in np.eye(3):
+        if all(fits(axis, angle) for angle in CONTINUOUS_DEG):
+            continuous.append({"axis": axis.tolist(), "offset": [0.0, 0.0, 0.0]})
+            continue
+        for angle in DISCRETE_DEG:
+            if fits(axis, angle):
+                T = np.eye(4)
+                T[:3, :3] = Rotation.from_rotvec(np.deg2rad(angle) * axis).as_matrix()
+                discrete.append(T.round(9).ravel().tolist())
+    return {
+        **({"symmetries_discrete": discrete} if discrete else {}),
+        **({"symmetries_continuous": continuous} if continuous else {}),
+    }
