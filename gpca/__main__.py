@@ -14,6 +14,9 @@ from gpca.errors import InputError
 STEPS = {
     "objects": "meshes or clouds of a source -> canonical clouds",
     "registrations": "canonical clouds -> perturbed pairs aligned by ICP",
+    "scenes": "settings -> table-top scenes of procedural objects, seen by a virtual depth camera",
+    "instances": "depth frames with masks and poses -> partial clouds with initial poses",
+    "frame_registrations": "partial clouds -> perturbed ones aligned by ICP",
     "train": "registrations -> encoder weights",
     "embed": "registrations and encoder -> embeddings",
     "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",

@@ -10,6 +10,9 @@ from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry, require_settings
+from gpca.frames.rgbd_scene import SceneSettings
+from gpca.frames.source import REAL_WORLD, resolve_datasets
+from gpca.objects import procedural
 from gpca.objects.source import resolve
 from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
 from gpca.settings import load_schema, require_valid
@@ -44,6 +47,7 @@ def check(config: dict) -> dict[str, dict]:
             raise InputError(
                 "config key active_learning.strategies", f"no strategy '{strategy}'", f"known are {', '.join(known)}"
             )
+    _check_real_world(config)
     sources = {
         name: {"stand_in": entry["kind"] == "procedural"}
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
@@ -52,6 +56,25 @@ def check(config: dict) -> dict[str, dict]:
     if (name := config["figures"]["fig3_source"]) not in sources:
         raise InputError("config key figures.fig3_source", f"no source '{name}'", f"known are {', '.join(sources)}")
     return sources
+
+
+def _check_real_world(config: dict) -> None:
+    section = config["real_world"]
+    for backbone in section["backbones"]:
+        if backbone not in config["encoders"]:
+            known = ", ".join(config["encoders"])
+            raise InputError("config key real_world.backbones", f"no encoder '{backbone}'", f"known are {known}")
+    if REAL_WORLD in config["sources"]:
+        raise InputError(f"config key sources.{REAL_WORLD}", "is the name of real_world's frames", "take another")
+    with_key("real_world.scenes", SceneSettings.from_dict, section["scenes"])
+    for family in section["scenes"].get("families", ()):
+        with_key("real_world.scenes.families", procedural.require_family, family)
+    with_key("real_world.datasets", resolve_datasets, section["datasets"], config["data_dir"])
+    if section["initial_pose"].get("form") == "results":
+        for name, entry in (section["datasets"] or {"scenes": {}}).items():
+            if not entry.get("results"):
+                key = f"config key real_world.datasets.{name}.results"
+                raise InputError(key, "is needed by initial_pose form results", "name the file, or take another form")
 
 
 def with_key(key: str, function, *arguments):

@@ -70,7 +70,12 @@ STEP_OPTIONS = {
         "--predictions": "labelled.csv",
     },
 }  # fmt: skip
+FRAME_STEPS = {"scenes", "instances", "frame_registrations"}  # of depth frames: tests/frames/test_steps.py
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
+
+
+def test_every_step_is_tested_here_or_with_the_frames():
+    assert set(STEPS) == set(STEP_OPTIONS) | FRAME_STEPS
 
 
 def arguments(step, changes=()):
@@ -102,7 +107,7 @@ def made(tmp_path_factory):
     (folder / "answers.txt").write_text("overlap\nocclusion\n/skip\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        for step in STEPS:
+        for step in STEP_OPTIONS:
             assert main(arguments(step)) == 0
     return folder
 
@@ -369,7 +374,7 @@ def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder):
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert err.splitlines()[-1] == "gpca train: stopped; the same command continues"
     assert "Traceback" not in err
     assert main(arguments("train", longer)) == 0

@@ -5,6 +5,7 @@ from pathlib import Path
 from gpca.acquisition import STRATEGIES as ACQUISITION, STREAMS
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
+from gpca.frames.source import REAL_WORLD, frame_files
 from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
@@ -12,6 +13,7 @@ from gpca.reporting.learning_tables import LEARNING_TABLES
 from gpca.reporting.tables import GPCA, TABLE1, title_of
 
 SEEDS = config["seeds"]
+REDUCTIONS = list(config["reductions"])
 EMBEDDING = f"{config['embedding']['encoder']}/{config['embedding']['reduction']}"
 STRATEGIES = config["active_learning"]["strategies"]
 POOL_STRATEGIES = [name for name in STRATEGIES if name in ACQUISITION]
@@ -28,7 +30,7 @@ for path in sorted(Path(workflow.basedir, "workflow/rules/sources").glob("*.smk"
 
 
 wildcard_constraints:
-    source="|".join(SOURCES),
+    source="|".join([*SOURCES, REAL_WORLD]),
     backbone="|".join(config["encoders"]),
     explainer="|".join(config["explainers"]),
     design="|".join(config["uncertainty"]),
@@ -133,6 +135,50 @@ def learning_curves(strategies):
     )
 
 
+def frames_inputs(wildcards):
+    """The files of the datasets that the config names, or the scenes that stand in for them."""
+    if not config["real_world"]["datasets"]:
+        return {"scenes": f"results/{wildcards.run}/scenes/{REAL_WORLD}"}
+    return {"data": frame_files(config["real_world"]["datasets"], config["data_dir"])}
+
+
+def frames_option(wildcards, input):
+    if input.get("scenes"):
+        return f"--scenes {input.scenes}"
+    named = {"--data-dir": config["data_dir"], "--downloads": config["downloads"]}
+    return " ".join(
+        f"{option} {shlex.quote(folder)}" for option, folder in named.items() if folder
+    )
+
+
+# Rows of Table VI: GP-CA on every backbone and reduction, and the classic features where they are switched on.
+BACKBONES = [
+    f"{backbone}-{reduction}"
+    for backbone in config["real_world"]["backbones"]
+    for reduction in config["real_world"]["reductions"]
+]
+SHOWN_BACKBONES = [
+    name
+    for name in BACKBONES
+    if name.endswith(f"-{config['real_world']['reductions'][0]}")
+]
+REAL_WORLD_TITLE = title_of(
+    {
+        "title": config["real_world"]["title"],
+        "stand_in": not config["real_world"]["datasets"],
+    }
+)
+CLASSIC = [name for name in ("analytical_gpc",) if name in config["explainers"]]
+
+
+def real_world_predictions(methods):
+    return collect(
+        f"results/{{{{run}}}}/predictions/{REAL_WORLD}/{{method}}/seed{{seed}}.csv",
+        method=methods,
+        seed=SEEDS,
+    )
+
+
 # The explainers that each table shows: asked for alone, a table builds these and nothing else. No table without any.
 TABLE_EXPLAINERS = {
     table: shown
@@ -156,14 +202,21 @@ def table_inputs(wildcards):
     return {"predictions": [pattern.format(run=wildcards.run) for pattern in patterns]}
 
 
+REAL_WORLD_FIGURES = [
+    "fig5_real_world_example",
+    "confusion_real_world",
+    "real_world_failures",
+]
 FIGURES = [
+    *REAL_WORLD_FIGURES,
     "fig3_concepts",
     "fig_attribution_confusions",
     "active_learning_curves",
     *(f"objects_{source}" for source in SOURCES),
 ]
 RESULTS = [
-    *("metrics.csv", "timings.csv", "active_learning.csv"),
+    *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *(f"tables/{table}.md" for table in (*TABLE_EXPLAINERS, *LEARNING_TABLES)),
+    "tables/table6_backbones.md",
     *(f"figures/{figure}.png" for figure in FIGURES),
 ]

@@ -9,6 +9,8 @@ rule registrations:
         "results/{run}/logs/registrations/{source}/seed{seed}.log",
     benchmark:
         "results/{run}/benchmarks/registrations/{source}/seed{seed}.tsv"
+    wildcard_constraints:
+        source="|".join(SOURCES),
     conda:
         "../envs/gpca.yaml"
     threads: 1

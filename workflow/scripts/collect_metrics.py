@@ -4,4 +4,4 @@ from gpca.metrics import collect, write_metrics
 from gpca.reporting.script import job
 
 with job(snakemake):
-    write_metrics(collect(snakemake.input.predictions, snakemake.input.causal), snakemake.output[0])
+    write_metrics(collect(snakemake.input.predictions, snakemake.input.get("causal", ())), snakemake.output[0])

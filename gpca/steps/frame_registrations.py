@@ -1,0 +1,42 @@
+"""Step ``frame_registrations``: instances -> ``registrations/{source}/seed{seed}.npz``, and their pose errors."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.frames.instances import Instances
+from gpca.frames.synthesis import FrameSettings, make_frame_registrations
+from gpca.objects.canonical import ObjectClouds
+from gpca.predictions import write_csv, write_timings
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.synthesis import RegistrationSettings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is the config's section ``registrations``, with test_share, occluders."""
+    parser.add_argument("--instances", required=True, type=Path)
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--poses", required=True, type=Path, help="CSV: where each sample is from, its pose errors")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds of every ICP")
+
+
+def run(options: Namespace) -> None:
+    """Perturb and align."""
+    given = dict(options.settings)
+    own = {name: given.pop(name) for name in ("test_share", "occluders") if name in given}
+    check_settings(given, "registrations")
+    check_settings(own, "real_world")
+    settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(given))
+    inputs = [options.instances, options.objects]
+    with recorded([options.out, options.poses, options.timings], inputs, options.settings, seed=options.seed):
+        instances, objects = Instances.load(options.instances), ObjectClouds.load(options.objects)
+        made = make_frame_registrations(instances, objects, options.source, options.seed, settings)
+        registrations, icp_seconds_S, poses = made
+        registrations.save(options.out)
+        write_csv(options.poses, poses)
+        write_timings(options.timings, registrations, icp_seconds_S, icp_seconds_S)

@@ -1,0 +1,66 @@
+"""Step ``instances``: BOP datasets -> ``instances/{source}.npz`` and the canonical clouds of their models."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.reading import Dataset, points_on_model, read_instances, read_models
+from gpca.frames.source import resolve_datasets
+from gpca.objects.canonical import ObjectClouds, write_objects
+from gpca.objects.source import data_files, folders
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` are parts of the config's section ``real_world``."""
+    parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
+    parser.add_argument("--scenes", type=Path, help="the folder that the step scenes wrote, in place of datasets")
+    parser.add_argument("--data-dir", help="folder that holds the datasets; what is there is not downloaded")
+    parser.add_argument("--downloads", default="data/downloads", type=Path, help="where downloads are kept")
+    parser.add_argument("--points", type=int, default=16384, help="points sampled on each model")
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--objects", required=True, type=Path, help="canonical clouds, to be written")
+
+
+def run(options: Namespace) -> None:
+    """Read models and frames, back-project the masks and find the initial poses."""
+    check_settings(options.settings, "real_world")
+    entries = resolve_datasets(options.settings.get("datasets"), options.data_dir)
+    if not entries and not options.scenes:
+        raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
+    inputs = [path for entry in entries.values() for path in data_files(entry)]
+    initial_pose = InitialPoseSettings(**options.settings.get("initial_pose", {}))
+    with recorded([options.out, options.objects], inputs, {**options.settings, "points": options.points}):
+        datasets = {
+            name: Dataset(name, tuple(folders(entry, options.downloads)), **_given(entry, options.data_dir))
+            for name, entry in entries.items()
+        }
+        if options.scenes:
+            datasets = {"scenes": Dataset("scenes", (options.scenes,))}
+        read = {}
+        for name, dataset in datasets.items():
+            frames = dataset.frames()
+            read[name] = (dataset, frames, read_models(dataset, frames))
+        surfaces = (model.surface for _, _, models in read.values() for model in models.values())
+        write_objects(surfaces, options.source, options.objects, options.points)
+        objects = ObjectClouds.load(options.objects)
+        instances = read_instances(read, objects, initial_pose, options.settings.get("gap", 10))
+        instances.save(options.out)
+    for name in datasets:
+        medians_m = points_on_model(instances, objects)[instances.dataset == name]
+        print(
+            f"{name}: {len(medians_m)} instances; median distance to the model under the true pose: "
+            f"{1e3 * medians_m.mean():.2f} mm on average, {1e3 * medians_m.max():.2f} mm at most",
+            file=sys.stderr,
+        )
+
+
+def _given(entry: dict, data_dir: str | None) -> dict:
+    given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
+    results = entry.get("results")
+    return given | ({"results": Path(data_dir or "", results).expanduser()} if results else {})

@@ -1,0 +1,26 @@
+"""Step ``scenes``: settings -> table-top scenes of procedural objects as a BOP dataset."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.frames.rgbd_scene import SceneSettings, write_scenes
+from gpca.objects import procedural
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is the config's section ``real_world.scenes``."""
+    parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
+    parser.add_argument("--out", required=True, type=Path, help="folder; one that is there is replaced")
+
+
+def run(options: Namespace) -> None:
+    """Lay the tables, look at them and write what was seen."""
+    check_settings(options.settings, "real_world", "scenes")
+    settings = SceneSettings.from_dict(options.settings)
+    with recorded([options.out], [], options.settings):
+        surfaces = (surface for family in settings.families for surface in procedural.surfaces(family))
+        write_scenes(surfaces, options.source, settings, options.out)

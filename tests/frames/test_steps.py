@@ -1,0 +1,98 @@
+"""The steps from datasets to registrations as commands, and what they say of a faulty call."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.__main__ import main
+from gpca.dataset import Registrations
+from gpca.frames.instances import Instances
+from gpca.objects.canonical import ObjectClouds
+
+REGISTRATIONS = {"train": 9, "test": 6, "points": 128, "test_share": 0.4, "occluders": 1.0}
+
+
+def settings(**given):
+    return json.dumps(given)
+
+
+@pytest.fixture
+def read(scenes, tmp_path):
+    def run(*more, given=None):
+        given = given or {"initial_pose": {"form": "true_pose"}, "datasets": {"tiny": {"location": str(scenes)}}}
+        files = ("--out", str(tmp_path / "instances.npz"), "--objects", str(tmp_path / "objects.npz"))
+        arguments = (
+            "instances",
+            "--source",
+            "tiny",
+            "--settings",
+            json.dumps(given),
+            "--points",
+            "1024",
+            *files,
+            *more,
+        )
+        return main(list(arguments)), tmp_path
+
+    return run
+
+
+def test_a_dataset_becomes_registrations(read, capsys):
+    status, folder = read()
+    assert status == 0
+    assert "instances; median distance to the model under the true pose:" in capsys.readouterr().err
+    instances, objects = Instances.load(folder / "instances.npz"), ObjectClouds.load(folder / "objects.npz")
+    assert set(objects.names) == {"tiny brick", "tiny cylinder", "tiny cone", "tiny capsule", "tiny bracket"}
+    assert set(instances.object_index) == set(range(5))
+    sources = ("--instances", str(folder / "instances.npz"), "--objects", str(folder / "objects.npz"))
+    outputs = [str(folder / name) for name in ("seed0.npz", "poses.csv", "timings.csv")]
+    step = ["frame_registrations", *sources, "--source", "tiny", "--seed", "0", "--settings", settings(**REGISTRATIONS)]
+    assert main([*step, "--out", outputs[0], "--poses", outputs[1], "--timings", outputs[2]]) == 0
+    registrations, poses = Registrations.load(outputs[0]), pd.read_csv(outputs[1])
+    assert (poses["sample"].to_numpy() == registrations.sample).all()
+    assert np.isfinite(poses[["init_error", "icp_error"]]).all(axis=None)
+    assert (folder / "poses.csv.provenance.json").is_file()
+
+
+def test_the_scenes_of_another_step_stand_in_for_datasets(scenes, read):
+    status, folder = read("--scenes", str(scenes), given={"initial_pose": {"form": "true_pose"}})
+    assert status == 0
+    assert set(Instances.load(folder / "instances.npz").dataset) == {"scenes"}
+
+
+def test_scenes_are_drawn_by_a_command(tmp_path, monkeypatch):
+    from gpca.objects import procedural
+
+    from .tiny import surfaces
+
+    monkeypatch.setattr(procedural, "surfaces", lambda family: iter(surfaces()))
+    given = settings(
+        scenes=2, views=1, objects=[2, 2], camera={"width": 64, "height": 48, "focal_px": 60}, families=["ycb"]
+    )
+    assert main(["scenes", "--source", "tiny", "--settings", given, "--out", str(tmp_path / "drawn")]) == 0
+    assert len(list((tmp_path / "drawn/test/000000/mask_visib").iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"datasets": {"tiny": {"location": "/nowhere/at/all"}}}, "/nowhere/at/all is not there"),
+        ({"datasets": {"tiny": {"place": "x"}}}, "setting datasets.tiny.place: unknown"),
+        ({"initial_pose": {"form": "guess"}}, "setting initial_pose.form: 'guess' is not one of"),
+    ],
+)
+def test_a_faulty_call_ends_in_one_line(read, capsys, given, expected):
+    status, folder = read(given=given)
+    assert status == 2
+    error = capsys.readouterr().err
+    assert expected in error
+    assert error.count("\n") == 1
+    assert not (folder / "instances.npz").exists()
+
+
+def test_no_dataset_and_no_scenes_are_nothing_to_read(read, capsys):
+    status, _ = read(given={"initial_pose": {"form": "true_pose"}})
+    assert status == 2
+    assert "name a dataset, or the folder of the step scenes" in capsys.readouterr().err
