@@ -47,6 +47,32 @@ def test_edge_conv_compares_networks_of_equal_embeddings_and_notices_unequal_one
     assert max_abs_error(reference, fused, clouds) > 1e-3
 
 
+def test_backbones_ends_with_the_numbers_of_each(capsys):
+    from benchmarks import backbones
+
+    backbones.main(["--batch", "2", "--points", "40", "--repeats", "1", "--backbones", "dgcnn", "pointnet"])
+    out = capsys.readouterr().out
+    result = last_line(out)
+    every = ["train_ms", "ms", "parameters", "peak_mb"]
+    names = [f"{name}_dgcnn" for name in every] + [f"{name}_pointnet" for name in (*every, "train_speedup")]
+    assert list(result) == names
+    assert min(result.values()) > 0
+    assert result["parameters_pointnet"] == 150_336
+    assert "2 clouds of 40 points, 1 thread(s)" in out
+
+
+def test_the_plain_form_is_that_of_the_same_network():
+    import torch
+
+    from benchmarks.backbones import every_slot, make_clouds, make_network
+
+    network, clouds = make_network("pointnext"), make_clouds(2, 64)
+    with every_slot():
+        plain = network(clouds)
+    assert not torch.equal(network(clouds), plain)
+    torch.testing.assert_close(network(clouds), plain, atol=1e-3, rtol=1e-3)
+
+
 @pytest.fixture
 def run_folder(tmp_path):
     """A run of three jobs: objects; encoders with two seeds in one job; a table that is written as two files."""
