@@ -6,7 +6,8 @@ share; the maximum over the slots is the group's feature (Qi et al. 2017, 2017b)
 - The first linear map W = [Wx | Wf] acts on ``[(p_j - c_g)/r ; f_j]``, so it splits into A_j + C_g with
   A_j = Wx p_j/r + Wf f_j and C_g = -Wx c_g/r: a matrix product over the points, not over the slots of all groups.
 - A ball with fewer than k points repeats its first one. Repeats do not change the maximum, and batch norm counts them
-  by a weight, so only distinct points are evaluated: in a cloud of 512 points a fifth of the slots, or fewer.
+  by a weight, so only distinct points are evaluated: of 512 points a quarter of the slots of PointNeXt's balls, two
+  fifths of PointNet++'s.
 
 Means and variances are those of all B·M·k slots. The plain form is kept in ``GroupMLP.plain``, for CUDA and for the
 tests; outputs, running statistics and all gradients agree with it.
