@@ -18,12 +18,14 @@ class Groups:
         neighbours_B_M_k: the group's points by their numbers in the cloud.
         counts_B_M: how many of them are distinct; the other slots repeat the first one.
         radius: unit of the relative coordinates.
+        is_whole: whether each cloud is one group of all its points in their order, around the origin.
     """
 
     centres_B_M_3: torch.Tensor
     neighbours_B_M_k: torch.Tensor
     counts_B_M: torch.Tensor
     radius: float = 1.0
+    is_whole: bool = False
 
     @classmethod
     def whole(cls, points_B_N_3: torch.Tensor) -> Groups:
@@ -31,12 +33,7 @@ class Groups:
         batch, n, _ = points_B_N_3.shape
         everything_N = torch.arange(n, dtype=torch.int32, device=points_B_N_3.device)
         counts_B_1 = torch.full((batch, 1), n, dtype=torch.int32, device=points_B_N_3.device)
-        return cls(points_B_N_3.new_zeros(batch, 1, 3), everything_N.expand(batch, 1, n), counts_B_1)
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether there is one group per cloud that holds every point once, in order (see :meth:`whole`)."""
-        return self.neighbours_B_M_k.stride(0) == 0
+        return cls(points_B_N_3.new_zeros(batch, 1, 3), everything_N.expand(batch, 1, n), counts_B_1, is_whole=True)
 
 
 def farthest_points(points_B_N_3: torch.Tensor, n_centres: int) -> torch.Tensor:

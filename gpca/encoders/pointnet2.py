@@ -10,10 +10,11 @@ from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
 
 
 class PointNet2(nn.Module):
-    """Set abstraction at 512 and 128 centroids, then of the whole cloud: the published network for ModelNet40.
+    """Set abstraction at 256 and 64 centroids, then of the whole cloud: the published network for ModelNet40.
 
-    Its radii of 0.2 and 0.4 are for clouds in the unit sphere, of diameter 2; here the object's diameter is 1, so they
-    are 0.1 and 0.2. A cloud with fewer points than centroids takes each point as one.
+    It has 512 and 128 centroids for clouds of 1024 points; with 512 points the shares are kept. Its radii of 0.2 and 0.4
+    are for clouds in the unit sphere, of diameter 2; here the object's diameter is 1, so they are 0.1 and 0.2. In a
+    cloud with fewer points than centroids each point is one.
 
     A ball's points are given relative to its centroid, as published, so the first two levels would not see where on
     the object a ball lies before the last one tells them. Therefore the points' own coordinates go in as features too,
@@ -30,7 +31,7 @@ class PointNet2(nn.Module):
         embedding_size: d = 16 · width.
     """
 
-    def __init__(self, width: int = 64, centroids: int = 512, radius: float = 0.1, neighbours: int = 32) -> None:
+    def __init__(self, width: int = 64, centroids: int = 256, radius: float = 0.1, neighbours: int = 32) -> None:
         super().__init__()
         w = width
         self.embedding_size = 16 * w
