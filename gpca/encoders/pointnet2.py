@@ -12,8 +12,8 @@ from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
 class PointNet2(nn.Module):
     """Set abstraction at 256 and 64 centroids, then of the whole cloud: the published network for ModelNet40.
 
-    It has 512 and 128 centroids for clouds of 1024 points; with 512 points the shares are kept. Its radii of 0.2 and 0.4
-    are for clouds in the unit sphere, of diameter 2; here the object's diameter is 1, so they are 0.1 and 0.2. In a
+    It has 512 and 128 centroids for clouds of 1024 points; with 512 points the shares are kept. Its radii of 0.2 and
+    0.4 are for clouds in the unit sphere, of diameter 2; here the object's diameter is 1, so they are 0.1 and 0.2. In a
     cloud with fewer points than centroids each point is one.
 
     A ball's points are given relative to its centroid, as published, so the first two levels would not see where on
