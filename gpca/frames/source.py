@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from gpca.errors import InputError
 from gpca.objects.source import data_files, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
@@ -14,17 +15,25 @@ def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) 
     """Return the resolved entries of the config's section ``real_world.datasets``; reads no data.
 
     Raises:
-        InputError: as :func:`gpca.objects.source.resolve` raises it.
+        InputError: as :func:`gpca.objects.source.resolve` raises it, and for a results file that is not there.
     """
-    return {name: resolve(_as_source(name, entry), data_dir) for name, entry in (datasets or {}).items()}
+    return {name: _resolved(name, entry, data_dir) for name, entry in (datasets or {}).items()}
 
 
 def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path]:
     """Return the files that local datasets are read from, sorted by dataset and name."""
-    return [path for entry in resolve_datasets(datasets, data_dir).values() for path in data_files(entry)]
+    files = []
+    for entry in resolve_datasets(datasets, data_dir).values():
+        files += data_files(entry) + ([Path(entry["results"])] if entry.get("results") else [])
+    return files
 
 
-def _as_source(name: str, entry: dict) -> dict:
+def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
     split = entry.get("split", "test")
     patterns = [f"{split}*/*/*.json", f"{split}*/*/depth/*", f"{split}*/*/mask_visib/*", "models/*"]
-    return {"title": name, "kind": "bop", "files": patterns, **entry}
+    found = resolve({"title": name, "kind": "bop", "files": patterns, **entry}, data_dir)
+    if found.get("results"):
+        found["results"] = str(Path(data_dir or "", found["results"]).expanduser().absolute())
+        if not Path(found["results"]).is_file():
+            raise InputError(found["results"], "no such results file", f"correct results of dataset {name}")
+    return found

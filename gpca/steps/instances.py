@@ -9,9 +9,9 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.reading import Dataset, points_on_model, read_instances, read_models
-from gpca.frames.source import resolve_datasets
+from gpca.frames.source import frame_files, resolve_datasets
 from gpca.objects.canonical import ObjectClouds, write_objects
-from gpca.objects.source import data_files, folders
+from gpca.objects.source import folders
 from gpca.provenance import recorded
 from gpca.settings import check_settings
 
@@ -33,11 +33,11 @@ def run(options: Namespace) -> None:
     entries = resolve_datasets(options.settings.get("datasets"), options.data_dir)
     if not entries and not options.scenes:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
-    inputs = [path for entry in entries.values() for path in data_files(entry)]
+    inputs = frame_files(options.settings.get("datasets"), options.data_dir)
     initial_pose = InitialPoseSettings(**options.settings.get("initial_pose", {}))
     with recorded([options.out, options.objects], inputs, {**options.settings, "points": options.points}):
         datasets = {
-            name: Dataset(name, tuple(folders(entry, options.downloads)), **_given(entry, options.data_dir))
+            name: Dataset(name, tuple(folders(entry, options.downloads)), **_given(entry))
             for name, entry in entries.items()
         }
         if options.scenes:
@@ -60,7 +60,6 @@ def run(options: Namespace) -> None:
         )
 
 
-def _given(entry: dict, data_dir: str | None) -> dict:
+def _given(entry: dict) -> dict:
     given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
-    results = entry.get("results")
-    return given | ({"results": Path(data_dir or "", results).expanduser()} if results else {})
+    return given | ({"results": Path(entry["results"])} if entry.get("results") else {})
