@@ -104,7 +104,11 @@ FAULTS = [
     ("encoders.dgcnn.learning_rate", NAN, "encoders.dgcnn.learning_rate: nan is not of type 'number'"),
     ("encoders.dgcnn.weight_decay", float("inf"), "encoders.dgcnn.weight_decay: inf is not of type 'number'"),
     ("explainers.gpca.iterations", 0, "explainers.gpca.iterations: 0 is less than the minimum of 1"),
-    ("explainers.gpca.kernel", "cubic", "explainers.gpca.kernel: 'cubic' is not one of ['rbf', 'matern32']"),
+    (
+        "explainers.gpca.kernel",
+        "cubic",
+        "explainers.gpca.kernel: 'cubic' is not one of ['rbf', 'matern32', 'polynomial']",
+    ),
     ("objects.points", 100, "objects.points: 100 is less than the minimum of 256"),
     ("seeds", [], "seeds: [] should be non-empty"),
     ("seeds", [0, 1, 0], "seeds: [0, 1, 0] has non-unique elements"),
