@@ -47,7 +47,7 @@ def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tenso
     if isinstance(base, ScaledPolynomialKernel):
         inner_A_B = a_A_d @ b_B_d.T / a_A_d.shape[1]
         return scale_C_1_1 * (inner_A_B + base.offset[:, :, None]).square()
-    squared_A_B = _squared_distances(a_A_d, b_B_d)
+    squared_A_B = squared_distances(a_A_d, b_B_d)
     if isinstance(base, gpytorch.kernels.MaternKernel):
         # Not zero under the root, where its derivative would be infinite.
         scaled_C_A_B = squared_A_B.clamp_min(1e-15).sqrt() * (math.sqrt(3) / base.lengthscale)
@@ -63,6 +63,7 @@ def variance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
     return scale_C_1.expand(-1, len(a_A_d))
 
 
-def _squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
+def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
+    """Return |a - b|², (A, B)."""
     squares_A_1, squares_B = a_A_d.square().sum(dim=1, keepdim=True), b_B_d.square().sum(dim=1)
     return torch.addmm(squares_A_1 + squares_B, a_A_d, b_B_d.T, alpha=-2).clamp_min(0)

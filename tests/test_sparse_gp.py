@@ -60,5 +60,5 @@ def test_the_divergence_is_torchs():
 
 
 def test_as_many_samples_as_latents_are_not_transposed():
-    model, losses = fitted("rbf", 40, inputs=INPUTS[:3], targets=torch.tensor([1, 2, 0]))
+    model, _ = fitted("rbf", 40, inputs=INPUTS[:3], targets=torch.tensor([1, 2, 0]))
     assert model.marginals(INPUTS[:3])[0].argmax(dim=0).tolist() == [1, 2, 0]
