@@ -1,0 +1,198 @@
+"""What the uncertainty of learners is worth: risk over coverage, reliability, uncertainty over distance.
+
+All take the same arguments and raise the same error:
+
+    learned: as :func:`gpca.learner_metrics.read_learned` returns it.
+    sources, learners: name -> title, in order; those without predictions are left out.
+    pdf_path, png_path: where the figure is written.
+    InputError: no predictions of these sources and learners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from gpca.diagnostics import BINS, rank_correlation, risk_coverage
+from gpca.errors import InputError
+from gpca.learner_metrics import sets_of, wrong
+from gpca.reporting.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY_BLUE,
+    TEXT_WIDTH_IN,
+    VERMILION,
+    save_figure,
+    use_style,
+)
+from gpca.shifted_sets import DISTANCES
+
+STYLES = {  # of the learners that are known: colour, line, width; GPC thick, the paper's rivals thinner
+    "gpca_paper": (BLUE, (0, (4, 2)), 1.8),
+    "gpca": (BLUE, "-", 1.8),
+    "learner_forest": (VERMILION, "-", 1.2),
+    "learner_linear_svm": (ORANGE, "-", 1.2),
+    "learner_rbf_svm": (ORANGE, ":", 0.9),
+    "learner_logistic": (BLACK, "-", 0.9),
+    "learner_nearest": (BLACK, ":", 0.9),
+    "learner_ensemble": (GREEN, "-", 0.9),
+    "learner_dropout": (GREEN, "--", 0.9),
+    "learner_laplace_head": (GREEN, ":", 0.9),
+    "learner_laplace_gpc": (SKY_BLUE, "-", 0.9),
+    "learner_dirichlet_gp": (PURPLE, "-", 0.9),
+}
+_OTHER = ("#777777", "-", 0.9)
+SET_STYLES = {  # set -> title, colour
+    "in_distribution": ("like the training", "#777777"),
+    "severity": ("severities beyond", VERMILION),
+    "source": ("unseen source", BLUE),
+    "objects": ("unseen objects", GREEN),
+}
+Titles = Mapping[str, str]
+COLUMNS = 4  # panels side by side
+COVERAGES = np.linspace(0.02, 1, 99)
+
+
+def draw_coverage_risk(
+    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw the mean over the seeds of the risk, by the largest score, on the test samples like the training's."""
+    shown, columns = _known(learned, sources, learners)
+    use_style()
+    import matplotlib.pyplot as plt
+
+    height_in = 2.75
+    figure, axes = plt.subplots(
+        1, len(columns), figsize=(TEXT_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
+    )
+    for panel, source in zip(axes[0], columns, strict=True):
+        for learner in reversed(shown):
+            risks = []
+            for rows in _of(learned, source, learner, "in_distribution"):
+                coverage, risk = risk_coverage(-rows["max_score"].to_numpy(), wrong(rows))
+                risks.append(np.interp(COVERAGES, coverage, risk))
+            if risks:
+                colour, line, width = STYLES.get(learner, _OTHER)
+                style = {"color": colour, "linestyle": line, "linewidth": width, "label": learners[learner]}
+                panel.plot(100 * COVERAGES, 100 * np.mean(risks, axis=0), **style)
+        panel.set_title(sources[source])
+        panel.set_xlabel("coverage (%)")
+        panel.set_xlim(0, 100)
+        panel.set_ylim(bottom=0)
+    axes[0, 0].set_ylabel("risk: errors among the covered (%)")
+    handles = {line.get_label(): line for panel in axes[0] for line in panel.get_lines()}
+    titles = [learners[name] for name in shown]
+    figure.legend([handles[title] for title in titles], titles, ncol=4, loc="lower center", columnspacing=1.2)
+    figure.tight_layout(rect=(0, 0.62 / height_in, 1, 1), pad=0.4)
+    save_figure(figure, pdf_path, png_path)
+
+
+def draw_reliability(
+    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw accuracy over confidence, in the bins of the calibration error, and the share of samples in each bin.
+
+    Samples of all sources and seeds together, those like the training's.
+    """
+    shown, columns = _known(learned, sources, learners)
+    figure, panels = _panels(len(shown), panel_height_in=1.45)
+    for panel, learner in zip(panels, shown, strict=False):
+        parts = [rows for source in columns for rows in _of(learned, source, learner, "in_distribution")]
+        confidence_S = np.concatenate([1 - rows["max_score"].to_numpy() for rows in parts])
+        hit_S = np.concatenate([~wrong(rows) for rows in parts])
+        bin_S = np.minimum((confidence_S * BINS).astype(int), BINS - 1)
+        counts_B = np.bincount(bin_S, minlength=BINS)
+        filled = counts_B > 0
+        accuracy_B = np.bincount(bin_S, weights=hit_S, minlength=BINS)[filled] / counts_B[filled]
+        mean_B = np.bincount(bin_S, weights=confidence_S, minlength=BINS)[filled] / counts_B[filled]
+        centres_B = (np.arange(BINS) + 0.5) / BINS
+        panel.bar(centres_B, counts_B / counts_B.sum(), width=1 / BINS, color="#CCCCCC", zorder=1)
+        panel.plot([0, 1], [0, 1], color="#777777", linewidth=0.6, linestyle=(0, (4, 3)), zorder=2)
+        panel.plot(mean_B, accuracy_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, zorder=3)
+        gap = np.abs(np.bincount(bin_S, weights=confidence_S - hit_S, minlength=BINS)).sum() / len(hit_S)
+        panel.text(0.04, 0.9, f"ECE {gap:.3f}", transform=panel.transAxes, fontsize=7)
+        panel.set_title(learners[learner], fontsize=7)
+        panel.set_xlim(1 / 3 - 0.03, 1.02)
+        panel.set_ylim(0, 1.02)
+        panel.set_xticks([0.4, 0.6, 0.8, 1.0])
+    figure.supxlabel("largest score", fontsize=8)
+    figure.supylabel("accuracy; share of samples (grey)", fontsize=8)
+    figure.tight_layout(pad=0.4, h_pad=0.8, w_pad=0.6)
+    save_figure(figure, pdf_path, png_path)
+
+
+def draw_uncertainty_vs_distance(
+    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw 1 - largest score over the distance to the training samples, of the first seed of every source.
+
+    ρ is the mean over sources, seeds and the three kinds of shift, each with the samples like the training's.
+    """
+    shown, columns = _known(learned, sources, learners)
+    figure, panels = _panels(len(shown), panel_height_in=1.4)
+    distance = DISTANCES[0]
+    first_seed = min(seed for _, _, seed in learned)
+    for panel, learner in zip(panels, shown, strict=False):
+        correlations = []
+        for (source, name, seed), rows in learned.items():
+            if name != learner or source not in columns:
+                continue
+            parts = sets_of(rows)
+            correlations += [rank_correlation(p["max_score"], p[distance]) for key, p in parts.items() if "+" in key]
+            if seed == first_seed:
+                for key, (_, colour) in SET_STYLES.items():
+                    if key in parts:
+                        points = {"color": colour, "alpha": 0.45, "s": 2.2, "linewidths": 0, "rasterized": True}
+                        panel.scatter(parts[key][distance], parts[key]["max_score"], **points)
+        panel.text(0.97, 0.92, f"ρ = {np.mean(correlations):.2f}", transform=panel.transAxes, ha="right", fontsize=7)
+        panel.set_title(learners[learner], fontsize=7)
+        panel.set_xscale("log")
+        panel.set_ylim(-0.02, 0.82)
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], color=c, marker="o", linestyle="", label=title) for title, c in SET_STYLES.values()]
+    height_in = figure.get_size_inches()[1]
+    figure.supxlabel("distance to the training samples", fontsize=8, y=0.24 / height_in)
+    figure.supylabel("1 - largest score", fontsize=8)
+    figure.legend(handles=handles, ncol=4, loc="lower center", columnspacing=1.4)
+    figure.tight_layout(rect=(0, 0.2 / height_in, 1, 1), pad=0.4, h_pad=0.8, w_pad=0.6)
+    save_figure(figure, pdf_path, png_path)
+
+
+LEARNER_FIGURES = {
+    "coverage_risk": draw_coverage_risk,
+    "reliability": draw_reliability,
+    "uncertainty_vs_distance": draw_uncertainty_vs_distance,
+}
+
+
+def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[str], list[str]]:
+    shown = [name for name in learners if any(learner == name for _, learner, _ in learned)]
+    columns = [name for name in sources if any(source == name for source, _, _ in learned)]
+    if not shown or not columns:
+        raise InputError("learners", "hold no predictions of these sources and learners", "run them first")
+    return shown, columns
+
+
+def _of(learned: Mapping, source: str, learner: str, of_set: str) -> list:
+    """Return the rows of a set, seed by seed."""
+    found = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
+    return [rows for rows in found if len(rows)]
+
+
+def _panels(count: int, panel_height_in: float):
+    """Return a figure with that many panels, their axes shared, and the panels."""
+    use_style()
+    import matplotlib.pyplot as plt
+
+    lines = -(-count // COLUMNS)
+    size = (TEXT_WIDTH_IN, 0.45 + panel_height_in * lines)
+    figure, axes = plt.subplots(lines, COLUMNS, figsize=size, sharex=True, sharey=True, squeeze=False)
+    for spare in axes.flat[count:]:
+        spare.set_visible(False)
+    return figure, list(axes.flat[:count])
