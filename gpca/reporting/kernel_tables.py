@@ -76,7 +76,7 @@ def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -
     groups = [
         [(row, measure) for row, labels in enumerate(rows) if labels[0][0] == name]
         for name in shown
-        for measure in ("accuracy", "ece", "nll")
+        for measure in ("accuracy", "nll")
     ]
     return _table(
         shown,

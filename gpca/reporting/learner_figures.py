@@ -55,6 +55,7 @@ SET_STYLES = {  # set -> title, colour
 }
 Titles = Mapping[str, str]
 COLUMNS = 4  # panels side by side
+FEWEST = 5  # samples of a bin whose accuracy is drawn
 COVERAGES = np.linspace(0.02, 1, 99)
 
 
@@ -83,7 +84,7 @@ def draw_coverage_risk(
         panel.set_title(sources[source])
         panel.set_xlabel("coverage (%)")
         panel.set_xlim(0, 100)
-        panel.set_ylim(bottom=0)
+    axes[0, 0].set_ylim(bottom=0)
     axes[0, 0].set_ylabel("risk: errors among the covered (%)")
     handles = {line.get_label(): line for panel in axes[0] for line in panel.get_lines()}
     titles = [learners[name] for name in shown]
@@ -97,33 +98,32 @@ def draw_reliability(
 ) -> None:
     """Draw accuracy over confidence, in the bins of the calibration error, and the share of samples in each bin.
 
-    Samples of all sources and seeds together, those like the training's.
+    Samples of all sources and seeds together, those like the training's; bins of fewer than `FEWEST` of them have no
+    point. The number in a title is the calibration error of them all.
     """
     shown, columns = _known(learned, sources, learners)
-    figure, panels = _panels(len(shown), panel_height_in=1.45)
+    figure, panels = _panels(len(shown), panel_height_in=1.55)
     for panel, learner in zip(panels, shown, strict=False):
         parts = [rows for source in columns for rows in _of(learned, source, learner, "in_distribution")]
         confidence_S = np.concatenate([1 - rows["max_score"].to_numpy() for rows in parts])
         hit_S = np.concatenate([~wrong(rows) for rows in parts])
         bin_S = np.minimum((confidence_S * BINS).astype(int), BINS - 1)
         counts_B = np.bincount(bin_S, minlength=BINS)
-        filled = counts_B > 0
-        accuracy_B = np.bincount(bin_S, weights=hit_S, minlength=BINS)[filled] / counts_B[filled]
-        mean_B = np.bincount(bin_S, weights=confidence_S, minlength=BINS)[filled] / counts_B[filled]
+        drawn = counts_B >= FEWEST
+        accuracy_B = np.bincount(bin_S, weights=hit_S, minlength=BINS)[drawn] / counts_B[drawn]
+        mean_B = np.bincount(bin_S, weights=confidence_S, minlength=BINS)[drawn] / counts_B[drawn]
         centres_B = (np.arange(BINS) + 0.5) / BINS
-        panel.bar(centres_B, counts_B / counts_B.sum(), width=1 / BINS, color="#CCCCCC", zorder=1)
-        panel.plot([0, 1], [0, 1], color="#777777", linewidth=0.6, linestyle=(0, (4, 3)), zorder=2)
-        panel.plot(mean_B, accuracy_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, zorder=3)
+        panel.bar(centres_B, counts_B / counts_B.sum(), width=1 / BINS, color="#CCCCCC", label="share of samples")
+        panel.plot([0, 1], [0, 1], color="#777777", linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
+        panel.plot(mean_B, accuracy_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, label="accuracy")
         gap = np.abs(np.bincount(bin_S, weights=confidence_S - hit_S, minlength=BINS)).sum() / len(hit_S)
-        panel.text(0.04, 0.9, f"ECE {gap:.3f}", transform=panel.transAxes, fontsize=7)
-        panel.set_title(learners[learner], fontsize=7)
+        panel.set_title(f"{learners[learner]}\nECE {gap:.3f}", fontsize=7)
         panel.set_xlim(1 / 3 - 0.03, 1.02)
         panel.set_ylim(0, 1.02)
         panel.set_xticks([0.4, 0.6, 0.8, 1.0])
-    figure.supxlabel("largest score", fontsize=8)
-    figure.supylabel("accuracy; share of samples (grey)", fontsize=8)
-    figure.tight_layout(pad=0.4, h_pad=0.8, w_pad=0.6)
-    save_figure(figure, pdf_path, png_path)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.suptitle(", ".join(sources[name] for name in columns), fontsize=8)
+    _finish(figure, handles, labels, "largest score", "accuracy", pdf_path, png_path)
 
 
 def draw_uncertainty_vs_distance(
@@ -133,6 +133,9 @@ def draw_uncertainty_vs_distance(
 
     ρ is the mean over sources, seeds and the three kinds of shift, each with the samples like the training's.
     """
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
     shown, columns = _known(learned, sources, learners)
     figure, panels = _panels(len(shown), panel_height_in=1.4)
     distance = DISTANCES[0]
@@ -152,16 +155,14 @@ def draw_uncertainty_vs_distance(
         panel.text(0.97, 0.92, f"ρ = {np.mean(correlations):.2f}", transform=panel.transAxes, ha="right", fontsize=7)
         panel.set_title(learners[learner], fontsize=7)
         panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(base=2))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        panel.xaxis.set_minor_locator(NullLocator())
         panel.set_ylim(-0.02, 0.82)
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], color=c, marker="o", linestyle="", label=title) for title, c in SET_STYLES.values()]
-    height_in = figure.get_size_inches()[1]
-    figure.supxlabel("distance to the training samples", fontsize=8, y=0.24 / height_in)
-    figure.supylabel("1 - largest score", fontsize=8)
-    figure.legend(handles=handles, ncol=4, loc="lower center", columnspacing=1.4)
-    figure.tight_layout(rect=(0, 0.2 / height_in, 1, 1), pad=0.4, h_pad=0.8, w_pad=0.6)
-    save_figure(figure, pdf_path, png_path)
+    handles = [Line2D([], [], color=c, marker="o", linestyle="") for _, c in SET_STYLES.values()]
+    labels = [title for title, _ in SET_STYLES.values()]
+    figure.suptitle(", ".join(sources[name] for name in columns), fontsize=8)
+    _finish(figure, handles, labels, "distance", "1 - largest score", pdf_path, png_path)
 
 
 LEARNER_FIGURES = {
@@ -196,3 +197,17 @@ def _panels(count: int, panel_height_in: float):
     for spare in axes.flat[count:]:
         spare.set_visible(False)
     return figure, list(axes.flat[:count])
+
+
+def _finish(figure, handles: list, labels: list[str], across: str, up: str, pdf_path, png_path) -> None:
+    """Label the outer panels, set a legend below all and write the figure."""
+    shown = [panel for panel in figure.axes if panel.get_visible()]
+    for i, panel in enumerate(shown):
+        if i % COLUMNS == 0:
+            panel.set_ylabel(up)
+        if i + COLUMNS >= len(shown):
+            panel.set_xlabel(across)
+            panel.tick_params(labelbottom=True)
+    figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
+    figure.tight_layout(rect=(0, 0.2 / figure.get_size_inches()[1], 1, 1), pad=0.4, h_pad=0.8, w_pad=0.6)
+    save_figure(figure, pdf_path, png_path)

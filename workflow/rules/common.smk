@@ -146,7 +146,10 @@ LEARNER_SETTINGS = {
     name: (config["explainers"].get(name) or {}) | (own or {})
     for name, own in config["learners"].items()
 }
-LEARNER_TITLES = {name: explainer_entry(name).title for name in LEARNER_SETTINGS}
+LEARNER_TITLES = {
+    name: explainer_entry(name).title.removesuffix(" on the embedding")
+    for name in LEARNER_SETTINGS
+}
 
 
 def of_all_learners():
