@@ -75,6 +75,9 @@ FAULTS = [
     ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
     ("active_learning.stream.widow", 3, "active_learning.stream.widow: unknown; did you mean window?"),
     ("active_learning.strategies", ["bold"], "active_learning.strategies: no strategy 'bold'; known are random, "),
+    ("kernels.kernel", ["rbf"], "kernels.kernel: unknown; did you mean kernels?"),
+    ("shift.severities.crops", [0.6, 0.7], "shift.severities.crops: unknown; did you mean crop?"),
+    ("shift.encoder.options", {"k": 8}, "shift.encoder.options: unknown"),
     # missing keys
     ("seeds", MISSING, "'seeds' is a required property"),
     ("registrations.icp", MISSING, "registrations: 'icp' is a required property"),
@@ -91,6 +94,12 @@ FAULTS = [
     ("explainers.gpca", [1], "explainers.gpca: [1] is not of type 'object', 'null'"),
     ("seeds", 3, "seeds: 3 is not of type 'array'"),
     # out of range
+    ("kernels.kernels", ["cubic"], "kernels.kernels.0: 'cubic' is not one of"),
+    ("kernels.iterations", [0], "kernels.iterations.0: 0 is less than the minimum of 1"),
+    ("kernels.learning_rates", [], "kernels.learning_rates: [] should be non-empty"),
+    ("learners.gpca", {"draws": 0}, "learners.gpca: setting draws: 0 is less than the minimum of 2"),
+    ("shift.held_out_share", 1, "shift.held_out_share: 1 is "),
+    ("shift.severities.noise", [0.5, 0.4], "shift.severities: severity noise: [0.5, 0.4] runs downwards"),
     ("active_learning.target", 1.5, "active_learning.target: 1.5 is greater than the maximum of 1"),
     ("active_learning.held_out", ["weather"], "active_learning.held_out.0: 'weather' is not one of"),
     ("active_learning.rare_share", 1, "active_learning.rare_share: 1 is "),
@@ -120,6 +129,10 @@ FAULTS = [
     ("embedding.encoder", "pointnet", "embedding.encoder: no encoder 'pointnet'; known are dgcnn"),
     ("explainers.shapley", {}, "explainers.shapley: explainer 'shapley': unknown; known are gpca_paper, gpca"),
     ("figures.fig3_source", "ycbv", "figures.fig3_source: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    ("kernels.sources", ["ycbv"], "kernels.sources: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    ("learners.learner_tree", {}, "learners.learner_tree: explainer 'learner_tree': unknown; known are gpca_paper"),
+    ("learners.learner_forest", {"tree": 3}, "learners.learner_forest: explainer 'learner_forest': got an unexpected"),
+    ("learners.residuals_forest", {}, "learners.residuals_forest: does not read embeddings; choose another"),
     # sources
     ("sources.ycb", None, "sources.ycb: None is not of type 'object'"),
     ("sources.ycb.kind", "procedurl", "sources.ycb: kind 'procedurl': there is no such kind of source; known are"),
