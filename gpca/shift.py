@@ -11,7 +11,6 @@ from baselines.analytical import AnalyticalGPC
 from gpca.dataset import Registrations
 from gpca.distance import knn_distance, mahalanobis_distance, principal_components
 from gpca.encoders.training import EncoderSettings, embed, train_encoder
-from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.seeds import generator
 from gpca.shifted_sets import SPACES, ShiftedSets
@@ -56,7 +55,8 @@ def make_sets(
     Args:
         objects: of the source.
         registrations: of the source, with the encoder's embeddings attached.
-        other: registrations of another source, whose test samples are the set `source`; without them it is left out.
+        other: registrations of another source, whose test samples are the set `source`; without them it is left out,
+            as the sets of unseen objects are where the source has a single one.
         encoder, encoder_settings: the source's encoder.
     """
     beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
@@ -66,30 +66,26 @@ def make_sets(
     for name in parts.keys() - {"in_distribution"}:
         h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
         parts[name] = replace(parts[name], attached={"embedding": h_S_d})
-    return ShiftedSets.joined(
-        [
-            _measured(parts, source, seed, settings),
-            _measured(_of_unseen_objects(registrations, source, seed, settings), source, seed, settings),
-        ]
-    )
+    measured = [_measured(parts, source, seed, settings)]
+    held_out = held_out_objects(registrations.object_name, settings.held_out_share, source, seed)
+    if len(held_out):
+        parts = _of_unseen_objects(registrations, held_out, source, seed, settings)
+        measured.append(_measured(parts, source, seed, settings))
+    return ShiftedSets.joined(measured)
 
 
 def held_out_objects(names: np.ndarray, share: float, source: str, seed: int) -> np.ndarray:
-    """Return the objects to be held out: a share of them, rounded, at least one; one alone cannot be."""
+    """Return the objects to be held out: a share of them, rounded, at least one; none where there is only one."""
     names = np.unique(names)
-    if len(names) < 2:
-        raise InputError(f"source '{source}'", "has a single object, so none can be held out", "add another object")
     count = min(max(1, round(share * len(names))), len(names) - 1)
     return np.sort(generator(source, seed, "held-out objects").permutation(names)[:count])
 
 
 def _of_unseen_objects(
-    registrations: Registrations, source: str, seed: int, settings: ShiftSettings
+    registrations: Registrations, held_out: np.ndarray, source: str, seed: int, settings: ShiftSettings
 ) -> dict[str, Registrations]:
     """Train an encoder that never sees some objects; return what it saw with its kind, and what it never saw."""
-    held_out_S = np.isin(
-        registrations.object_name, held_out_objects(registrations.object_name, settings.held_out_share, source, seed)
-    )
+    held_out_S = np.isin(registrations.object_name, held_out)
     is_train_S = registrations.split == "train"
     train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
     seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))

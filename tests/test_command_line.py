@@ -316,7 +316,6 @@ FAULTS = {
     "shift": [
         (removed("weights.pt"), {}, r"weights.pt: no such weights"),
         (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"embeddings.npz: holds other samples than"),
-        (arrays_changed("registrations.npz", object_name=lambda n: np.full_like(n, "cone")), {}, r"a single object"),
         (untouched, settings("shift", shift=SHIFT | {"sample": 3}), r"setting sample: unknown; did you mean samples\?"),
         (untouched, settings("shift", shift=SHIFT | {"encoder": {"options": {}}}), r"setting encoder.options: unknown"),
         (untouched, settings("shift", shifts={}), r"setting shifts: unknown; known are shift, registrations, encoder"),

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from gpca.encoders.training import EncoderSettings, embed, train_encoder
-from gpca.errors import InputError
 from gpca.shift import held_out_objects, make_sets, settings_from
 from gpca.shifted_sets import TRAINED_ON
 
@@ -86,5 +85,11 @@ def test_a_share_of_the_objects_at_least_one_and_never_all_is_held_out():
     assert len(held_out_objects(names[:3], 0.9, "mine", 0)) == 2
     assert held_out_objects(names, 0.2, "mine", 0).tolist() == held_out_objects(names[::-1], 0.2, "mine", 0).tolist()
     assert len({tuple(held_out_objects(names, 0.2, "mine", seed)) for seed in range(5)}) > 1
-    with pytest.raises(InputError, match="source 'mine': has a single object, so none can be held out"):
-        held_out_objects(np.array(["cup", "cup"]), 0.2, "mine", 0)
+
+
+def test_of_a_single_object_none_is_held_out_and_those_sets_are_left_out(objects, embedded):
+    model, registrations = embedded
+    assert len(held_out_objects(np.array(["cup", "cup"]), 0.2, "mine", 0)) == 0
+    alone = replace(registrations, object_name=np.full(len(registrations), "cup"))
+    sets = make_sets(objects, alone, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    assert set(sets.set) == {"in_distribution", "severity"}

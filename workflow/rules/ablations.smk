@@ -71,9 +71,7 @@ rule shift:
 
 rule learn:
     input:
-        sets=collect(
-            "results/{{run}}/shifted/{{source}}/seed{seed}.npz", seed=SEEDS
-        ),
+        sets=collect("results/{{run}}/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
         code=code_files("gpca.steps.learn", *map(explainer_module, config["learners"])),
     output:
         collect(
@@ -219,13 +217,15 @@ rule kernel_learning_curves:
 rule learner_figure:
     input:
         predictions=of_all_learners(),
-        sets=lambda wildcards: collect(
-            f"results/{wildcards.run}/shifted/{{source}}/seed{{seed}}.npz",
-            source=SOURCES,
-            seed=SEEDS,
-        )
-        if wildcards.figure == "uncertainty_vs_distance"
-        else [],
+        sets=lambda wildcards: (
+            collect(
+                f"results/{wildcards.run}/shifted/{{source}}/seed{{seed}}.npz",
+                source=SOURCES,
+                seed=SEEDS,
+            )
+            if wildcards.figure == "uncertainty_vs_distance"
+            else []
+        ),
         code=code_files("gpca.reporting.learner_figures", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/{figure}.pdf",
