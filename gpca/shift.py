@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from torch import nn
 
-from baselines.analytical import AnalyticalGPC
+from gpca.analytical_features import analytical_features
 from gpca.dataset import Registrations
 from gpca.distance import knn_distance, mahalanobis_distance, principal_components
 from gpca.encoders.training import EncoderSettings, embed, train_encoder
@@ -103,9 +103,11 @@ def _of_unseen_objects(
 
 def _measured(parts: dict[str, Registrations], source: str, seed: int, settings: ShiftSettings) -> ShiftedSets:
     """Join sets of one encoder, the one with its training samples first, and measure the distances to these."""
-    describe = AnalyticalGPC(source, seed, points=settings.points).features
     spaces = {
-        "analytical": {name: describe(part) for name, part in parts.items()},
+        "analytical": {
+            name: analytical_features(part, source, seed, "distance", name, points=settings.points)
+            for name, part in parts.items()
+        },
         "embedding": {name: part.embedding for name, part in parts.items()},
     }
     home = next(iter(parts))

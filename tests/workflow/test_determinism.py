@@ -11,7 +11,7 @@ KEYS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("suffix", "files"), {".npz": 19, ".pt": 2, ".csv": 76, ".png": 1, ".pdf": 1}.items())
+@pytest.mark.parametrize(("suffix", "files"), {".npz": 21, ".pt": 2, ".csv": 102, ".png": 1, ".pdf": 1}.items())
 def test_cores_and_interruptions_change_no_byte(smoke, killed_and_continued, suffix, files):
     actual = killed_and_continued.results(suffix)
     expected = {name: content for name, content in smoke.results(suffix).items() if "ycb" in name}

@@ -22,6 +22,8 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, config, ru
     assert planned.jobs["registrations"] == planned.jobs["encoder"] == 3 * seeds
     assert planned.jobs["explain"] == 3 * 19
     assert planned.jobs["uncertainty"] == 3 * 6
+    assert planned.jobs["shift"] == planned.jobs["learn"] == 3
+    assert planned.jobs["kernels"] == (1 if config == "smoke" else 2)
     assert planned.jobs["embeddings_without"] == planned.jobs["active_learning"] == 3 * seeds
     for name in (
         "metrics.csv",
@@ -29,6 +31,10 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, config, ru
         "tables/table1_single_baselines.md",
         "tables/table2_per_concept.tex",
         "tables/table3_stream.csv",
+        "tables/table4_kernels.md",
+        "tables/table5_claims.tex",
+        "diagnostics.csv",
+        "figures/reliability.pdf",
     ):
         assert f"results/{run}/{name}" in planned.outputs
     assert {f"results/{run}/figures/{name}.png" for name in ("fig3_concepts", "objects_ycb")} <= planned.outputs

@@ -5,6 +5,8 @@ import pytest
 SMOKE = ("all", "--configfile", "config/smoke.yaml")
 COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
 LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
+DIAGNOSED = {"learn": 3, "diagnostics": 1, "learner_table": 3, "learner_figure": 3}
+KERNELS = {"kernels": 1, "kernel_table": 2, "kernel_learning_curves": 1}
 # Explainers times three sources: those with a GPC, those on embeddings, those on uncertainties, all.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 3 * explainers} for explainers in (4, 4, 13))
 
@@ -35,13 +37,29 @@ def test_table3_needs_no_uncertainty_and_no_explainer(project):
     }  # fmt: skip
 
 
+def test_table4_needs_its_sources_alone_and_table5_no_explainer(project):
+    smoke = ("--configfile", "config/smoke.yaml")
+    planned = project.dry_run("results/smoke/tables/table4_kernels.md", *smoke)
+    assert planned.jobs == {
+        "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "kernels": 1, "kernel_table": 1,
+    }  # fmt: skip
+    planned = project.dry_run("results/smoke/tables/table5_learners.md", *smoke)
+    assert planned.jobs == {
+        "objects": 3, "registrations": 6, "encoder": 6, "embeddings": 6, "shift": 3, "learn": 3, "diagnostics": 1,
+        "learner_table": 1,
+    }  # fmt: skip
+
+
 def test_a_finished_run_has_nothing_to_do(finished):
     assert not finished.dry_run(*SMOKE).jobs
     assert not finished.dry_run("smoke").jobs
 
 
 EDITS = {
-    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED,
+    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED | DIAGNOSED | KERNELS,
+    "gpca/shift.py": {"shift": 3} | DIAGNOSED,
+    "baselines/heads.py": DIAGNOSED,
+    "gpca/reporting/kernel_figure.py": {"kernel_learning_curves": 1},
     "gpca/acquisition.py": {"active_learning": 6} | LEARNED,
     "gpca/stream.py": {"active_learning": 6} | LEARNED,
     "gpca/reporting/learning_figure.py": {"active_learning_curves": 1},
@@ -50,16 +68,18 @@ EDITS = {
     "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
     "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1},
-    "gpca/reporting/tables.py": {"table": 3, "learning_table": 3},
+    "gpca/reporting/tables.py": {
+        "table": 3, "learning_table": 3, "learner_table": 3, "kernel_table": 2, "kernel_learning_curves": 1,
+    },
     "gpca/reporting/confusions_figure.py": {"fig_attribution_confusions": 1},
     "gpca/encoders/dgcnn.py": {
-        "encoder": 6, "embeddings": 6, "embeddings_without": 6, "active_learning": 6,
-    } | ON_EMBEDDINGS | COLLECTORS | LEARNED,
+        "encoder": 6, "embeddings": 6, "embeddings_without": 6, "active_learning": 6, "shift": 3,
+    } | ON_EMBEDDINGS | COLLECTORS | LEARNED | DIAGNOSED | KERNELS,
     "gpca/objects/bop.py": {},
     "gpca/objects/shapes/cups.py": {
         "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
-        "objects_figure": 1, "fig3_concepts": 1, "embeddings_without": 2, "active_learning": 2,
-    } | COLLECTORS | LEARNED,
+        "objects_figure": 1, "fig3_concepts": 1, "embeddings_without": 2, "active_learning": 2, "shift": 3,
+    } | COLLECTORS | LEARNED | DIAGNOSED,
 }  # fmt: skip
 
 
@@ -77,8 +97,8 @@ def test_a_touched_but_unchanged_module_reruns_nothing(finished):
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert planned.jobs == {"explain": 3} | COLLECTORS
-    assert not [path for path in planned.outputs if "gpca_paper" in path]
+    assert planned.jobs == {"explain": 3} | COLLECTORS | DIAGNOSED
+    assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):

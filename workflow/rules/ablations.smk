@@ -150,7 +150,7 @@ rule kernel_table:
         mem_mb=1000,
         runtime=10,
     params:
-        sources=SHOWN_SOURCES,
+        sources=KERNEL_SOURCES,
         test=config["registrations"]["test"],
     script:
         "../scripts/kernel_table.py"
@@ -209,7 +209,7 @@ rule kernel_learning_curves:
         mem_mb=2000,
         runtime=10,
     params:
-        sources={name: title_of(entry) for name, entry in SOURCES.items()},
+        sources={name: title_of(entry) for name, entry in KERNEL_SOURCES.items()},
     script:
         "../scripts/kernel_learning_curves.py"
 

@@ -141,6 +141,11 @@ KERNEL_GRIDS = collect(
     source=config["kernels"]["sources"],
     seed=SEEDS,
 )
+KERNEL_SOURCES = {
+    name: entry
+    for name, entry in SHOWN_SOURCES.items()
+    if name in config["kernels"]["sources"]
+}
 # A learner that is an explainer of the config too has its settings, and those of its own besides.
 LEARNER_SETTINGS = {
     name: (config["explainers"].get(name) or {}) | (own or {})
@@ -162,9 +167,8 @@ def of_all_learners():
 
 
 def shift_inputs(wildcards):
-    """What a source's shifted sets are made from; the source after it is the one that its encoder never saw."""
-    names = list(SOURCES)
-    other = names[(names.index(wildcards.source) + 1) % len(names)]
+    """What a source's shifted sets are made from; the source that its encoder never saw is the first other one."""
+    other = next((name for name in SOURCES if name != wildcards.source), None)
     encoder = config["embedding"]["encoder"]
     own = f"results/{wildcards.run}/{{}}/{wildcards.source}"
     inputs = {
@@ -172,7 +176,7 @@ def shift_inputs(wildcards):
         "embeddings": f"{own.format('embeddings')}/{EMBEDDING}/seed{{seed}}.npz",
         "encoders": f"{own.format('encoders')}/{encoder}/seed{{seed}}.pt",
     }
-    if other != wildcards.source:
+    if other:
         inputs["other"] = (
             f"results/{wildcards.run}/registrations/{other}/seed{{seed}}.npz"
         )
