@@ -63,7 +63,7 @@ def make_sets(
     parts = {"in_distribution": registrations, "severity": beyond}
     if other is not None:
         parts["source"] = other.subset(other.rows("test")[: settings.samples])
-    for name in parts.keys() - {"in_distribution"}:
+    for name in [name for name in parts if name != "in_distribution"]:
         h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
         parts[name] = replace(parts[name], attached={"embedding": h_S_d})
     measured = [_measured(parts, source, seed, settings)]

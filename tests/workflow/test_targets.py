@@ -1,3 +1,4 @@
+import csv
 import json
 
 import pytest
@@ -87,6 +88,19 @@ EDITS = {
 def test_an_edit_reruns_the_rules_that_use_the_module_and_no_other(finished, module):
     finished.append(module, "\n# edited\n")
     assert finished.dry_run(*SMOKE).jobs == EDITS[module]
+
+
+@pytest.mark.parametrize("name", ["gpca", "gpca_paper"])
+def test_an_explainer_says_the_same_as_a_learner(smoke, name):
+    def rows(path, columns):
+        with (smoke.folder / "results/smoke" / path).open() as file:
+            return [[row[column] for column in columns] for row in csv.DictReader(file)
+                    if row["split"] == "test" and row.get("set", "in_distribution") == "in_distribution"]  # fmt: skip
+
+    columns = ("sample", "object", "concept_true", "score_noise", "variance_pose", "bald")
+    learned = rows(f"learners/ycb/{name}/seed1.csv", columns)
+    assert len(learned) == 12
+    assert learned == rows(f"predictions/ycb/{name}/seed1.csv", columns)
 
 
 def test_a_touched_but_unchanged_module_reruns_nothing(finished):
