@@ -122,8 +122,8 @@ def draw_reliability(
         panel.set_ylim(0, 1.02)
         panel.set_xticks([0.4, 0.6, 0.8, 1.0])
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.suptitle(", ".join(sources[name] for name in columns), fontsize=8)
-    _finish(figure, handles, labels, "largest score", "accuracy", pdf_path, png_path)
+    title = ", ".join(sources[name] for name in columns)
+    _finish(figure, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
 
 
 def draw_uncertainty_vs_distance(
@@ -161,8 +161,8 @@ def draw_uncertainty_vs_distance(
         panel.set_ylim(-0.02, 0.82)
     handles = [Line2D([], [], color=c, marker="o", linestyle="") for _, c in SET_STYLES.values()]
     labels = [title for title, _ in SET_STYLES.values()]
-    figure.suptitle(", ".join(sources[name] for name in columns), fontsize=8)
-    _finish(figure, handles, labels, "distance", "1 - largest score", pdf_path, png_path)
+    title = ", ".join(sources[name] for name in columns)
+    _finish(figure, title, handles, labels, "distance", "1 - largest score", pdf_path, png_path)
 
 
 LEARNER_FIGURES = {
@@ -192,15 +192,16 @@ def _panels(count: int, panel_height_in: float):
     import matplotlib.pyplot as plt
 
     lines = -(-count // COLUMNS)
-    size = (TEXT_WIDTH_IN, 0.45 + panel_height_in * lines)
+    size = (TEXT_WIDTH_IN, 0.65 + panel_height_in * lines)
     figure, axes = plt.subplots(lines, COLUMNS, figsize=size, sharex=True, sharey=True, squeeze=False)
     for spare in axes.flat[count:]:
         spare.set_visible(False)
     return figure, list(axes.flat[:count])
 
 
-def _finish(figure, handles: list, labels: list[str], across: str, up: str, pdf_path, png_path) -> None:
-    """Label the outer panels, set a legend below all and write the figure."""
+def _finish(figure, title: str, handles: list, labels: list[str], across: str, up: str, pdf_path, png_path) -> None:
+    """Label the outer panels, set a title above all and a legend below, and write the figure."""
+    height_in = figure.get_size_inches()[1]
     shown = [panel for panel in figure.axes if panel.get_visible()]
     for i, panel in enumerate(shown):
         if i % COLUMNS == 0:
@@ -209,5 +210,6 @@ def _finish(figure, handles: list, labels: list[str], across: str, up: str, pdf_
             panel.set_xlabel(across)
             panel.tick_params(labelbottom=True)
     figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
-    figure.tight_layout(rect=(0, 0.2 / figure.get_size_inches()[1], 1, 1), pad=0.4, h_pad=0.8, w_pad=0.6)
+    figure.suptitle(title, fontsize=8, y=1 - 0.05 / height_in, va="top")
+    figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.06 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
     save_figure(figure, pdf_path, png_path)
