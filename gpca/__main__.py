@@ -24,6 +24,9 @@ STEPS = {
     "explain": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
+    "kernels": "embeddings -> every kernel, learning rate and number of iterations",
+    "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
+    "learn": "embeddings -> predictions of every learner, on test samples and on shifted ones",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
 }
 
