@@ -41,8 +41,11 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"gpca {chosen}: {fault}", file=sys.stderr)
         return 2
     except (KeyboardInterrupt, SystemError) as fault:
-        # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead.
-        if not isinstance(fault, KeyboardInterrupt) and not isinstance(fault.__cause__, KeyboardInterrupt):
+        # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead, or several in a row.
+        root = fault
+        while root.__cause__ is not None:
+            root = root.__cause__
+        if not isinstance(root, KeyboardInterrupt):
             raise
         print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
         return 130

@@ -12,6 +12,7 @@ import time
 import numpy as np
 import pytest
 
+from gpca import __main__ as command_line
 from gpca.__main__ import STEPS, main
 from gpca.code_files import ROOT
 from gpca.files import save_arrays
@@ -415,6 +416,34 @@ def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, change
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith(message)
+
+
+def _from(fault, cause):
+    fault.__cause__ = cause
+    return fault
+
+
+@pytest.mark.parametrize(
+    ("fault", "status"),
+    [
+        (KeyboardInterrupt(), 130),
+        (_from(SystemError(), KeyboardInterrupt()), 130),
+        (_from(SystemError(), _from(SystemError(), KeyboardInterrupt())), 130),  # as numba raises it
+        (_from(SystemError(), ValueError()), None),
+        (SystemError(), None),
+    ],
+)
+def test_ctrl_c_is_known_in_whatever_it_is_wrapped_and_nothing_else_is(monkeypatch, capsys, fault, status):
+    def stopped(arguments, chosen):
+        raise fault
+
+    monkeypatch.setattr(command_line, "_run", stopped)
+    if status is None:
+        with pytest.raises(SystemError):
+            main(["train"])
+    else:
+        assert main(["train"]) == status
+        assert capsys.readouterr().err == "gpca train: stopped; the same command continues\n"
 
 
 def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder):
