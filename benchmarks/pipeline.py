@@ -33,6 +33,8 @@ from gpca.errors import InputError  # noqa: E402 (the script runs from a plain c
 RUN = "benchmark"
 STAGES = (
     "objects",
+    "scenes",
+    "instances",
     "registrations",
     "encoders",
     "embeddings",
