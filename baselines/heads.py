@@ -2,8 +2,7 @@
 
 The encoder stays as it is; a head of one hidden layer is trained on it with the labelled embeddings. From each
 follow draws of the logits, and from those scores, variances and BALD as GP-CA's: the members of a deep ensemble
-(Lakshminarayanan et al. 2017), the passes of Monte-Carlo dropout (Gal & Ghahramani 2016), draws from Laplace's
-approximation over the last layer (Daxberger et al. 2021).
+(Lakshminarayanan et al. 2017), the passes of Monte-Carlo dropout (Gal & Ghahramani 2016).
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
 from gpca.attribution import Attribution, summarise_draws
 from gpca.dataset import Registrations
-from gpca.diagnostics import negative_log_likelihood
 from gpca.explainer import Entry
 from gpca.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
@@ -108,7 +106,7 @@ class Heads:
 
 
 class HeadLearner:
-    """What the three learners share: heads, and draws of the logits from them. Training takes `training`'s settings."""
+    """What such learners share: heads, and draws of the logits from them. Training takes `training`'s settings."""
 
     def __init__(self, source: str, seed: int, **training) -> None:
         self._axes = (source, seed, type(self).__name__)
@@ -160,90 +158,7 @@ class Dropout(HeadLearner):
         return self._heads.logits((hidden_1_N_H * kept_M_1_H / (1 - self._rate)).astype(np.float32))
 
 
-class LastLayerLaplace(HeadLearner):
-    """Laplace's approximation over the last layer, with the full generalised Gauss-Newton matrix.
-
-    The last layer is fitted anew to the hidden units under a Gaussian prior: an approximation about weights that are no
-    maximum of the posterior would not be Laplace's. The prior's precision is the one that predicts a fifth of the
-    training samples best (least NLL) after training on the others; that of the largest evidence, as the hidden units
-    were learnt from the same labels, leaves the scores far too timid.
-    """
-
-    PRECISIONS = tuple(10.0 ** (exponent / 2) for exponent in range(6, -5, -1))
-
-    def __init__(self, source: str, seed: int, draws: int = 1000, **training) -> None:
-        super().__init__(source, seed, **training)
-        self._draws = draws
-
-    def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
-        order_N = generator(*self._axes, "validation").permutation(len(target_N))
-        validation, rest = order_N[::5], np.delete(order_N, np.s_[::5])
-        precision = self.PRECISIONS[0]
-        if len(rest):
-            super()._train(h_N_d[rest], target_N[rest])
-            losses = []
-            for candidate in self.PRECISIONS:
-                self._approximate(h_N_d[rest], target_N[rest], candidate)
-                scores_N_C, _, _ = summarise_draws(self._draw_logits(h_N_d[validation]))
-                losses.append(negative_log_likelihood(scores_N_C, target_N[validation]))
-            precision = self.PRECISIONS[int(np.argmin(losses))]
-        super()._train(h_N_d, target_N)
-        self._approximate(h_N_d, target_N, precision)
-
-    def _approximate(self, h_N_d: np.ndarray, target_N: np.ndarray, precision: float) -> None:
-        features_N_F, wanted_N_C = self._features(h_N_d), np.eye(len(CONCEPTS))[target_N]
-        self._weights_F_C = _regularised_weights(features_N_F, wanted_N_C, precision)
-        p_N_C = np.exp(_log_softmax(features_N_F @ self._weights_F_C))
-        eigenvalues, self._vectors = np.linalg.eigh(_gauss_newton(features_N_F, p_N_C))
-        self._deviations = 1 / np.sqrt(np.maximum(eigenvalues, 0) + precision)
-
-    def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
-        features_N_F, n_classes = self._features(h_N_d), len(CONCEPTS)
-        # W (C·F, K) with covariance W Wᵀ of the weights; that of a sample's logits is then R Rᵀ with R (C, K).
-        roots_C_F_K = (self._vectors * self._deviations).reshape(n_classes, features_N_F.shape[1], -1)
-        roots_C_N_K = features_N_F @ roots_C_F_K
-        covariance_N_C_C = np.einsum("cnk,dnk->ncd", roots_C_N_K, roots_C_N_K)
-        cholesky_N_C_C = np.linalg.cholesky(covariance_N_C_C + 1e-9 * np.eye(n_classes))
-        normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, n_classes))
-        return features_N_F @ self._weights_F_C + np.einsum("ncd,md->mnc", cholesky_N_C_C, normal_M_C)
-
-    def _features(self, h_N_d: np.ndarray) -> np.ndarray:
-        hidden_N_H = self._heads.hidden(h_N_d)[0].astype(float)
-        return np.column_stack([hidden_N_H, np.ones(len(hidden_N_H))])
-
-
-def _regularised_weights(features_N_F: np.ndarray, wanted_N_C: np.ndarray, precision: float) -> np.ndarray:
-    """Return the weights (F, C) that minimise cross-entropy + precision / 2 · |weights|²."""
-    from scipy.optimize import minimize
-
-    shape = (features_N_F.shape[1], wanted_N_C.shape[1])
-
-    def loss(flat):
-        weights_F_C = flat.reshape(shape)
-        log_p_N_C = _log_softmax(features_N_F @ weights_F_C)
-        gradient_F_C = features_N_F.T @ (np.exp(log_p_N_C) - wanted_N_C) + precision * weights_F_C
-        return -np.sum(wanted_N_C * log_p_N_C) + 0.5 * precision * flat @ flat, gradient_F_C.ravel()
-
-    return minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B").x.reshape(shape)
-
-
-def _gauss_newton(features_N_F: np.ndarray, p_N_C: np.ndarray) -> np.ndarray:
-    """Return the curvature (C·F, C·F) of the cross-entropy in the weights, classes first."""
-    rows = []
-    for c, p_N in enumerate(p_N_C.T):
-        curvature_N_C = p_N[:, None] * (np.eye(p_N_C.shape[1])[c] - p_N_C)
-        rows.append([(features_N_F * curvature_N[:, None]).T @ features_N_F for curvature_N in curvature_N_C.T])
-    return np.block(rows)
-
-
-def _log_softmax(logits_N_C: np.ndarray) -> np.ndarray:
-    from scipy.special import log_softmax
-
-    return log_softmax(logits_N_C, axis=1)
-
-
 EXPLAINERS = {
     "learner_ensemble": Entry("Deep ensemble of heads", Ensemble, reads="embeddings"),
     "learner_dropout": Entry("MC dropout of the head", Dropout, reads="embeddings"),
-    "learner_laplace_head": Entry("Last-layer Laplace of the head", LastLayerLaplace, reads="embeddings"),
 }

@@ -93,6 +93,7 @@ def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners
 
 def table5_claims(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
     """The paper's two claims about the GPC, answered with the differences paired by seed."""
+    metrics = _only(metrics, "accuracy", RHO)
     rows, cells = [], {}
     for source, entry in sources.items():
         for own in (name for name in GPCA if name in learners):
@@ -143,6 +144,7 @@ def _of_distance() -> str:
 
 
 def _of_learners(metrics, sources, learners, picks: Mapping[str, tuple[str, str]], **fields) -> Table:
+    metrics = _only(metrics, *(metric for _, metric in picks.values()))
     rows, cells, compared = [], {}, []
     for source, entry in sources.items():
         first = len(rows)
@@ -165,6 +167,11 @@ def _of_learners(metrics, sources, learners, picks: Mapping[str, tuple[str, str]
         compared=tuple(compared),
         **fields,
     )
+
+
+def _only(metrics: pd.DataFrame, *names: str) -> pd.DataFrame:
+    """Return the rows of these metrics, and of the numbers of samples: one in twenty, to be searched many times."""
+    return metrics[metrics["metric"].isin(["test_samples", *names])]
 
 
 def _values(metrics: pd.DataFrame, source: str, of_set: str, metric: str, learner: str) -> pd.Series:

@@ -3,11 +3,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines import dirichlet_gp, heads, learners
+from baselines import dirichlet_gp, heads, laplace_head, learners
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
 
-DRAWING = {**heads.EXPLAINERS, **dirichlet_gp.EXPLAINERS}  # with a class for every concept, variances and BALD
+# With a class for every concept, variances and BALD.
+DRAWING = {**heads.EXPLAINERS, **laplace_head.EXPLAINERS, **dirichlet_gp.EXPLAINERS}
 EXPLAINERS = {**learners.EXPLAINERS, **DRAWING}
 
 

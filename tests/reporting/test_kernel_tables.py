@@ -4,7 +4,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.kernel_grid import COLUMNS
 from gpca.reporting.kernel_figure import draw_kernel_curves
-from gpca.reporting.kernel_tables import KERNEL_TABLES, PRINTED, table4_grid, table4_kernels
+from gpca.reporting.kernel_tables import KERNEL_TABLES, PRINTED, kernel_tables_of, table4_grid, table4_kernels
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
 STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
@@ -55,6 +55,13 @@ def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(make):
     assert table.latex().count("{") == table.latex().count("}")
     with pytest.raises(InputError, match=f"hold nothing for {make.__name__}"):
         make(grid(("cups",)), REAL, 200)
+
+
+def test_a_grid_without_any_printed_row_has_no_table4_kernels():
+    kernels = {"kernels": ["rbf"], "learning_rates": [0.01], "iterations": [10, 100]}
+    assert kernel_tables_of(kernels) == ["table4_kernels", "table4_grid"]
+    for other in ({"iterations": [10]}, {"learning_rates": [0.1]}, {"kernels": ["matern32"]}):
+        assert kernel_tables_of(kernels | other) == ["table4_grid"]
 
 
 def test_one_seed_has_no_interval():

@@ -10,7 +10,7 @@ from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
 from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES
-from gpca.reporting.kernel_tables import KERNEL_TABLES
+from gpca.reporting.kernel_tables import kernel_tables_of
 from gpca.reporting.learner_figures import LEARNER_FIGURES
 from gpca.reporting.learner_tables import LEARNER_TABLES
 from gpca.reporting.learning_tables import LEARNING_TABLES
@@ -183,6 +183,7 @@ def real_world_predictions(methods):
     )
 
 
+KERNEL_TABLES = kernel_tables_of(config["kernels"])
 KERNEL_GRIDS = collect(
     "results/{{run}}/kernels/{source}/seed{seed}.csv",
     source=config["kernels"]["sources"],
