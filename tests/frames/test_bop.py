@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -6,7 +7,7 @@ from PIL import Image
 
 from gpca.errors import InputError
 from gpca.frames.bop import Annotation, Frame, TooFewPoints, back_project, read_frames, visible_points
-from gpca.frames.reading import Dataset
+from gpca.frames.reading import Dataset, read_models
 
 from .tiny import read
 
@@ -129,3 +130,15 @@ def test_a_damaged_dataset_is_refused_in_one_line(damaged, tmp_path, fault):
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
     assert ";" in str(caught.value)  # what to do
+
+
+def test_models_and_frames_may_come_in_archives_of_their_own(scenes, tmp_path):
+    for part in ("models", "test"):
+        shutil.copytree(scenes / part, tmp_path / f"tiny_{part}" / part)
+    folders = (tmp_path / "tiny_models", tmp_path / "tiny_test")
+    apart, whole = Dataset("tiny", folders), Dataset("tiny", (scenes,))
+    assert [frame.depth.name for frame in apart.frames()] == [frame.depth.name for frame in whole.frames()]
+    models = read_models(apart, apart.frames())
+    assert models.keys() == read_models(whole, whole.frames()).keys()
+    with pytest.raises(InputError, match="holds no models/obj_"):
+        read_models(Dataset("tiny", folders[1:]), apart.frames())
