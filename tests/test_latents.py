@@ -11,6 +11,8 @@ from gpca.gp_prior import Prior
 from gpca.gpc import GPC, GPCSettings
 from gpca.latents import Latents, Projection, Sites, elbo, refine
 
+from .gpytorch_form import LatentGPs
+
 CLASSES = ("noise", "pose", "overlap")
 QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)
 MANY_POINTS_C = norm.ppf(qmc.Sobol(3, rng=5).random_base2(12))  # for expectations, computed independently
@@ -29,12 +31,19 @@ LABELS, LABELS_TEST = np.array(CLASSES)[TARGETS], np.array(CLASSES)[TARGETS_TEST
 
 @pytest.fixture(scope="module")
 def trained():
-    """A GPC as gpytorch left it, and gpytorch's model."""
+    """A GPC as its fit left it, and gpytorch's model with the same parameters."""
     models = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Prior, "of", lambda model, of=Prior.of: models.append(model) or of(model))
         gpc = GPC(CLASSES, QUICK, "blobs", 0).fit(H, LABELS)
-    return gpc, models[0]
+    (model,) = models
+    reference = LatentGPs(model.kernel, model.inducing_M_d.detach())
+    reference.strategy.variational_params_initialized.fill_(1)  # or gpytorch would set them to the prior's
+    distribution = reference.strategy._variational_distribution
+    with torch.no_grad():
+        distribution.variational_mean.copy_(model.mean_C_M)
+        distribution.chol_variational_covar.copy_(model.root_C_M_M)
+    return gpc, reference.eval()
 
 
 @pytest.fixture(scope="module")
