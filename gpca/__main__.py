@@ -21,7 +21,7 @@ STEPS = {
     "embed": "registrations and encoder -> embeddings",
     "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
-    "explain": "registrations, embeddings or uncertainty -> predictions of one explainer",
+    "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",

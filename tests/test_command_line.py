@@ -50,7 +50,7 @@ STEP_OPTIONS = {
         "--registrations": "registrations.npz", "--out": "uncertainty.npz", "--tables": "uncertainty.csv",
         "--timings": "uncertainty_timings.csv",
     },
-    "explain": COMMON | {
+    "attribute": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
         "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--input-timings": "dgcnn.csv",
         "--predictions": "predictions.csv", "--timings": "gpca.csv",
@@ -135,7 +135,7 @@ def test_every_step_runs_by_hand(made):
 
 
 def test_a_step_made_anew_gives_the_same_bytes(folder, made):
-    for step in ("registrations", "train", "embed", "reduce", "uncertainty", "explain", "without", "active_learning"):
+    for step in ("registrations", "train", "embed", "reduce", "uncertainty", "attribute", "without", "active_learning"):
         assert main(arguments(step)) == 0
     for name in (
         "registrations.npz",
@@ -275,7 +275,7 @@ FAULTS = {
         (untouched, settings("uncertainty", icp={"method": "gicp"}), r"setting method: 'gicp' is not one of"),
         (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
     ],
-    "explain": [
+    "attribute": [
         (untouched, SHAP | {"--uncertainty": None}, r"'shap_removal': reads the uncertainty of design 'removal'"),
         (removed("uncertainty.npz"), SHAP, r"uncertainty.npz: no such file; make it with 'python -m gpca"),
         (arrays_changed("uncertainty.npz", sample=lambda s: s + 50), SHAP, r"holds other samples or conditions"),
@@ -292,8 +292,8 @@ FAULTS = {
         (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
         (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'head_logits' is 24×3, not 23"),
         (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: column 'split' is missing"),
-        (untouched, settings("explain", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
-        (untouched, settings("explain", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
+        (untouched, settings("attribute", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
+        (untouched, settings("attribute", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
         (untouched, {"--predictions": "meshes"}, r"meshes"),
     ],
     "without": [
@@ -345,7 +345,7 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, step, fault):
     [
         ("objects", {"--data-dir": "nowhere"}, "gpca objects: nowhere: no such folder; correct data_dir in the config"),
         ("registrations", {"--objects": "lost.npz"}, "gpca registrations: lost.npz: no such file; make it with"),
-        ("explain", {"--explainer": "shapley"}, "gpca explain: explainer 'shapley': unknown; known are"),
+        ("attribute", {"--explainer": "shapley"}, "gpca attribute: explainer 'shapley': unknown; known are"),
     ],
 )
 def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, changes, message):

@@ -1,4 +1,4 @@
-"""Step ``explain``: one explainer on all seeds of a source -> its predictions."""
+"""Step ``attribute``: one explainer on all seeds of a source -> its predictions."""
 
 from __future__ import annotations
 
