@@ -24,6 +24,9 @@ STEPS = {
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
+    "kernels": "embeddings -> every kernel, learning rate and number of iterations",
+    "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
+    "learn": "embeddings -> predictions of every learner, on test samples and on shifted ones",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
 }
 
@@ -38,8 +41,11 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"gpca {chosen}: {fault}", file=sys.stderr)
         return 2
     except (KeyboardInterrupt, SystemError) as fault:
-        # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead.
-        if not isinstance(fault, KeyboardInterrupt) and not isinstance(fault.__cause__, KeyboardInterrupt):
+        # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead, or several in a row.
+        root = fault
+        while root.__cause__ is not None:
+            root = root.__cause__
+        if not isinstance(root, KeyboardInterrupt):
             raise
         print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
         return 130

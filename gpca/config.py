@@ -15,7 +15,7 @@ from gpca.frames.source import REAL_WORLD, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.source import resolve
 from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
-from gpca.settings import load_schema, require_valid
+from gpca.settings import check_settings, load_schema, require_valid
 from gpca.synthesis import RegistrationSettings
 
 
@@ -47,6 +47,13 @@ def check(config: dict) -> dict[str, dict]:
             raise InputError(
                 "config key active_learning.strategies", f"no strategy '{strategy}'", f"known are {', '.join(known)}"
             )
+    for name, settings in config["learners"].items():
+        own = (config["explainers"].get(name) or {}) | (settings or {})
+        with_key(f"learners.{name}", require_settings, name, own)
+        with_key(f"learners.{name}", check_settings, own, "explainers", name)
+        if explainer_entry(name).reads != "embeddings":
+            raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
+    with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
     _check_real_world(config)
     sources = {
         name: {"stand_in": entry["kind"] == "procedural"}
@@ -55,6 +62,9 @@ def check(config: dict) -> dict[str, dict]:
     }
     if (name := config["figures"]["fig3_source"]) not in sources:
         raise InputError("config key figures.fig3_source", f"no source '{name}'", f"known are {', '.join(sources)}")
+    for name in config["kernels"]["sources"]:
+        if name not in sources:
+            raise InputError("config key kernels.sources", f"no source '{name}'", f"known are {', '.join(sources)}")
     return sources
 
 

@@ -11,7 +11,9 @@ import torch
 from linear_operator.utils.cholesky import psd_safe_cholesky
 from scipy.linalg import solve_triangular
 
+from gpca.kernels import covariance, variance
 from gpca.latents import Projection
+from gpca.sparse_gp import JITTER, SparseGPs
 
 
 @dataclass(frozen=True)
@@ -21,33 +23,27 @@ class Prior:
     Attributes:
         kernel: a ``ScaleKernel`` of batch shape (C,).
         inducing_M_d: shared inducing inputs Z, standardised.
-        jitter: added to variances, as gpytorch does.
     """
 
     kernel: gpytorch.kernels.ScaleKernel
     inducing_M_d: torch.Tensor
-    jitter: float
 
     @classmethod
-    def of(cls, model: gpytorch.models.ApproximateGP) -> Prior:
+    def of(cls, model: SparseGPs) -> Prior:
         """Take kernel and inducing inputs from a trained model, detached from it."""
-        strategy = model.variational_strategy.base_variational_strategy
-        kernel = deepcopy(model.covar_module).eval().requires_grad_(False)
-        return cls(kernel, strategy.inducing_points.detach().clone(), float(strategy.jitter_val))
+        return cls(deepcopy(model.kernel).requires_grad_(False), model.inducing_M_d.detach().clone())
 
     def __post_init__(self) -> None:
         with torch.no_grad():
-            K_C_M_M = self.kernel(self.inducing_M_d).add_jitter(self.jitter).to_dense()
-            cholesky_C_M_M = psd_safe_cholesky(K_C_M_M.double())
+            K_C_M_M = covariance(self.kernel, self.inducing_M_d, self.inducing_M_d)
+            cholesky_C_M_M = psd_safe_cholesky((K_C_M_M + JITTER * torch.eye(len(self.inducing_M_d))).double())
         object.__setattr__(self, "_cholesky_C_M_M", cholesky_C_M_M.numpy())
 
     def project(self, inputs_N_d: torch.Tensor) -> Projection:
         """Return weights L⁻¹ k(Z, x) and residual variance k(x, x) - |weights|² of standardised inputs."""
         with torch.no_grad():
-            K_C_M_N = self.kernel(self.inducing_M_d, inputs_N_d).to_dense().double().numpy()
-            # gpytorch takes the variances of as many inputs as classes for a square matrix: one more, then less.
-            padded = torch.cat([inputs_N_d, inputs_N_d[:1]]) if len(inputs_N_d) == len(K_C_M_N) else inputs_N_d
-            variance_C_N = self.kernel(padded, diag=True).double().numpy()[:, : len(inputs_N_d)] + self.jitter
+            K_C_M_N = covariance(self.kernel, self.inducing_M_d, inputs_N_d).double().numpy()
+            variance_C_N = variance(self.kernel, inputs_N_d).double().numpy() + JITTER
         weights_C_M_N = np.stack(
             [solve_triangular(L, K, lower=True) for L, K in zip(self._cholesky_C_M_M, K_C_M_N, strict=True)]
         )
@@ -81,7 +77,7 @@ class Prior:
                 raw_C = constraint.inverse_transform(change(constraint.transform(raw_C)))
                 setattr(part, name, torch.nn.Parameter(raw_C, requires_grad=False))
                 part.batch_shape = raw_C.shape[:1]
-        return Prior(kernel, self.inducing_M_d, self.jitter)
+        return Prior(kernel, self.inducing_M_d)
 
 
 def _geometric_mean(values_C: torch.Tensor) -> torch.Tensor:

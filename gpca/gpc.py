@@ -1,17 +1,15 @@
-"""Multi-class Gaussian process classification by sparse variational inference (paper Sec. III-B), on gpytorch.
+"""Multi-class Gaussian process classification by sparse variational inference (paper Sec. III-B).
 
 One latent GP per concept, inducing inputs shared by all, Cholesky variational posterior, softmax likelihood
-(Hensman et al. 2015). A class of the label space without a label yet has its GP already. Learnt by gpytorch are
-kernel, inducing inputs and posterior; further labels then move the posterior alone (:mod:`gpca.latents`).
+(Hensman et al. 2015). A class of the label space without a label yet has its GP already. A fit learns kernel, inducing
+inputs and posterior (:mod:`gpca.sparse_gp`); further labels then move the posterior alone (:mod:`gpca.latents`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import gpytorch
 import numpy as np
 import torch
 from sklearn.cluster import KMeans
@@ -20,14 +18,11 @@ from sklearn.preprocessing import StandardScaler
 from gpca.attribution import summarise_marginals
 from gpca.errors import InputError
 from gpca.gp_prior import Prior
-from gpca.latents import Latents, Projection, Sites, refine
+from gpca.kernels import KERNELS, make_kernel
+from gpca.latents import Projection, Sites, elbo, refine
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
-
-KERNELS = {
-    "rbf": gpytorch.kernels.RBFKernel,
-    "matern32": lambda **options: gpytorch.kernels.MaternKernel(nu=1.5, **options),
-}
+from gpca.sparse_gp import SparseGPs
 
 
 @dataclass(frozen=True)
@@ -35,7 +30,7 @@ class GPCSettings:
     """How the classifier is built and fitted; the defaults are the paper's.
 
     Attributes:
-        kernel: ``rbf`` or ``matern32``.
+        kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
         learning_rate, iterations: of Adam on the ELBO of the whole training set.
         inducing: number of shared inducing inputs N_Z.
         draws: M, posterior draws per explanation.
@@ -77,27 +72,35 @@ class GPC:
             around_R_d: embeddings by which the inputs are standardised and the inducing inputs and the lengthscale
                 initialised, where those to come lie elsewhere than the labelled ones; by default the labelled ones.
         """
+        for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N, around_R_d):
+            pass
+        return self
+
+    def fit_up_to(
+        self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None
+    ) -> Iterator[int]:
+        """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many."""
         around_R_d = h_N_d if around_R_d is None else around_R_d
         self._scaler = StandardScaler().fit(around_R_d)
         around_R_d = self._scaled(around_R_d)
-        inputs_N_d = self._scaled(h_N_d)
-        targets_N = self._targets(labels_N)
-        with _torch_seed(*self._axes, "gpc"):
-            model = _LatentGPs(_inducing_inputs(around_R_d, self.settings, self._axes), len(self.classes))
-            model.initialise(KERNELS[self.settings.kernel], _median_distance(around_R_d, self._axes))
-            likelihood = _Softmax(num_classes=len(self.classes), mixing_weights=False)
-            elbo = gpytorch.mlls.VariationalELBO(likelihood, model, num_data=len(targets_N))
-            optimiser = torch.optim.Adam(model.parameters(), lr=self.settings.learning_rate)
-            model.train()
-            for _ in progress(range(self.settings.iterations), " ".join(map(str, ("GPC", *self._axes)))):
-                optimiser.zero_grad()
-                loss = -elbo(model(inputs_N_d), torch.from_numpy(targets_N))
-                loss.backward()
-                optimiser.step()
-        self._prior = Prior.of(model.eval())
-        self._latents = model.latents()
-        self._labelled, self._targets_N, self._sites = self.project(h_N_d), targets_N, None
-        return self
+        inputs_N_d, targets_N = self._scaled(h_N_d), self._targets(labels_N)
+        random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
+        kernel = make_kernel(self.settings.kernel, len(self.classes), _median_distance(around_R_d, self._axes))
+        model = SparseGPs(kernel, _inducing_inputs(around_R_d, self.settings, self._axes), random)
+        optimiser = torch.optim.Adam(model.parameters(), lr=self.settings.learning_rate)
+        stops = sorted(set(iterations))
+        for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
+            optimiser.zero_grad()
+            (-model.elbo(inputs_N_d, torch.from_numpy(targets_N))).backward()
+            optimiser.step()
+            if done in stops:
+                self._prior, self._latents = Prior.of(model), model.latents()
+                self._labelled, self._targets_N, self._sites = self.project(h_N_d), targets_N, None
+                yield done
+
+    def elbo(self) -> float:
+        """Return the evidence lower bound per labelled sample in nats."""
+        return elbo(self._labelled, self._targets_N, self._latents) / len(self._targets_N)
 
     def update(
         self, h_L_d: np.ndarray | Projection, labels_L: np.ndarray, iterations: int = 100, tolerance: float = 1e-3
@@ -170,43 +173,6 @@ class GPC:
         return torch.from_numpy(self._scaler.transform(h_N_d).astype(np.float32))
 
 
-class _Softmax(gpytorch.likelihoods.SoftmaxLikelihood):
-    """The softmax likelihood of logits (…, N, C); gpytorch's own takes N = C points for an old, transposed layout."""
-
-    def forward(self, logits_N_C, *_args, **_kwargs):
-        """Return the distribution of the label given the latents (Eq. 2)."""
-        return torch.distributions.Categorical(logits=logits_N_C)
-
-
-class _LatentGPs(gpytorch.models.ApproximateGP):
-    """C independent sparse GPs with shared inducing inputs (M, d) and kernels of their own."""
-
-    def __init__(self, inducing_M_d: torch.Tensor, n_classes: int) -> None:
-        batch = torch.Size([n_classes])
-        distribution = gpytorch.variational.CholeskyVariationalDistribution(len(inducing_M_d), batch_shape=batch)
-        strategy = gpytorch.variational.VariationalStrategy(
-            self, inducing_M_d, distribution, learn_inducing_locations=True
-        )
-        super().__init__(gpytorch.variational.IndependentMultitaskVariationalStrategy(strategy, num_tasks=n_classes))
-        self._batch = batch
-
-    def initialise(self, kernel, lengthscale: float) -> None:
-        """Set the prior: zero mean (Eq. 1) and a scaled kernel with the given lengthscale."""
-        self.mean_module = gpytorch.means.ZeroMean(batch_shape=self._batch)
-        self.covar_module = gpytorch.kernels.ScaleKernel(kernel(batch_shape=self._batch), batch_shape=self._batch)
-        self.covar_module.base_kernel.lengthscale = lengthscale
-
-    def forward(self, inputs):
-        """Return the prior over the latents at the inputs."""
-        return gpytorch.distributions.MultivariateNormal(self.mean_module(inputs), self.covar_module(inputs))
-
-    def latents(self) -> Latents:
-        """Return the whitened variational posterior."""
-        q = self.variational_strategy.base_variational_strategy._variational_distribution()
-        with torch.no_grad():
-            return Latents(q.mean.double().numpy(), q.covariance_matrix.double().numpy())
-
-
 def _inducing_inputs(inputs_N_d: torch.Tensor, settings: GPCSettings, axes: tuple) -> torch.Tensor:
     clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
     kmeans = KMeans(clusters, n_init=1, random_state=seed_of(*axes, "inducing") % 2**32)
@@ -218,11 +184,3 @@ def _median_distance(inputs_N_d: torch.Tensor, axes: tuple, most: int = 1000) ->
     order = generator(*axes, "median").permutation(len(inputs_N_d))[:most]
     median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
     return median if median > 0 else 1.0
-
-
-@contextmanager
-def _torch_seed(*axes: object) -> Iterator[None]:
-    """Seed torch's global generator, from which gpytorch draws, and restore it afterwards."""
-    with torch.random.fork_rng():
-        torch.manual_seed(seed_of(*axes))
-        yield

@@ -27,9 +27,14 @@ _TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
 def write_predictions(path: str | Path, registrations: Registrations, attribution: Attribution) -> None:
     """Write the prediction file that every table is made from (results/README.md)."""
+    write_csv(path, prediction_frame(registrations, attribution))
+
+
+def prediction_frame(registrations: Registrations, attribution: Attribution) -> pd.DataFrame:
+    """Return the columns of a prediction file."""
     import pandas as pd
 
-    frame = pd.DataFrame(
+    return pd.DataFrame(
         {
             "sample": registrations.sample,
             "split": registrations.split,
@@ -44,18 +49,19 @@ def write_predictions(path: str | Path, registrations: Registrations, attributio
             "icp_calls": attribution.icp_calls_N,
         }
     )
-    write_csv(path, frame)
 
 
-def read_predictions(path: str | Path) -> pd.DataFrame:
+def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
     """Read a prediction file as text, but for `score_…`, `variance_…` and `icp_calls` (numbers) and `abstained` (bool).
+
+    With `sets`, a column `set` says of which set of samples each is, and numbers may occur once in each.
 
     Raises:
         InputError: missing, empty or unreadable file; missing column; a concept without a score column; a sample
-            twice in one split; a split other than train and test; a score or a number of ICP calls that is not a
-            finite number; a variance that is neither that nor empty.
+            twice in one split (and set); a split other than train and test; a score or a number of ICP calls that is
+            not a finite number; a variance that is neither that nor empty.
     """
-    rows = read_csv(path, PREDICTION_COLUMNS)
+    rows = read_csv(path, ("set", *PREDICTION_COLUMNS) if sets else PREDICTION_COLUMNS)
     concepts = concepts_of(rows)
     if not concepts:
         raise InputError(path, "has no column score_<concept>", "make it anew")
@@ -72,7 +78,7 @@ def read_predictions(path: str | Path) -> pd.DataFrame:
             raise InputError(
                 path, f"unknown concept '{unknown}' in '{column}'", f"its concepts are {', '.join(concepts)}"
             )
-    require_samples(path, rows)
+    require_samples(path, rows, ("set", "split", "sample") if sets else ("split", "sample"))
     rows["icp_calls"] = numbers(path, rows, "icp_calls")
     for column in (name for name in rows.columns if name.startswith(("score_", "variance_"))):
         # Every explainer that does not abstain has scores; one without variances leaves them empty.
@@ -134,11 +140,11 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
     return rows
 
 
-def require_samples(path: str | Path, rows: pd.DataFrame) -> None:
+def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:
     """Raise an InputError unless every row is of split train or test and each sample of a split stands once."""
     if not rows["split"].isin(["train", "test"]).all():
         raise InputError(path, "column 'split' holds something other than train and test", "make it anew")
-    if rows.duplicated(["split", "sample"]).any():
+    if rows.duplicated(list(keys)).any():
         raise InputError(path, "holds a sample twice", "make it anew")
 
 

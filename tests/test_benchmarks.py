@@ -223,3 +223,14 @@ def test_active_learning_compares_equal_bald_and_ends_with_its_numbers(capsys):
     assert list(result) == ["bald_speedup", "select_ms", "retrain_s", "max_abs_error"]
     assert result["max_abs_error"] < 1e-9
     assert "BALD of 30 embeddings, 20 draws" in out
+
+
+def test_gpc_compares_equal_fits_and_ends_with_its_numbers(capsys):
+    from benchmarks import gpc
+
+    tiny = ["--samples", "24", "--width", "6", "--inducing", "5", "--iterations", "4", "--draws", "20"]
+    gpc.main([*tiny, "--repeats", "1"])
+    result = last_line(capsys.readouterr().out)
+    assert list(result) == ["fit_s", "fit_speedup", "one_sample_ms", "ms_200_samples", "max_abs_error"]
+    assert result["max_abs_error"] < 1e-3
+    assert result["fit_s"] > 0

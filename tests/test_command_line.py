@@ -12,6 +12,7 @@ import time
 import numpy as np
 import pytest
 
+from gpca import __main__ as command_line
 from gpca.__main__ import STEPS, main
 from gpca.code_files import ROOT
 from gpca.files import save_arrays
@@ -21,6 +22,10 @@ LEARNING = {
     "held_out": ["noise", "overlap"], "initial": 6, "labels": 4, "batch": 2, "rare_share": 0.2, "rare_labels": 2,
     "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
     "stream": {"arrivals": 8, "quiet": 2, "budget": 0.5, "every": 2},
+}  # fmt: skip
+SHIFT = {
+    "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
+    "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "points": 16,
 }  # fmt: skip
 COMMON = {"--source": "tiny"}
 STEP_OPTIONS = {
@@ -63,6 +68,20 @@ STEP_OPTIONS = {
         "--settings": LEARNING, "--seed": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz",
         "--embeddings-without": "without.npz", "--strategies": ["random", "bald_kmeans", "stream_bald"],
         "--out": ["random.csv", "bald_kmeans.csv", "stream_bald.csv"],
+    },
+    "kernels": COMMON | {
+        "--settings": {"kernels": ["rbf", "polynomial"], "iterations": [2, 4], "inducing": 6, "draws": 20},
+        "--seeds": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "grid.csv",
+    },
+    "shift": COMMON | {
+        "--settings": {"shift": SHIFT, "registrations": {"points": 128}, "encoder": ENCODER}, "--seeds": 0,
+        "--objects": "objects.npz", "--registrations": "registrations.npz",
+        "--other-registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--encoders": "weights.pt",
+        "--out": "shifted.npz",
+    },
+    "learn": COMMON | {
+        "--settings": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "learner_nearest": {}}, "--seeds": 0,
+        "--learners": ["gpca", "learner_nearest"], "--sets": "shifted.npz", "--out": ["learnt.csv", "nearest.csv"],
     },
     "label": {
         "registrations.npz": [], "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--initial": 6,
@@ -135,7 +154,19 @@ def test_every_step_runs_by_hand(made):
 
 
 def test_a_step_made_anew_gives_the_same_bytes(folder, made):
-    for step in ("registrations", "train", "embed", "reduce", "uncertainty", "attribute", "without", "active_learning"):
+    for step in (
+        "registrations",
+        "train",
+        "embed",
+        "reduce",
+        "uncertainty",
+        "attribute",
+        "without",
+        "active_learning",
+        "kernels",
+        "shift",
+        "learn",
+    ):
         assert main(arguments(step)) == 0
     for name in (
         "registrations.npz",
@@ -150,6 +181,9 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
         "random.csv",
         "bald_kmeans.csv",
         "stream_bald.csv",
+        "grid.csv",
+        "shifted.npz",
+        "learnt.csv",
     ):
         assert (folder / name).read_bytes() == (made / name).read_bytes(), name
 
@@ -311,6 +345,32 @@ FAULTS = {
         (untouched, {"--strategies": ["random", "bald", "oracle"]}, r"strategy 'oracle': unknown; known are random"),
         (untouched, {"--strategies": ["random"]}, r"--out: 3 file\(s\) for 1 strategies"),
     ],
+    "kernels": [
+        (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+        (arrays_changed("embeddings.npz", h=lambda h: h * np.nan), {}, r"embeddings.npz: array 'h' holds NaN"),
+        (untouched, settings("kernels", kernels=["cubic"]), r"setting kernels.0: 'cubic' is not one of"),
+        (untouched, settings("kernels", iterations=[0]), r"setting iterations.0: 0 is less than the minimum"),
+        (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\)"),
+    ],
+    "shift": [
+        (removed("weights.pt"), {}, r"weights.pt: no such weights"),
+        (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"embeddings.npz: holds other samples than"),
+        (untouched, settings("shift", shift=SHIFT | {"sample": 3}), r"setting sample: unknown; did you mean samples\?"),
+        (untouched, settings("shift", shift=SHIFT | {"encoder": {"options": {}}}), r"setting encoder.options: unknown"),
+        (untouched, settings("shift", shifts={}), r"setting shifts: unknown; known are shift, registrations, encoder"),
+        (untouched, {"--other-registrations": ["registrations.npz"] * 2}, r"--other-registrations: 2 file\(s\) for 1"),
+    ],
+    "learn": [
+        (removed("shifted.npz"), {}, r"shifted.npz: no such file; make it with 'python -m gpca shift'"),
+        (arrays_changed("shifted.npz", h=lambda h: h * np.nan), {}, r"shifted.npz: array 'h' holds NaN"),
+        (arrays_changed("shifted.npz", concept=lambda c: np.full_like(c, "pose")),
+         {"--learners": ["learner_nearest", "gpca"]}, r"fewer than two concepts"),
+        (untouched, settings("learn", gpca={"iteration": 5}), r"explainer 'gpca': .*iteration|setting iteration"),
+        (untouched, {"--learners": ["gpca", "learner_oracle"]}, r"explainer 'learner_oracle': unknown"),
+        (untouched, {"--learners": ["gpca", "residuals_forest"]}, r"'residuals_forest': does not read embeddings"),
+        (untouched, {"--learners": ["gpca"]}, r"--out: 2 file\(s\), not 1; give one per learner and seed"),
+        (untouched, {"--seeds": [0, 1]}, r"--sets: 1 file\(s\) for 2 seed\(s\)"),
+    ],
     "label": [
         (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
         (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file with an answer on each line"),
@@ -356,6 +416,34 @@ def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, change
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith(message)
+
+
+def _from(fault, cause):
+    fault.__cause__ = cause
+    return fault
+
+
+@pytest.mark.parametrize(
+    ("fault", "status"),
+    [
+        (KeyboardInterrupt(), 130),
+        (_from(SystemError(), KeyboardInterrupt()), 130),
+        (_from(SystemError(), _from(SystemError(), KeyboardInterrupt())), 130),  # as numba raises it
+        (_from(SystemError(), ValueError()), None),
+        (SystemError(), None),
+    ],
+)
+def test_ctrl_c_is_known_in_whatever_it_is_wrapped_and_nothing_else_is(monkeypatch, capsys, fault, status):
+    def stopped(arguments, chosen):
+        raise fault
+
+    monkeypatch.setattr(command_line, "_run", stopped)
+    if status is None:
+        with pytest.raises(SystemError):
+            main(["train"])
+    else:
+        assert main(["train"]) == status
+        assert capsys.readouterr().err == "gpca train: stopped; the same command continues\n"
 
 
 def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder):

@@ -15,6 +15,9 @@ import yaml
 from snakemake.utils import update_config
 
 from gpca.__main__ import STEPS
+from gpca.reporting.kernel_tables import KERNEL_TABLES
+from gpca.reporting.learner_figures import LEARNER_FIGURES
+from gpca.reporting.learner_tables import LEARNER_TABLES
 from gpca.reporting.learning_tables import LEARNING_TABLES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -110,7 +113,7 @@ def test_every_snakemake_command_can_be_planned(page, command, tmp_path):
     assert plan.returncode == 0, plan.stderr
 
 
-@pytest.mark.parametrize(("page", "fewest"), [("protocol", 15), ("baselines", 7)])
+@pytest.mark.parametrize(("page", "fewest"), [("protocol", 15), ("baselines", 7), ("diagnostics", 7)])
 def test_every_number_of_the_protocol_is_that_of_the_config(page, fewest):
     config = yaml.safe_load((ROOT / "config/config.yaml").read_text())
     rows = re.findall(r"^\| `([a-z0-9_.]+)` \| `([^`]+)` \|", (ROOT / f"docs/{page}.md").read_text(), re.MULTILINE)
@@ -129,6 +132,12 @@ def test_every_configured_rival_is_described():
         assert f"`{name}`" in page or f"`…{name.removeprefix('shap_removal').removeprefix('sa_local_removal')}`" in page
 
 
+def test_every_configured_learner_is_described():
+    learners = yaml.safe_load((ROOT / "config/config.yaml").read_text())["learners"]
+    page = (ROOT / "docs/diagnostics.md").read_text()
+    assert [name for name in learners if f"`{name}`" not in page] == []
+
+
 def test_every_key_of_a_source_is_described():
     schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
     keys = schema["$defs"]["source"]["properties"]
@@ -140,9 +149,10 @@ def test_every_key_of_a_source_is_described():
 def test_every_table_and_figure_of_the_readme_is_made():
     listed = re.findall(r"^\| `(tables|figures)/([a-z0-9_]+)", (ROOT / "README.md").read_text(), re.MULTILINE)
     rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
+    by_name = {*LEARNING_TABLES, *KERNEL_TABLES, *LEARNER_TABLES, *LEARNER_FIGURES}
     assert {kind for kind, _ in listed} == {"tables", "figures"}
     for kind, name in listed:
-        assert f'"{name}"' in rules or f"/{kind}/{name}" in rules or name in LEARNING_TABLES, name
+        assert f'"{name}"' in rules or f"/{kind}/{name}" in rules or name in by_name, name
 
 
 # --- nothing of one machine ---

@@ -1,4 +1,5 @@
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ import torch
 
 from gpca.errors import InputError
 from gpca.gpc import GPC, GPCSettings
+from gpca.kernels import KERNELS
 
 CLASSES = ("noise", "pose", "overlap")
 QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)
@@ -35,7 +37,7 @@ def gpc():
     return fitted(H, LABELS)
 
 
-@pytest.mark.parametrize("kernel", ["rbf", "matern32"])
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_separated_blobs_are_learnt(kernel):
     settings = GPCSettings(kernel, learning_rate=0.05, iterations=40, inducing=12, draws=200)
     assert np.mean(predicted(fitted(H, LABELS, settings), H_TEST) == LABELS_TEST) > 0.95
@@ -98,6 +100,27 @@ def test_a_seed_repeats_every_byte_and_another_does_not(gpc):
         assert expected.tobytes() == of_same_seed.tobytes() != of_other_seed.tobytes()
 
 
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_on_the_way_it_is_what_fewer_iterations_make_it(kernel):
+    settings = GPCSettings(kernel, learning_rate=0.05, iterations=9, inducing=12, draws=50)
+    longer = GPC(CLASSES, settings, "blobs", 0)
+    for done in longer.fit_up_to([4, 9], H, LABELS):
+        stopped = fitted(H, LABELS, replace(settings, iterations=done))
+        assert stopped.elbo() == longer.elbo()
+        for expected, on_the_way in zip(stopped.attribute(H_TEST), longer.attribute(H_TEST), strict=True):
+            assert np.array_equal(expected, on_the_way)
+    assert done == 9
+
+
+def test_the_bound_rises_with_the_fit():
+    bounds = []
+    gpc = GPC(CLASSES, QUICK, "blobs", 0)
+    for _ in gpc.fit_up_to([1, 10, 40], H, LABELS):
+        bounds.append(gpc.elbo())
+    assert bounds == sorted(bounds)
+    assert bounds[-1] < 0
+
+
 def test_fitting_leaves_torchs_generator_where_it_was():
     before = torch.random.get_rng_state()
     fitted(H[:6], LABELS[:6])
@@ -110,7 +133,7 @@ def test_repeated_and_few_points_can_be_fitted():
 
 
 def test_an_unknown_kernel_is_named():
-    with pytest.raises(InputError, match=r"kernel 'linear': unknown; known are rbf, matern32"):
+    with pytest.raises(InputError, match=r"kernel 'linear': unknown; known are rbf, matern32, polynomial"):
         GPCSettings("linear")
 
 
@@ -125,7 +148,7 @@ def accuracy(gpc, h, labels):
     return np.mean(np.array(gpc.classes)[gpc.attribute(h)[0].argmax(axis=1)] == labels)
 
 
-@pytest.mark.parametrize("kernel", ["rbf", "matern32"])
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_labels_of_the_missing_class_make_it_recognised(kernel):
     gpc = fitted_without_overlap(GPCSettings(kernel, learning_rate=0.05, iterations=40, inducing=12, draws=200))
     assert "overlap" not in predicted(gpc, H_TEST)
@@ -173,7 +196,7 @@ def test_what_changes_a_classifier_leaves_an_earlier_copy_as_it_was(change):
         assert np.array_equal(expected, of_copy)
 
 
-@pytest.mark.parametrize("kernel", ["rbf", "matern32"])
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_a_class_added_later_costs_the_others_nothing_and_is_learnt(kernel):
     fourth = np.full(16, 3.0) * np.random.default_rng(4).choice([-1, 1], size=16)
     h_new = fourth + np.random.default_rng(5).normal(size=(30, 16))

@@ -20,6 +20,11 @@ def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) 
     return {name: _resolved(name, entry, data_dir) for name, entry in (datasets or {}).items()}
 
 
+def patterns(split: str = "test") -> list[str]:
+    """Return the patterns of the files that are read of a dataset, below its folder."""
+    return [f"{split}*/*/*.json", f"{split}*/*/depth/*", f"{split}*/*/mask_visib/*", "models/*"]
+
+
 def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path]:
     """Return the files that local datasets are read from, sorted by dataset and name."""
     files = []
@@ -29,9 +34,7 @@ def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path
 
 
 def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
-    split = entry.get("split", "test")
-    patterns = [f"{split}*/*/*.json", f"{split}*/*/depth/*", f"{split}*/*/mask_visib/*", "models/*"]
-    found = resolve({"title": name, "kind": "bop", "files": patterns, **entry}, data_dir)
+    found = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
     if found.get("results"):
         found["results"] = str(Path(data_dir or "", found["results"]).expanduser().absolute())
         if not Path(found["results"]).is_file():

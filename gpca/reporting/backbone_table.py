@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 BACKBONES = {"dgcnn": "DGCNN", "pointnet": "PointNet", "pointnet2": "PointNet++", "pointnext": "PointNeXt-S"}
 REDUCTIONS = {"none": "No reduction", "pca": "PCA", "umap": "UMAP", "autoencoder": "Autoencoder"}
-CLASSIC = "analytical_gpc"
+CLASSIC = {
+    "analytical_gpc": "Classic features",
+    "analytical_gpc_no_counts": "Classic features without point counts",
+}
 
 
 def table6_backbones(
@@ -42,7 +45,7 @@ def table6_backbones(
     methods = [
         (f"{b}-{r}", (b, BACKBONES.get(b, b)), (r, REDUCTIONS[r]), n) for b, n in backbones.items() for r in reductions
     ]
-    methods.append((CLASSIC, (CLASSIC, "Classic features"), ("none", REDUCTIONS["none"]), None))
+    methods += [(name, (name, title), ("none", REDUCTIONS["none"]), None) for name, title in CLASSIC.items()]
     reference_R = _values(metrics, methods[0][0])
     for method, *labels, parameters in methods:
         accuracy_R = _values(metrics, method)

@@ -133,8 +133,10 @@ class _Camera:
 
 
 def _zoom(panel, u: np.ndarray, v: np.ndarray, shape: tuple[int, ...]) -> None:
-    """Show a part of the image of its own shape around the object, twice as wide as it or high as it."""
-    half_v = max(np.ptp(v), np.ptp(u) * shape[0] / shape[1]) * 0.85
-    half_u = half_v * shape[1] / shape[0]
-    centre_u, centre_v = (u.min() + u.max()) / 2, (v.min() + v.max()) / 2
+    """Show a part of the image, of its own shape, around the object."""
+    height, width = shape[:2]
+    half_v = min(0.85 * max(np.ptp(v), np.ptp(u) * height / width), height / 2)
+    half_u = half_v * width / height
+    centre_u = np.clip((u.min() + u.max()) / 2, half_u, width - half_u)
+    centre_v = np.clip((v.min() + v.max()) / 2, half_v, height - half_v)
     panel.set(xlim=(centre_u - half_u, centre_u + half_u), ylim=(centre_v + half_v, centre_v - half_v))

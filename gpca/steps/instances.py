@@ -9,7 +9,7 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.reading import Dataset, points_on_model, read_instances, read_models
-from gpca.frames.source import frame_files, resolve_datasets
+from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.source import folders
 from gpca.provenance import recorded
@@ -34,6 +34,8 @@ def run(options: Namespace) -> None:
     if not entries and not options.scenes:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
     inputs = frame_files(options.settings.get("datasets"), options.data_dir)
+    if options.scenes:
+        inputs = sorted(path for pattern in patterns() for path in options.scenes.glob(pattern))
     initial_pose = InitialPoseSettings(**options.settings.get("initial_pose", {}))
     with recorded([options.out, options.objects], inputs, {**options.settings, "points": options.points}):
         datasets = {

@@ -3,9 +3,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines.learners import EXPLAINERS
+from baselines import dirichlet_gp, heads, learners
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
+
+DRAWING = {**heads.EXPLAINERS, **dirichlet_gp.EXPLAINERS}  # with a class for every concept, variances and BALD
+EXPLAINERS = {**learners.EXPLAINERS, **DRAWING}
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +35,7 @@ def test_separated_concepts_are_told_apart_with_probabilities(name, embedded):
     assert (attribution.icp_calls_N == 0).all()
 
 
-@pytest.mark.parametrize("name", EXPLAINERS)
+@pytest.mark.parametrize("name", learners.EXPLAINERS)
 def test_a_concept_absent_from_training_keeps_its_column(name, embedded):
     train = embedded.rows("train")
     scores = explained(name, embedded, train[embedded.concept[train] != "pose"]).scores_N_C
@@ -53,9 +56,50 @@ def test_a_constant_embedding_gives_finite_scores(name, embedded):
     assert np.isfinite(explained(name, constant).scores_N_C).all()
 
 
-@pytest.mark.parametrize("name", EXPLAINERS)
+@pytest.mark.parametrize("name", learners.EXPLAINERS)
 def test_the_same_embeddings_give_the_same_scores(name, embedded):
     assert np.array_equal(explained(name, embedded).scores_N_C, explained(name, embedded, seed=1).scores_N_C)
+
+
+@pytest.mark.parametrize("name", DRAWING)
+def test_a_concept_absent_from_training_is_hardly_ever_named(name, embedded):
+    train = embedded.rows("train")
+    scores = explained(name, embedded, train[embedded.concept[train] != "pose"]).scores_N_C
+    assert scores[:, CONCEPTS.index("pose")].max() < 0.5
+    assert scores.sum(axis=1) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("name", DRAWING)
+def test_draws_give_variances_and_bald_in_their_bounds(name, embedded):
+    attribution = explained(name, embedded)
+    assert 0 <= attribution.variances_N_C.min() < attribution.variances_N_C.max() <= 0.25
+    assert -1e-6 < attribution.bald_N.min() < attribution.bald_N.max() <= np.log(3)
+
+
+@pytest.mark.parametrize("name", DRAWING)
+def test_a_seed_repeats_every_byte_another_does_not_and_nothing_global_is_drawn(name, embedded):
+    import torch
+
+    before = torch.random.get_rng_state()
+    first, again, other = (explained(name, embedded, seed=seed).scores_N_C for seed in (0, 0, 1))
+    assert first.tobytes() == again.tobytes() != other.tobytes()
+    assert torch.equal(torch.random.get_rng_state(), before)
+
+
+@pytest.mark.parametrize("name", DRAWING)
+def test_a_result_does_not_depend_on_the_other_samples(name, embedded):
+    learner = EXPLAINERS[name].make("tiny", 0)
+    learner.fit(embedded.subset(embedded.rows("train")))
+    rows = embedded.rows("test")
+    whole, part = (learner.explain(embedded.subset(chosen)).scores_N_C for chosen in (rows, rows[2:5]))
+    assert np.abs(whole[2:5] - part).max() < 1e-5
+
+
+@pytest.mark.parametrize("name", EXPLAINERS)
+def test_fewer_than_two_concepts_are_a_fault(name, embedded):
+    train = embedded.rows("train")
+    with pytest.raises(InputError, match="fewer than two concepts"):
+        explained(name, embedded, train[embedded.concept[train] == "pose"])
 
 
 @pytest.mark.parametrize("name", EXPLAINERS)

@@ -12,16 +12,22 @@ def test_snakemakes_own_linter_has_nothing_to_say(project):
 
 
 @pytest.mark.parametrize(
-    ("config", "run", "seeds"), [("config", "embedded", 3), ("smoke", "smoke", 2), ("real", "real", 5)]
+    ("config", "run", "seeds", "backbones", "reductions"),
+    [("config", "embedded", 3, 4, 4), ("smoke", "smoke", 2, 2, 2), ("real", "real", 5, 4, 4)],
 )
-def test_every_config_loads_offline_and_asks_for_all_results(project, config, run, seeds):
+def test_every_config_loads_offline_and_asks_for_all_results(project, config, run, seeds, backbones, reductions):
     done = project.snakemake("-n", "all", "--configfile", f"config/{config}.yaml")
     assert "profiles/default" in done.stderr
     planned = project.dry_run("all", "--configfile", f"config/{config}.yaml")
     assert planned.jobs["objects"] == 3
-    assert planned.jobs["registrations"] == planned.jobs["encoder"] == 3 * seeds
-    assert planned.jobs["explain"] == 3 * 19
+    assert planned.jobs["registrations"] == 3 * seeds
+    assert planned.jobs["encoder"] == (3 + backbones) * seeds
+    assert planned.jobs["explain"] == 3 * 19 + 2
+    assert planned.jobs["explain_with_backbone"] == backbones * reductions
+    assert planned.jobs["scenes"] == (config != "real")
     assert planned.jobs["uncertainty"] == 3 * 6
+    assert planned.jobs["shift"] == planned.jobs["learn"] == 3
+    assert planned.jobs["kernels"] == (1 if config == "smoke" else 2)
     assert planned.jobs["embeddings_without"] == planned.jobs["active_learning"] == 3 * seeds
     for name in (
         "metrics.csv",
@@ -29,6 +35,12 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, config, ru
         "tables/table1_single_baselines.md",
         "tables/table2_per_concept.tex",
         "tables/table3_stream.csv",
+        "tables/table6_backbones.tex",
+        "poses/real_rgbd/seed0.csv",
+        "tables/table4_kernels.md",
+        "tables/table5_claims.tex",
+        "diagnostics.csv",
+        "figures/reliability.pdf",
     ):
         assert f"results/{run}/{name}" in planned.outputs
     assert {f"results/{run}/figures/{name}.png" for name in ("fig3_concepts", "objects_ycb")} <= planned.outputs

@@ -1,3 +1,4 @@
+import csv
 import json
 
 import pytest
@@ -5,8 +6,14 @@ import pytest
 SMOKE = ("all", "--configfile", "config/smoke.yaml")
 COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
 LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
+DIAGNOSED = {"learn": 3, "diagnostics": 1, "learner_table": 3, "learner_figure": 3}
+KERNELS = {"kernels": 1, "kernel_table": 2, "kernel_learning_curves": 1}
+PICTURES = {"fig5_real_world_example": 1, "real_world_failures": 1}
+REAL_WORLD = {"real_world_metrics": 1, "table6_backbones": 1, "confusion_real_world": 1} | PICTURES
+BACKBONES = {"explain_with_backbone": 4} | REAL_WORLD
 # Explainers times three sources: those with a GPC, those on embeddings, those on uncertainties, all.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 3 * explainers} for explainers in (4, 4, 13))
+WITH_GPC["explain"] += 2  # classic features on depth frames
 
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
@@ -35,13 +42,37 @@ def test_table3_needs_no_uncertainty_and_no_explainer(project):
     }  # fmt: skip
 
 
+def test_table4_needs_its_sources_alone_and_table5_no_explainer(project):
+    smoke = ("--configfile", "config/smoke.yaml")
+    planned = project.dry_run("results/smoke/tables/table4_kernels.md", *smoke)
+    assert planned.jobs == {
+        "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "kernels": 1, "kernel_table": 1,
+    }  # fmt: skip
+    planned = project.dry_run("results/smoke/tables/table5_learners.md", *smoke)
+    assert planned.jobs == {
+        "objects": 3, "registrations": 6, "encoder": 6, "embeddings": 6, "shift": 3, "learn": 3, "diagnostics": 1,
+        "learner_table": 1,
+    }  # fmt: skip
+
+
+def test_table6_needs_the_frames_alone(project):
+    planned = project.dry_run("results/smoke/tables/table6_backbones.md", "--configfile", "config/smoke.yaml")
+    assert planned.jobs == {
+        "scenes": 1, "instances": 1, "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2,
+        "explain": 2, "explain_with_backbone": 4, "real_world_metrics": 1, "table6_backbones": 1,
+    }  # fmt: skip
+
+
 def test_a_finished_run_has_nothing_to_do(finished):
     assert not finished.dry_run(*SMOKE).jobs
     assert not finished.dry_run("smoke").jobs
 
 
 EDITS = {
-    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED,
+    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED | DIAGNOSED | KERNELS | BACKBONES,
+    "gpca/shift.py": {"shift": 3} | DIAGNOSED,
+    "baselines/heads.py": DIAGNOSED,
+    "gpca/reporting/kernel_figure.py": {"kernel_learning_curves": 1},
     "gpca/acquisition.py": {"active_learning": 6} | LEARNED,
     "gpca/stream.py": {"active_learning": 6} | LEARNED,
     "gpca/reporting/learning_figure.py": {"active_learning_curves": 1},
@@ -49,17 +80,27 @@ EDITS = {
     "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2},
     "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
-    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1},
-    "gpca/reporting/tables.py": {"table": 3, "learning_table": 3},
-    "gpca/reporting/confusions_figure.py": {"fig_attribution_confusions": 1},
+    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | PICTURES,
+    "gpca/reduction.py": {"reduced_embeddings": 2} | BACKBONES | {"explain_with_backbone": 2},
+    "gpca/frames/occlusion.py": {
+        "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2, "explain": 2,
+    } | BACKBONES,
+    "gpca/frames/bop.py": {
+        "instances": 1, "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2, "explain": 2,
+    } | BACKBONES,
+    "gpca/reporting/tables.py": {
+        "table": 3, "learning_table": 3, "learner_table": 3, "kernel_table": 2, "kernel_learning_curves": 1,
+    },
+    "gpca/reporting/confusions_figure.py": {"fig_attribution_confusions": 1, "confusion_real_world": 1},
     "gpca/encoders/dgcnn.py": {
-        "encoder": 6, "embeddings": 6, "embeddings_without": 6, "active_learning": 6,
-    } | ON_EMBEDDINGS | COLLECTORS | LEARNED,
-    "gpca/objects/bop.py": {},
+        "encoder": 8, "embeddings": 8, "embeddings_without": 6, "active_learning": 6, "shift": 3,
+        "reduced_embeddings": 1,
+    } | BACKBONES | {"explain_with_backbone": 2} | ON_EMBEDDINGS | COLLECTORS | LEARNED | DIAGNOSED | KERNELS,
+    "gpca/objects/uw_rgbd.py": {},
     "gpca/objects/shapes/cups.py": {
         "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
-        "objects_figure": 1, "fig3_concepts": 1, "embeddings_without": 2, "active_learning": 2,
-    } | COLLECTORS | LEARNED,
+        "objects_figure": 1, "fig3_concepts": 1, "embeddings_without": 2, "active_learning": 2, "shift": 3,
+    } | COLLECTORS | LEARNED | DIAGNOSED,
 }  # fmt: skip
 
 
@@ -67,6 +108,19 @@ EDITS = {
 def test_an_edit_reruns_the_rules_that_use_the_module_and_no_other(finished, module):
     finished.append(module, "\n# edited\n")
     assert finished.dry_run(*SMOKE).jobs == EDITS[module]
+
+
+@pytest.mark.parametrize("name", ["gpca", "gpca_paper"])
+def test_an_explainer_says_the_same_as_a_learner(smoke, name):
+    def rows(path, columns):
+        with (smoke.folder / "results/smoke" / path).open() as file:
+            return [[row[column] for column in columns] for row in csv.DictReader(file)
+                    if row["split"] == "test" and row.get("set", "in_distribution") == "in_distribution"]  # fmt: skip
+
+    columns = ("sample", "object", "concept_true", "score_noise", "variance_pose", "bald")
+    learned = rows(f"learners/ycb/{name}/seed1.csv", columns)
+    assert len(learned) == 12
+    assert learned == rows(f"predictions/ycb/{name}/seed1.csv", columns)
 
 
 def test_a_touched_but_unchanged_module_reruns_nothing(finished):
@@ -77,8 +131,8 @@ def test_a_touched_but_unchanged_module_reruns_nothing(finished):
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert planned.jobs == {"explain": 3} | COLLECTORS
-    assert not [path for path in planned.outputs if "gpca_paper" in path]
+    assert planned.jobs == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES
+    assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):

@@ -9,6 +9,10 @@ from gpca.frames.source import REAL_WORLD, frame_files
 from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
+from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES
+from gpca.reporting.kernel_tables import KERNEL_TABLES
+from gpca.reporting.learner_figures import LEARNER_FIGURES
+from gpca.reporting.learner_tables import LEARNER_TABLES
 from gpca.reporting.learning_tables import LEARNING_TABLES
 from gpca.reporting.tables import GPCA, TABLE1, title_of
 
@@ -168,7 +172,7 @@ REAL_WORLD_TITLE = title_of(
         "stand_in": not config["real_world"]["datasets"],
     }
 )
-CLASSIC = [name for name in ("analytical_gpc",) if name in config["explainers"]]
+CLASSIC = [name for name in CLASSIC_TITLES if name in config["explainers"]]
 
 
 def real_world_predictions(methods):
@@ -177,6 +181,54 @@ def real_world_predictions(methods):
         method=methods,
         seed=SEEDS,
     )
+
+
+KERNEL_GRIDS = collect(
+    "results/{{run}}/kernels/{source}/seed{seed}.csv",
+    source=config["kernels"]["sources"],
+    seed=SEEDS,
+)
+KERNEL_SOURCES = {
+    name: entry
+    for name, entry in SHOWN_SOURCES.items()
+    if name in config["kernels"]["sources"]
+}
+# A learner that is an explainer of the config too has its settings, and those of its own besides.
+LEARNER_SETTINGS = {
+    name: (config["explainers"].get(name) or {}) | (own or {})
+    for name, own in config["learners"].items()
+}
+LEARNER_TITLES = {
+    name: explainer_entry(name).title.removesuffix(" on the embedding")
+    for name in LEARNER_SETTINGS
+}
+
+
+def of_all_learners():
+    return collect(
+        "results/{{run}}/learners/{source}/{learner}/seed{seed}.csv",
+        source=SOURCES,
+        learner=LEARNER_SETTINGS,
+        seed=SEEDS,
+    )
+
+
+def shift_inputs(wildcards):
+    """What a source's shifted sets are made from; the source that its encoder never saw is the first other one."""
+    other = next((name for name in SOURCES if name != wildcards.source), None)
+    encoder = config["embedding"]["encoder"]
+    own = f"results/{wildcards.run}/{{}}/{wildcards.source}"
+    inputs = {
+        "registrations": f"{own.format('registrations')}/seed{{seed}}.npz",
+        "embeddings": f"{own.format('embeddings')}/{EMBEDDING}/seed{{seed}}.npz",
+        "encoders": f"{own.format('encoders')}/{encoder}/seed{{seed}}.pt",
+    }
+    if other:
+        inputs["other"] = (
+            f"results/{wildcards.run}/registrations/{other}/seed{{seed}}.npz"
+        )
+    files = {name: collect(pattern, seed=SEEDS) for name, pattern in inputs.items()}
+    return files | {"objects": f"{own.format('objects')}.npz"}
 
 
 # The explainers that each table shows: asked for alone, a table builds these and nothing else. No table without any.
@@ -212,11 +264,19 @@ FIGURES = [
     "fig3_concepts",
     "fig_attribution_confusions",
     "active_learning_curves",
+    "kernel_learning_curves",
+    *LEARNER_FIGURES,
     *(f"objects_{source}" for source in SOURCES),
 ]
 RESULTS = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *(f"tables/{table}.md" for table in (*TABLE_EXPLAINERS, *LEARNING_TABLES)),
     "tables/table6_backbones.md",
+    *("metrics.csv", "timings.csv", "active_learning.csv", "diagnostics.csv"),
+    *(
+        f"tables/{table}.md"
+        for tables in (TABLE_EXPLAINERS, LEARNING_TABLES, KERNEL_TABLES, LEARNER_TABLES)
+        for table in tables
+    ),
     *(f"figures/{figure}.png" for figure in FIGURES),
 ]

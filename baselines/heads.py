@@ -1,0 +1,249 @@
+"""Heads of a neural network on the embeddings, with what deep learning offers for uncertainty (paper, Table V).
+
+The encoder stays as it is; a head of one hidden layer is trained on it with the labelled embeddings. From each
+follow draws of the logits, and from those scores, variances and BALD as GP-CA's: the members of a deep ensemble
+(Lakshminarayanan et al. 2017), the passes of Monte-Carlo dropout (Gal & Ghahramani 2016), draws from Laplace's
+approximation over the last layer (Daxberger et al. 2021).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from time import perf_counter
+
+import numpy as np
+
+from baselines.attached import attached
+from baselines.concept_classifier import known_concepts
+from gpca.attribution import Attribution, summarise_draws
+from gpca.dataset import Registrations
+from gpca.diagnostics import negative_log_likelihood
+from gpca.explainer import Entry
+from gpca.perturbation import CONCEPTS
+from gpca.seeds import generator, seed_of
+
+BATCH_SIZE = 64
+
+
+class Heads:
+    """E heads d -> hidden -> C, ReLU between, trained side by side from starts and on batches of their own.
+
+    Args:
+        axes: name the random numbers.
+        heads: E.
+        rate: of the dropout before the last layer.
+        hidden: units.
+        steps, learning_rate, weight_decay: of AdamW on the cross-entropy of random batches; the rate falls as a cosine.
+    """
+
+    def __init__(
+        self,
+        *axes: object,
+        heads: int = 1,
+        rate: float = 0.0,
+        hidden: int = 128,
+        steps: int = 300,
+        learning_rate: float = 2e-3,
+        weight_decay: float = 1e-2,
+    ) -> None:
+        self._axes, self._heads, self._rate, self._hidden = axes, heads, rate, hidden
+        self._steps, self._learning_rate, self._weight_decay = steps, learning_rate, weight_decay
+
+    def fit(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
+        """Train on standardised embeddings and the numbers of their concepts."""
+        import torch
+        from sklearn.preprocessing import StandardScaler
+
+        self._scaler = StandardScaler().fit(h_N_d)
+        inputs_N_d, targets_N = self._inputs(h_N_d), torch.from_numpy(target_N)
+        random = torch.Generator().manual_seed(seed_of(*self._axes))
+        widths = (h_N_d.shape[1], self._hidden, len(CONCEPTS))
+        self._layers = []
+        for width, outputs in pairwise(widths):
+            weight = torch.randn((self._heads, width, outputs), generator=random) * (2 / width) ** 0.5
+            self._layers += [weight.requires_grad_(), torch.zeros((self._heads, 1, outputs), requires_grad=True)]
+        optimiser = torch.optim.AdamW(self._layers, self._learning_rate, weight_decay=self._weight_decay)
+        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, self._steps)
+        for _ in range(self._steps):
+            rows_E_B = torch.rand((self._heads, len(targets_N)), generator=random).argsort(dim=1)[:, :BATCH_SIZE]
+            hidden_E_B_H = self._hidden_units(inputs_N_d[rows_E_B])
+            if self._rate:
+                kept = torch.rand(hidden_E_B_H.shape, generator=random) >= self._rate
+                hidden_E_B_H = hidden_E_B_H * kept / (1 - self._rate)
+            logits_E_B_C = self._last_layer(hidden_E_B_H)
+            loss = torch.nn.functional.cross_entropy(logits_E_B_C.flatten(0, 1), targets_N[rows_E_B].flatten())
+            optimiser.zero_grad()
+            # A head's gradient is that of its own loss, however many are trained beside it.
+            (loss * self._heads).backward()
+            optimiser.step()
+            schedule.step()
+
+    def hidden(self, h_N_d: np.ndarray) -> np.ndarray:
+        """Return the hidden units (E, N, H) of the embeddings."""
+        import torch
+
+        with torch.no_grad():
+            return self._hidden_units(self._inputs(h_N_d)).numpy()
+
+    def logits(self, hidden_E_N_H: np.ndarray) -> np.ndarray:
+        """Return the last layer's logits (E, N, C)."""
+        import torch
+
+        with torch.no_grad():
+            return self._last_layer(torch.from_numpy(hidden_E_N_H)).numpy()
+
+    def _inputs(self, h_N_d: np.ndarray):
+        import torch
+
+        return torch.from_numpy(self._scaler.transform(h_N_d).astype(np.float32))
+
+    def _hidden_units(self, inputs):
+        weight, bias = self._layers[:2]
+        return (inputs @ weight + bias).relu()
+
+    def _last_layer(self, hidden):
+        weight, bias = self._layers[2:]
+        return hidden @ weight + bias
+
+
+class HeadLearner:
+    """What the three learners share: heads, and draws of the logits from them. Training takes `training`'s settings."""
+
+    def __init__(self, source: str, seed: int, **training) -> None:
+        self._axes = (source, seed, type(self).__name__)
+        self._heads = Heads(*self._axes, **training)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Train on the labelled embeddings; fewer than two concepts among the labels raise an InputError."""
+        known_concepts(registrations.concept)
+        h_N_d = attached(registrations, "embedding", None)
+        target_N = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
+        self._train(h_N_d, target_N)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Draw the logits of every registration and summarise, as GP-CA does."""
+        started = perf_counter()
+        logits_M_N_C = self._draw_logits(attached(registrations, "embedding", None))
+        scores_N_C, variances_N_C, bald_N = summarise_draws(logits_M_N_C)
+        seconds = (perf_counter() - started) / len(registrations)
+        attribution = Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds)
+        return replace(attribution, variances_N_C=variances_N_C, bald_N=bald_N)
+
+    def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
+        self._heads.fit(h_N_d, target_N)
+
+    def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
+        raise NotImplementedError
+
+
+class Ensemble(HeadLearner):
+    """A deep ensemble of heads: each is a draw."""
+
+    def __init__(self, source: str, seed: int, members: int = 5, **training) -> None:
+        super().__init__(source, seed, heads=members, **training)
+
+    def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
+        return self._heads.logits(self._heads.hidden(h_N_d))
+
+
+class Dropout(HeadLearner):
+    """Monte-Carlo dropout: every pass is a draw, its mask shared by all samples, as one network is."""
+
+    def __init__(self, source: str, seed: int, rate: float = 0.5, passes: int = 100, **training) -> None:
+        super().__init__(source, seed, rate=rate, **training)
+        self._rate, self._passes = rate, passes
+
+    def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
+        hidden_1_N_H = self._heads.hidden(h_N_d)
+        kept_M_1_H = generator(*self._axes, "passes").random((self._passes, 1, hidden_1_N_H.shape[2])) >= self._rate
+        return self._heads.logits((hidden_1_N_H * kept_M_1_H / (1 - self._rate)).astype(np.float32))
+
+
+class LastLayerLaplace(HeadLearner):
+    """Laplace's approximation over the last layer, with the full generalised Gauss-Newton matrix.
+
+    The last layer is fitted anew to the hidden units under a Gaussian prior: an approximation about weights that are no
+    maximum of the posterior would not be Laplace's. The prior's precision is the one that predicts a fifth of the
+    training samples best (least NLL) after training on the others; that of the largest evidence, as the hidden units
+    were learnt from the same labels, leaves the scores far too timid.
+    """
+
+    PRECISIONS = tuple(10.0 ** (exponent / 2) for exponent in range(6, -5, -1))
+
+    def __init__(self, source: str, seed: int, draws: int = 1000, **training) -> None:
+        super().__init__(source, seed, **training)
+        self._draws = draws
+
+    def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
+        order_N = generator(*self._axes, "validation").permutation(len(target_N))
+        validation, rest = order_N[::5], np.delete(order_N, np.s_[::5])
+        precision = self.PRECISIONS[0]
+        if len(rest):
+            super()._train(h_N_d[rest], target_N[rest])
+            losses = []
+            for candidate in self.PRECISIONS:
+                self._approximate(h_N_d[rest], target_N[rest], candidate)
+                scores_N_C, _, _ = summarise_draws(self._draw_logits(h_N_d[validation]))
+                losses.append(negative_log_likelihood(scores_N_C, target_N[validation]))
+            precision = self.PRECISIONS[int(np.argmin(losses))]
+        super()._train(h_N_d, target_N)
+        self._approximate(h_N_d, target_N, precision)
+
+    def _approximate(self, h_N_d: np.ndarray, target_N: np.ndarray, precision: float) -> None:
+        features_N_F, wanted_N_C = self._features(h_N_d), np.eye(len(CONCEPTS))[target_N]
+        self._weights_F_C = _regularised_weights(features_N_F, wanted_N_C, precision)
+        p_N_C = np.exp(_log_softmax(features_N_F @ self._weights_F_C))
+        eigenvalues, self._vectors = np.linalg.eigh(_gauss_newton(features_N_F, p_N_C))
+        self._deviations = 1 / np.sqrt(np.maximum(eigenvalues, 0) + precision)
+
+    def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
+        features_N_F, n_classes = self._features(h_N_d), len(CONCEPTS)
+        # W (C·F, K) with covariance W Wᵀ of the weights; that of a sample's logits is then R Rᵀ with R (C, K).
+        roots_C_F_K = (self._vectors * self._deviations).reshape(n_classes, features_N_F.shape[1], -1)
+        roots_C_N_K = features_N_F @ roots_C_F_K
+        covariance_N_C_C = np.einsum("cnk,dnk->ncd", roots_C_N_K, roots_C_N_K)
+        cholesky_N_C_C = np.linalg.cholesky(covariance_N_C_C + 1e-9 * np.eye(n_classes))
+        normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, n_classes))
+        return features_N_F @ self._weights_F_C + np.einsum("ncd,md->mnc", cholesky_N_C_C, normal_M_C)
+
+    def _features(self, h_N_d: np.ndarray) -> np.ndarray:
+        hidden_N_H = self._heads.hidden(h_N_d)[0].astype(float)
+        return np.column_stack([hidden_N_H, np.ones(len(hidden_N_H))])
+
+
+def _regularised_weights(features_N_F: np.ndarray, wanted_N_C: np.ndarray, precision: float) -> np.ndarray:
+    """Return the weights (F, C) that minimise cross-entropy + precision / 2 · |weights|²."""
+    from scipy.optimize import minimize
+
+    shape = (features_N_F.shape[1], wanted_N_C.shape[1])
+
+    def loss(flat):
+        weights_F_C = flat.reshape(shape)
+        log_p_N_C = _log_softmax(features_N_F @ weights_F_C)
+        gradient_F_C = features_N_F.T @ (np.exp(log_p_N_C) - wanted_N_C) + precision * weights_F_C
+        return -np.sum(wanted_N_C * log_p_N_C) + 0.5 * precision * flat @ flat, gradient_F_C.ravel()
+
+    return minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B").x.reshape(shape)
+
+
+def _gauss_newton(features_N_F: np.ndarray, p_N_C: np.ndarray) -> np.ndarray:
+    """Return the curvature (C·F, C·F) of the cross-entropy in the weights, classes first."""
+    rows = []
+    for c, p_N in enumerate(p_N_C.T):
+        curvature_N_C = p_N[:, None] * (np.eye(p_N_C.shape[1])[c] - p_N_C)
+        rows.append([(features_N_F * curvature_N[:, None]).T @ features_N_F for curvature_N in curvature_N_C.T])
+    return np.block(rows)
+
+
+def _log_softmax(logits_N_C: np.ndarray) -> np.ndarray:
+    from scipy.special import log_softmax
+
+    return log_softmax(logits_N_C, axis=1)
+
+
+EXPLAINERS = {
+    "learner_ensemble": Entry("Deep ensemble of heads", Ensemble, reads="embeddings"),
+    "learner_dropout": Entry("MC dropout of the head", Dropout, reads="embeddings"),
+    "learner_laplace_head": Entry("Last-layer Laplace of the head", LastLayerLaplace, reads="embeddings"),
+}

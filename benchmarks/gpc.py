@@ -1,0 +1,121 @@
+"""One fit of the GPC and the explanation of one sample: how long each takes on one thread.
+
+    python benchmarks/gpc.py [--samples 800] [--width 512] [--inducing 64] [--iterations 100] [--draws 1000]
+                             [--kernel rbf] [--repeats 3]
+
+The embeddings are drawn: three overlapping blobs. The fit is compared with the form that gpytorch's tutorials teach
+(tests/gpytorch_form.py), in turn (A B A B …), from the same inducing inputs, kernels and random numbers; the ratio is
+the median over the pairs. Ours counts standardisation, k-means and the median distance too. An explanation is
+everything from the embedding on: kernel, posterior, draws, scores, variances, BALD. The last line is a JSON object:
+fit_s, fit_speedup, one_sample_ms, ms_200_samples, and max_abs_error, the largest difference of a latent's mean.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+LEARNING_RATE = 0.01  # the paper's
+
+
+def main(arguments: list[str] | None = None) -> None:
+    options = parse(arguments)
+    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[variable] = "1"
+    import numpy as np
+    import torch
+
+    from gpca.gpc import GPC, GPCSettings
+    from gpca.perturbation import CONCEPTS
+
+    torch.set_num_threads(1)
+    h_N_d, labels_N = blobs(options.samples, options.width)
+    h_test_d, _ = blobs(200, options.width)
+    settings = GPCSettings(options.kernel, LEARNING_RATE, options.iterations, options.inducing, options.draws)
+    ours_s, plain_s = [], []
+    for _ in range(options.repeats):
+        gpc = GPC(CONCEPTS, settings, "benchmark", 0)
+        ours_s.append(seconds(lambda gpc=gpc: gpc.fit(h_N_d, labels_N)))
+        plain = plain_form(gpc, h_N_d, labels_N)
+        plain_s.append(seconds(plain))
+    with torch.no_grad():
+        expected_S_C = plain.model(gpc._scaled(h_test_d)).mean.numpy()
+    error = float(np.abs(gpc.posterior(h_test_d)[0] - expected_S_C).max())
+    one_s = [seconds(lambda row=row: gpc.attribute(h_test_d[row : row + 1])) for row in range(20 * options.repeats)]
+    all_s = [seconds(lambda: gpc.attribute(h_test_d)) for _ in range(5 * options.repeats)]
+    speedup = median(plain / ours for plain, ours in zip(plain_s, ours_s, strict=True))
+    print(f"fit of {options.samples} embeddings of width {options.width}, {options.kernel} kernel, {options.inducing}")
+    print(f"inducing inputs, {options.iterations} iterations: {median(ours_s):.2f} s;")
+    print(f"gpytorch's form {median(plain_s):.2f} s;")
+    print(f"largest difference of a latent's mean {error:.1e}")
+    print(f"{options.draws} draws and scores: {1e3 * median(one_s):.2f} ms for one sample,")
+    print(f"{1e3 * median(all_s):.1f} ms for 200")
+    result = {
+        "fit_s": median(ours_s), "fit_speedup": speedup, "one_sample_ms": 1e3 * median(one_s),
+        "ms_200_samples": 1e3 * median(all_s), "max_abs_error": error,
+    }  # fmt: skip
+    print(json.dumps({key: float(f"{value:.4g}") for key, value in result.items()}))
+
+
+def parse(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    defaults = {"samples": 800, "width": 512, "inducing": 64, "iterations": 100, "draws": 1000, "repeats": 3}
+    for name, default in defaults.items():
+        parser.add_argument(f"--{name}", type=int, default=default, help=f"default {default}")
+    parser.add_argument("--kernel", choices=("rbf", "matern32", "polynomial"), default="rbf", help="default rbf")
+    options = parser.parse_args(arguments)
+    if options.samples < 6 or options.draws < 2 or min(getattr(options, name) for name in defaults) < 1:
+        parser.error("samples must be at least 6, draws 2 and the others 1")
+    return options
+
+
+def blobs(n: int, width: int):
+    """Return n points of three overlapping blobs, the same blobs at every call, and their labels."""
+    import numpy as np
+
+    from gpca.perturbation import CONCEPTS
+
+    blob = np.arange(n) % 3
+    centres = 0.15 * np.random.default_rng(0).normal(size=(3, width))
+    return centres[blob] + np.random.default_rng(n).normal(size=(n, width)), np.array(CONCEPTS)[blob]
+
+
+def plain_form(gpc, h_N_d, labels_N):
+    """Return a call that fits gpytorch's form from where the GPC's fit started; its result is then its `model`."""
+    import torch
+
+    from gpca.gpc import _inducing_inputs, _median_distance
+    from gpca.kernels import make_kernel
+    from gpca.seeds import seed_of
+    from tests.gpytorch_form import fit
+
+    inputs_N_d, targets_N, settings = gpc._scaled(h_N_d), torch.from_numpy(gpc._targets(labels_N)), gpc.settings
+    inducing_M_d = _inducing_inputs(inputs_N_d, settings, gpc._axes)
+    kernel = make_kernel(settings.kernel, len(gpc.classes), _median_distance(inputs_N_d, gpc._axes))
+
+    def call():
+        with torch.random.fork_rng():
+            torch.manual_seed(seed_of(*gpc._axes, "gpc"))
+            call.model, _ = fit(
+                kernel, inducing_M_d, inputs_N_d, targets_N, settings.iterations, settings.learning_rate
+            )
+
+    return call
+
+
+def seconds(function) -> float:
+    """Return the wall time of one call."""
+    started = perf_counter()
+    function()
+    return perf_counter() - started
+
+
+if __name__ == "__main__":
+    main()

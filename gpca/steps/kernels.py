@@ -1,0 +1,38 @@
+"""Step ``kernels``: embeddings -> accuracy and calibration of every kernel, learning rate and number of iterations."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import fields, replace
+from pathlib import Path
+
+import torch
+
+from gpca.dataset import Registrations, load_embeddings
+from gpca.kernel_grid import KernelGrid, evaluate_grid, write_grid
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.steps import per_seed
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names, one of each per seed; ``--settings`` is the config's section ``kernels``."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+")
+    parser.add_argument("--embeddings", required=True, type=Path, nargs="+")
+    parser.add_argument("--out", required=True, type=Path, nargs="+")
+
+
+def run(options: Namespace) -> None:
+    """Evaluate the grid, seed by seed."""
+    torch.set_num_threads(options.threads)
+    check_settings(options.settings, "kernels")
+    known = {field.name for field in fields(KernelGrid)}
+    grid = KernelGrid(**{name: value for name, value in options.settings.items() if name in known})
+    for seed, registrations, embeddings, out in per_seed(options, "registrations", "embeddings", "out"):
+        with recorded([out], [registrations, embeddings], options.settings, seed=seed):
+            loaded = Registrations.load(registrations)
+            h_S_d = load_embeddings(embeddings, loaded, {"h": ("S", "d")}, "python -m gpca embed")["h"]
+            loaded = replace(loaded, attached={"embedding": h_S_d})
+            write_grid(out, evaluate_grid(loaded, grid, options.source, seed))

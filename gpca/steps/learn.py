@@ -1,0 +1,51 @@
+"""Step ``learn``: embeddings of all sets -> what every learner says of their test samples."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.explainer import explainer_entry, require_settings
+from gpca.learned import predict_sets
+from gpca.predictions import write_csv
+from gpca.progress import progress
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.shifted_sets import ShiftedSets
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` holds the settings of every learner by its name."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--learners", required=True, nargs="+")
+    parser.add_argument("--sets", required=True, type=Path, nargs="+", help="one per seed, of python -m gpca shift")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one learner after the other")
+
+
+def run(options: Namespace) -> None:
+    """Fit every learner and let it explain, seed by seed."""
+    if len(options.sets) != len(options.seeds):
+        raise InputError("--sets", f"{len(options.sets)} file(s) for {len(options.seeds)} seed(s)", "give one for each")
+    if len(options.out) != (wanted := len(options.learners) * len(options.seeds)):
+        raise InputError("--out", f"{len(options.out)} file(s), not {wanted}", "give one per learner and seed")
+    for learner in options.learners:
+        settings = options.settings.get(learner) or {}
+        require_settings(learner, settings)
+        check_settings(settings, "explainers", learner)
+        if explainer_entry(learner).reads != "embeddings":
+            raise InputError(f"learner '{learner}'", "does not read embeddings", "choose another")
+    import torch
+
+    torch.set_num_threads(options.threads)
+    for i, (seed, path) in enumerate(zip(options.seeds, options.sets, strict=True)):
+        sets = ShiftedSets.load(path)
+        outputs = options.out[i :: len(options.seeds)]
+        title = f"learners on {options.source}, seed {seed}"
+        for learner, out in progress(list(zip(options.learners, outputs, strict=True)), title):
+            settings = options.settings.get(learner) or {}
+            with recorded([out], [path], settings, seed=seed):
+                make = partial(explainer_entry(learner).make, options.source, seed, **settings)
+                write_csv(out, predict_sets(make, sets))

@@ -1,0 +1,56 @@
+"""Step ``shift``: registrations and encoder -> samples unlike the training samples, embedded, and their distances."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from gpca.dataset import Registrations, load_embeddings
+from gpca.encoders.training import EncoderSettings, load_model
+from gpca.errors import InputError
+from gpca.objects.canonical import ObjectClouds
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.shift import make_sets, settings_from
+from gpca.steps import per_seed
+
+SECTIONS = {"shift": ("shift",), "registrations": ("registrations",), "encoder": ("encoders", "*")}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names, one of each per seed; ``--settings`` holds ``shift``, ``registrations``, ``encoder``."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+")
+    parser.add_argument("--other-registrations", type=Path, nargs="*", help="of another source; none, no such set")
+    parser.add_argument("--embeddings", required=True, type=Path, nargs="+")
+    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights")
+    parser.add_argument("--out", required=True, type=Path, nargs="+")
+
+
+def run(options: Namespace) -> None:
+    """Make the sets, seed by seed."""
+    torch.set_num_threads(options.threads)
+    given = {name: options.settings.get(name, {}) for name in SECTIONS}
+    if unknown := set(options.settings) - set(SECTIONS):
+        raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"known are {', '.join(SECTIONS)}")
+    for name, section in SECTIONS.items():
+        check_settings(given[name], *section)
+    settings, encoder_settings = settings_from(**given), EncoderSettings(**given["encoder"])
+    options.other_registrations = options.other_registrations or [None] * len(options.seeds)
+    objects = ObjectClouds.load(options.objects)
+    files = ("registrations", "other_registrations", "embeddings", "encoders", "out")
+    for seed, own, other, embeddings, weights, out in per_seed(options, *files):
+        inputs = [path for path in (options.objects, own, other, embeddings, weights) if path]
+        with recorded([out], inputs, options.settings, seed=seed):
+            registrations = Registrations.load(own)
+            h_S_d = load_embeddings(embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
+            registrations = replace(registrations, attached={"embedding": h_S_d})
+            others = Registrations.load(other) if other else None
+            model = load_model(weights, encoder_settings)
+            sets = make_sets(objects, registrations, others, model, encoder_settings, options.source, seed, settings)
+            sets.save(out)

@@ -1,0 +1,10 @@
+"""Grids of kernels and schedules -> the table {table} as CSV, Markdown, LaTeX."""
+
+from gpca.kernel_grid import read_grids
+from gpca.reporting.kernel_tables import KERNEL_TABLES
+from gpca.reporting.script import job
+
+with job(snakemake):
+    grid = read_grids(snakemake.input.grids)
+    table = KERNEL_TABLES[snakemake.wildcards.table](grid, snakemake.params.sources, snakemake.params.test)
+    table.write(snakemake.output.csv, snakemake.output.md, snakemake.output.tex)
