@@ -1,0 +1,49 @@
+"""Step ``explain``: one registration of a user's own -> why it is uncertain and what to do, on stdout."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+import torch
+
+from gpca.errors import InputError
+from gpca.model import Model, model_path
+from gpca.objects.mesh_folder import METRES_PER_UNIT
+from gpca.point_file import read_points, read_pose
+from gpca.registration_explainer import Explainer
+from gpca.uncertainty import UncertaintySettings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and options."""
+    parser.add_argument("source", type=Path, help="what was observed: points or a mesh (PLY, PCD, OBJ, STL, OFF)")
+    parser.add_argument("target", type=Path, help="the reference that it is aligned to")
+    parser.add_argument("--init", type=Path, help="text file of T_target_source where ICP starts, 4×4 numbers")
+    parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="of files and pose (default m)")
+    parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, or one in results/")
+    parser.add_argument("--uncertainty", action="store_true", help="measure how the pose scatters by Monte-Carlo ICP")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(options: Namespace) -> None:
+    """Read, explain and print; all that is no result goes to stderr."""
+    torch.set_num_threads(options.threads)
+    if options.settings:
+        raise InputError("--settings", "explain has none", "they are in the model; make another one")
+    path = model_path(options.model)
+    model = Model.load(path)
+    T_init = read_pose(options.init) if options.init else None
+    source, _ = read_points(options.source, options.unit)
+    target, frame = read_points(options.target, options.unit)
+    uncertainty = UncertaintySettings() if options.uncertainty else None
+    explanation = Explainer(model).explain(source, target, T_init, options.unit, frame, uncertainty)
+    trained_on = model.title + " (procedural stand-in)" * model.stand_in
+    for note in (*explanation.notes, f"model {path}, trained on {trained_on}"):
+        print(note, file=sys.stderr)
+    if options.json:
+        print(json.dumps(explanation.as_dict() | {"model": str(path), "trained_on": trained_on}))
+    else:
+        print(explanation.text(), end="")
