@@ -28,6 +28,9 @@ STEPS = {
     "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
     "learn": "embeddings -> predictions of every learner, on test samples and on shifted ones",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
+    "model": "encoder and embeddings -> one file with all that an explanation needs",
+    "explain": "two files of points -> why their registration is uncertain, and what to do",
+    "runtime": "model, registrations and embeddings -> seconds of every stage",
 }
 
 

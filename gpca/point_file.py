@@ -36,7 +36,7 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
     else:
         surface = mesh_folder.read_surface(path, scale)
         if surface.faces is not None:
-            points_m, _, diameter_m = canonical_cloud(surface, "explain", SAMPLED_POINTS)
+            points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS)
             frame = CanonicalFrame(bounding_centre(surface) / scale, diameter_m / scale)
             return points_m.astype(np.float64) / scale + frame.centre_3, frame
         points = surface.vertices_m / scale

@@ -68,6 +68,8 @@ STEPS = {
     "without": ({"gpca/encoders/training.py"}, {"gpca/gpc.py", "gpca/acquisition.py"}),
     "active_learning": ({"gpca/latents.py", "gpca/stream.py"}, {"gpca/explainer.py", "gpca/encoders/training.py"}),
     "uncertainty": ({"gpca/icp_kernels.py", "gpca/designs.py"}, {"gpca/gpc.py", "gpca/explainer.py"}),
+    "model": ({"gpca/gpc.py", "gpca/encoders/training.py"}, {"gpca/explainer.py", "gpca/acquisition.py"}),
+    "runtime": ({"gpca/registration_explainer.py", "gpca/acquisition.py"}, {"gpca/explainer.py"}),
     "attribute": (
         {"gpca/explainer.py", "gpca/attribution.py"},
         {"gpca/gpc.py", "gpca/designs.py", "gpca/encoders/training.py"},
