@@ -1,1 +1,17 @@
 """GP-CA Bench: Gaussian-process concept attribution for point cloud registration, and its rivals."""
+
+_EXPORTS = {
+    "CanonicalFrame": "gpca.canonical_frame",
+    "Explainer": "gpca.registration_explainer",
+    "Explanation": "gpca.explanation",
+}
+__all__ = list(_EXPORTS)
+
+
+def __getattr__(name: str):
+    """Load what is used by itself only when it is asked for: it brings torch, and every step imports this package."""
+    if name not in _EXPORTS:
+        raise AttributeError(f"module 'gpca' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(_EXPORTS[name]), name)

@@ -21,13 +21,16 @@ STEPS = {
     "embed": "registrations and encoder -> embeddings",
     "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
-    "explain": "registrations, embeddings or uncertainty -> predictions of one explainer",
+    "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "kernels": "embeddings -> every kernel, learning rate and number of iterations",
     "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
     "learn": "embeddings -> predictions of every learner, on test samples and on shifted ones",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
+    "model": "encoder and embeddings -> one file with all that an explanation needs",
+    "explain": "two files of points -> why their registration is uncertain, and what to do",
+    "runtime": "model, registrations and embeddings -> seconds of every stage",
 }
 
 

@@ -140,7 +140,7 @@ def learn(
     queried: list[int] = []
     steps = [_step(task, gpc, queried, epochs=0)]
     while len(queried) < settings.labels and len(left):
-        pool = _pool_of(task, gpc, left, queried, require_strategy(strategy).needs_scores)
+        pool = pool_of(task, gpc, left, queried, require_strategy(strategy).needs_scores)
         chosen = left[select(strategy, pool, min(settings.batch, settings.labels - len(queried)), random)]
         epochs = gpc.update(task.pool.h[chosen], task.pool.concept_N[chosen], settings.iterations, settings.tolerance)
         queried += chosen.tolist()
@@ -149,7 +149,8 @@ def learn(
     return steps
 
 
-def _pool_of(task: Task, gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool) -> Pool:
+def pool_of(task: Task, gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
+    """Return what a strategy chooses from: the rows `left` of the pool, and what the GPC makes of them."""
     h = task.pool.h[left]
     scores_N_C, _, bald_N = gpc.attribute(h) if needs_scores else (np.empty((len(left), 0)), None, np.empty(len(left)))
     labelled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])

@@ -65,6 +65,9 @@ def check(config: dict) -> dict[str, dict]:
     for name in config["kernels"]["sources"]:
         if name not in sources:
             raise InputError("config key kernels.sources", f"no source '{name}'", f"known are {', '.join(sources)}")
+    for key, known in {"source": (*sources, REAL_WORLD), "encoder": tuple(config["encoders"])}.items():
+        if (name := config["model"][key]) not in known:
+            raise InputError(f"config key model.{key}", f"no {key} '{name}'", f"known are {', '.join(known)}")
     return sources
 
 

@@ -8,7 +8,7 @@ inputs and posterior (:mod:`gpca.sparse_gp`); further labels then move the poste
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import torch
@@ -19,7 +19,7 @@ from gpca.attribution import summarise_marginals
 from gpca.errors import InputError
 from gpca.gp_prior import Prior
 from gpca.kernels import KERNELS, make_kernel
-from gpca.latents import Projection, Sites, elbo, refine
+from gpca.latents import Latents, Projection, Sites, elbo, refine
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.sparse_gp import SparseGPs
@@ -165,6 +165,36 @@ class GPC:
         """
         normal_M_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
         return summarise_marginals(*self.posterior(h_N_d), normal_M_C)
+
+    def state(self) -> dict[str, object]:
+        """Return all that was learnt as tensors, numbers and names, for :meth:`from_state`."""
+        return {
+            "classes": list(self.classes),
+            "settings": asdict(self.settings),
+            "axes": list(self._axes),
+            "scaler_mean": torch.from_numpy(self._scaler.mean_),
+            "scaler_scale": torch.from_numpy(self._scaler.scale_),
+            "kernel": self._prior.kernel.state_dict(),
+            "inducing": self._prior.inducing_M_d,
+            "mean": torch.from_numpy(self._latents.mean_C_M),
+            "covariance": torch.from_numpy(self._latents.covariance_C_M_M),
+            "labelled": torch.from_numpy(self._labelled.inputs_N_d),
+            "targets": torch.from_numpy(self._targets_N),
+        }
+
+    @classmethod
+    def from_state(cls, state: dict) -> GPC:
+        """Return the classifier of a :meth:`state`: it attributes alike, and learns further labels."""
+        gpc = cls(tuple(state["classes"]), GPCSettings(**state["settings"]), *state["axes"])
+        gpc._scaler = StandardScaler()
+        gpc._scaler.mean_, gpc._scaler.scale_ = state["scaler_mean"].numpy(), state["scaler_scale"].numpy()
+        kernel = make_kernel(gpc.settings.kernel, len(gpc.classes), lengthscale=1.0).requires_grad_(False)
+        kernel.load_state_dict(state["kernel"])
+        gpc._prior = Prior(kernel, state["inducing"])
+        gpc._latents = Latents(state["mean"].numpy(), state["covariance"].numpy())
+        gpc._labelled, gpc._targets_N = gpc._prior.project(state["labelled"]), state["targets"].numpy()
+        gpc._sites = None
+        return gpc
 
     def _targets(self, labels_N: np.ndarray) -> np.ndarray:
         return np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)

@@ -73,15 +73,18 @@ def _code_version() -> dict[str, object]:
     return {"commit": commit.stdout.strip(), "dirty": bool(changes.stdout.strip())}
 
 
-def _device() -> str:
-    """The processor, and the GPU where torch was loaded and uses one."""
+def cpu_name() -> str:
+    """Return the processor and its number of cores."""
     lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines() if Path("/proc/cpuinfo").exists() else []
     models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    device = f"{models[0] if models else platform.processor()}, {os.cpu_count()} cores"
+    return f"{models[0] if models else platform.processor()}, {os.cpu_count()} cores"
+
+
+def _device() -> str:
+    """The processor, and the GPU where torch was loaded and uses one."""
     torch = sys.modules.get("torch")
-    if torch is not None and torch.cuda.is_available():
-        device += f", {torch.cuda.get_device_name()}"
-    return device
+    gpu = torch is not None and torch.cuda.is_available()
+    return cpu_name() + (f", {torch.cuda.get_device_name()}" if gpu else "")
 
 
 def _library_versions() -> dict[str, str]:

@@ -38,3 +38,24 @@ def registrations(objects):
     from gpca.synthesis import RegistrationSettings, make_registrations
 
     return make_registrations(objects, "tiny", 0, RegistrationSettings(train=36, test=18, points=256))[0]
+
+
+@pytest.fixture(scope="session")
+def model(registrations):
+    """A model of an encoder that was not trained: its embeddings tell concepts apart well enough to be scored."""
+    import torch
+
+    from gpca.encoders.training import EncoderSettings, embed, make_model
+    from gpca.gpc import GPC, GPCSettings
+    from gpca.model import Model
+    from gpca.perturbation import CONCEPTS
+    from gpca.registration import ICPSettings
+
+    settings = EncoderSettings(points=64, draws=2, options={"k": 8, "point_features": 16})
+    torch.manual_seed(0)
+    network = make_model(settings).eval()
+    train = registrations.subset(registrations.rows("train"))
+    h_S_d, _ = embed(network, train, "tiny", 0, settings)
+    gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, iterations=40, inducing=12, draws=200), "tiny", 0)
+    gpc.fit(h_S_d, train.concept)
+    return Model(network.encoder, settings, gpc, ICPSettings(), 256, "Tiny", stand_in=True)

@@ -55,7 +55,7 @@ STEP_OPTIONS = {
         "--registrations": "registrations.npz", "--out": "uncertainty.npz", "--tables": "uncertainty.csv",
         "--timings": "uncertainty_timings.csv",
     },
-    "explain": COMMON | {
+    "attribute": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
         "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--input-timings": "dgcnn.csv",
         "--predictions": "predictions.csv", "--timings": "gpca.csv",
@@ -88,6 +88,17 @@ STEP_OPTIONS = {
         "--embeddings": "embeddings.npz", "--labels": "labels.csv", "--answers": "answers.txt",
         "--predictions": "labelled.csv",
     },
+    "model": COMMON | {
+        "--settings": {"encoder": ENCODER, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
+                       "registrations": {"points": 128}},
+        "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
+        "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--out": "model.pt",
+    },
+    "runtime": COMMON | {
+        "--settings": {"runtime": {"repeats": 2}, "active_learning": LEARNING}, "--seed": 0, "--model": "model.pt",
+        "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "runtime.csv",
+    },
+    "explain": {"meshes/brick.stl": [], "meshes/cone.ply": [], "--unit": "mm", "--model": "model.pt", "--json": []},
 }  # fmt: skip
 FRAME_STEPS = {"scenes", "instances", "frame_registrations"}  # of depth frames: tests/frames/test_steps.py
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
@@ -160,7 +171,7 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
         "embed",
         "reduce",
         "uncertainty",
-        "explain",
+        "attribute",
         "without",
         "active_learning",
         "kernels",
@@ -309,7 +320,7 @@ FAULTS = {
         (untouched, settings("uncertainty", icp={"method": "gicp"}), r"setting method: 'gicp' is not one of"),
         (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
     ],
-    "explain": [
+    "attribute": [
         (untouched, SHAP | {"--uncertainty": None}, r"'shap_removal': reads the uncertainty of design 'removal'"),
         (removed("uncertainty.npz"), SHAP, r"uncertainty.npz: no such file; make it with 'python -m gpca"),
         (arrays_changed("uncertainty.npz", sample=lambda s: s + 50), SHAP, r"holds other samples or conditions"),
@@ -326,8 +337,8 @@ FAULTS = {
         (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
         (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'head_logits' is 24×3, not 23"),
         (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: column 'split' is missing"),
-        (untouched, settings("explain", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
-        (untouched, settings("explain", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
+        (untouched, settings("attribute", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
+        (untouched, settings("attribute", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
         (untouched, {"--predictions": "meshes"}, r"meshes"),
     ],
     "without": [
@@ -381,6 +392,28 @@ FAULTS = {
         (written("labels.csv", "sample,split,concept\n9,train,\n9,train,pose\n"), {}, r"line 3: 'pose' contradicts ''"),
         (written("labels.csv", "sample,split,concept\n9,train,Not pose\n"), {}, r"'Not pose' is no name of a concept"),
     ],
+    "model": [
+        (removed("weights.pt"), {}, r"weights.pt: no such weights; make them anew with 'python -m gpca train'"),
+        (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+        (untouched, {"--settings": {"encoder": {"layers": 3}}}, r"setting layers: unknown; known are backbone"),
+        (untouched, {"--settings": {"gpc": {"kernel": "cubic"}}}, r"setting kernel: 'cubic' is not one of"),
+        (untouched, {"--settings": {"registrations": {"icp": {"method": "x"}}}}, r"setting icp.method: 'x' is not"),
+    ],
+    "runtime": [
+        (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),
+        (untouched, {"--settings": {"runtime": {"repeats": 1}}}, r"setting repeats: 1 is less than the minimum"),
+        (untouched, {"--settings": {}}, r"leaves no pool of 18 training samples"),
+    ],
+    "explain": [
+        (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),
+        (truncated("model.pt"), {}, r"model.pt: is damaged or no model"),
+        (truncated("meshes/cone.ply"), {}, r"cone.ply: is truncated or not a readable .ply file"),
+        (removed("meshes/brick.stl"), {}, r"brick.stl: no such file; give one of .ply"),
+        (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit looks wrong"),
+        (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: holds 3 numbers; give 4×4"),
+        (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
+        (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),
+    ],
 }  # fmt: skip
 SAYS_MORE = {"label"}  # steps that speak to a person on stdout
 
@@ -400,12 +433,34 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, step, fault):
     assert content(folder) == before
 
 
+def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys):
+    np.savetxt(folder / "pose.txt", np.eye(4))
+    assert main(arguments("explain", {"--init": "pose.txt", "--uncertainty": []})) == 0
+    out, err = capsys.readouterr()
+    explanation = json.loads(out)
+    assert set(explanation["scores"]) == set(explanation["variances"]) == {"noise", "pose", "overlap"}
+    assert explanation["unit"] == "mm"
+    assert explanation["spread"]["starts"] == 50
+    assert explanation["trained_on"] == "Tiny (procedural stand-in)"
+    assert "source: 128 of 16384 points, drawn at random\n" in err
+    assert "model model.pt, trained on Tiny (procedural stand-in)\n" in err
+    assert main(arguments("explain", {"--json": None})) == 0
+    text = capsys.readouterr().out
+    for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
+        assert word in text
+
+
+def test_a_model_made_anew_is_the_same_to_the_byte(folder, made):
+    assert main(arguments("model")) == 0
+    assert (folder / "model.pt").read_bytes() == (made / "model.pt").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("step", "changes", "message"),
     [
         ("objects", {"--data-dir": "nowhere"}, "gpca objects: nowhere: no such folder; correct data_dir in the config"),
         ("registrations", {"--objects": "lost.npz"}, "gpca registrations: lost.npz: no such file; make it with"),
-        ("explain", {"--explainer": "shapley"}, "gpca explain: explainer 'shapley': unknown; known are"),
+        ("attribute", {"--explainer": "shapley"}, "gpca attribute: explainer 'shapley': unknown; known are"),
     ],
 )
 def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, changes, message):

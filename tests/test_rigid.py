@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.rigid import inverse, random_direction, rotation_angle_rad, scale_translation, transform
+from gpca.errors import InputError
+from gpca.rigid import inverse, random_direction, require_rigid, rotation_angle_rad, scale_translation, transform
 
 
 def pose(seed=0):
@@ -44,3 +45,18 @@ def test_directions_are_unit_and_favour_no_side():
     # Uniform on the sphere: mean 0, covariance I/3 (their standard errors are about 0.01).
     assert np.abs(directions.mean(axis=0)).max() < 0.04
     assert np.abs(directions.T @ directions / len(directions) - np.eye(3) / 3).max() < 0.04
+
+
+@pytest.mark.parametrize(
+    ("T_b_a", "message"),
+    [
+        (np.eye(3), r"my pose: the pose is of shape \(3, 3\)"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "my pose: the pose is no rigid transform"),
+        (np.full((4, 4), np.nan), "my pose: the pose is no rigid transform"),
+        (pose().T, "its last row has to be 0 0 0 1"),
+    ],
+)
+def test_what_is_no_rigid_transform_is_refused(T_b_a, message):
+    require_rigid(pose(), "my pose")
+    with pytest.raises(InputError, match=message):
+        require_rigid(T_b_a, "my pose")

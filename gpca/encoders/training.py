@@ -75,7 +75,7 @@ def train_encoder(
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     device = best_device()
-    model = _make_model(settings).to(device)
+    model = make_model(settings).to(device)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     rows = registrations.rows("train")
     if len(rows) < 2:
@@ -154,7 +154,7 @@ def load_model(weights: Path, settings: EncoderSettings) -> nn.Sequential:
     Raises:
         InputError: missing, damaged, pickled or another encoder's weights.
     """
-    model = _make_model(settings)
+    model = make_model(settings)
     remedy = "make them anew with 'python -m gpca train'"
     if not Path(weights).is_file():
         raise InputError(weights, "no such weights", remedy)
@@ -165,7 +165,8 @@ def load_model(weights: Path, settings: EncoderSettings) -> nn.Sequential:
     return model.eval()
 
 
-def _make_model(settings: EncoderSettings) -> nn.Sequential:
+def make_model(settings: EncoderSettings) -> nn.Sequential:
+    """Return a new encoder with a head over the concepts, ``model.encoder`` and ``model.head``."""
     encoder = make_encoder(settings.backbone, settings.options)
     return nn.Sequential(OrderedDict(encoder=encoder, head=nn.Linear(encoder.embedding_size, len(CONCEPTS))))
 

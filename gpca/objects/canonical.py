@@ -83,7 +83,7 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
             raise InputError(subject, "the mesh has no area", "export it anew, with its faces")
         hull_m, draw = _used_vertices(surface), _sampled
     diameter_m = diameter(hull_m, subject)
-    _require_size(diameter_m, subject)
+    require_size(diameter_m, subject)
     points_m, normals = draw(surface, n_points, seeds.generator(source, surface.name, "surface"))
     return (points_m - bounding_centre(surface)).astype(np.float32), normals.astype(np.float32), diameter_m
 
@@ -100,7 +100,8 @@ def _used_vertices(surface: Surface) -> np.ndarray:
     return vertices_m if surface.faces is None else vertices_m[np.unique(surface.faces)]
 
 
-def _require_size(diameter_m: float, subject: str) -> None:
+def require_size(diameter_m: float, subject: object) -> None:
+    """Raise an InputError unless a diameter lies between 1 mm and 10 m, as one in the right unit does."""
     if SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
         return
     likely = "in millimetres? set unit: mm" if diameter_m > LARGEST_DIAMETER_M else "in metres? set unit: m"
@@ -125,11 +126,12 @@ def _sampled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple
 
 def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     order = rng.permutation(len(surface.vertices_m))
-    normals = _estimated_normals(surface.vertices_m) if surface.normals is None else surface.normals
+    normals = estimated_normals(surface.vertices_m) if surface.normals is None else surface.normals
     return surface.vertices_m[order], normals[order]
 
 
-def _estimated_normals(points_m: np.ndarray) -> np.ndarray:
+def estimated_normals(points_m: np.ndarray) -> np.ndarray:
+    """Return unit normals (P, 3) by the nearest neighbours of points (P, 3), turned towards a camera at the origin."""
     o3d = require_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBOURS))

@@ -63,8 +63,9 @@ class Project:
         """The paths and bytes of all results with one of the suffixes; seconds and memory differ from run to run."""
         files = sorted(path for path in self.folder.glob("results/smoke/**/*") if path.suffix in suffixes)
         relative = {path.relative_to(self.folder / "results/smoke"): path for path in files}
-        measured = ("timings", "timings.csv", "benchmarks", "logs")
-        return {str(name): path.read_bytes() for name, path in relative.items() if name.parts[0] not in measured}
+        measured, drawn_from = ("timings", "timings.csv", "benchmarks", "logs"), ("runtime", "table7_runtime")
+        kept = [name for name in relative if name.parts[0] not in measured and name.stem not in drawn_from]
+        return {str(name): relative[name].read_bytes() for name in kept}
 
     def _python(self, *arguments, check):
         done = subprocess.run(

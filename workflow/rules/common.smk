@@ -266,6 +266,7 @@ FIGURES = [
     "fig_attribution_confusions",
     "active_learning_curves",
     "kernel_learning_curves",
+    "runtime",
     *LEARNER_FIGURES,
     *(f"objects_{source}" for source in SOURCES),
 ]
@@ -279,5 +280,6 @@ RESULTS = [
         for tables in (TABLE_EXPLAINERS, LEARNING_TABLES, KERNEL_TABLES, LEARNER_TABLES)
         for table in tables
     ),
+    *("model.pt", "runtime.csv", "tables/table7_runtime.md"),
     *(f"figures/{figure}.png" for figure in FIGURES),
 ]

@@ -5,7 +5,7 @@ rule explain:
             "results/{{run}}/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
         code=lambda wildcards: code_files(
-            "gpca.steps.explain", explainer_module(wildcards.explainer)
+            "gpca.steps.attribute", explainer_module(wildcards.explainer)
         ),
     output:
         predictions=collect(
@@ -31,7 +31,7 @@ rule explain:
         seeds=SEEDS,
         attached=attached_options,
     shell:
-        "python -m gpca explain --threads {threads} --explainer {wildcards.explainer} "
+        "python -m gpca attribute --threads {threads} --explainer {wildcards.explainer} "
         "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
         "--registrations {input.registrations} {params.attached} --input-timings {input.timings} "
         "--predictions {output.predictions} --timings {output.timings} 2> {log}"

@@ -143,7 +143,7 @@ rule explain_with_backbone:
             "results/{{run}}/timings/{{source}}/{{backbone}}/seed{seed}.csv",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.explain", "gpca.concept_attribution"),
+        code=code_files("gpca.steps.attribute", "gpca.concept_attribution"),
     output:
         predictions=collect(
             "results/{{run}}/predictions/{{source}}/{{backbone}}-{{reduction}}/seed{seed}.csv",
@@ -169,7 +169,7 @@ rule explain_with_backbone:
         settings=json.dumps(config["explainers"].get("gpca") or {}, sort_keys=True),
         seeds=SEEDS,
     shell:
-        "python -m gpca explain --threads {threads} --explainer gpca "
+        "python -m gpca attribute --threads {threads} --explainer gpca "
         "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
         "--registrations {input.registrations} --embeddings {input.embeddings} --input-timings {input.timings} "
         "--predictions {output.predictions} --timings {output.timings} 2> {log}"

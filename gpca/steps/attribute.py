@@ -1,0 +1,85 @@
+"""Step ``attribute``: one explainer on all seeds of a source -> its predictions."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+
+from gpca.dataset import Registrations, load_embeddings
+from gpca.errors import InputError
+from gpca.explainer import Entry, explainer_entry, require_settings
+from gpca.outcomes import Outcomes, read_seconds
+from gpca.predictions import read_timings, write_predictions, write_timings
+from gpca.provenance import recorded
+from gpca.settings import check_settings
+from gpca.steps import per_seed
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names, one of each per seed; ``--settings`` are the explainer's in the config."""
+    parser.add_argument("--explainer", required=True)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+")
+    parser.add_argument("--embeddings", type=Path, nargs="*", help="for explainers that read them")
+    parser.add_argument("--uncertainty", type=Path, nargs="*", help="for explainers that read a design's outcomes")
+    parser.add_argument("--uncertainty-timings", type=Path, nargs="*", help="their seconds")
+    parser.add_argument("--input-timings", required=True, type=Path, nargs="+", help="seconds spent before")
+    parser.add_argument("--predictions", required=True, type=Path, nargs="+")
+    parser.add_argument("--timings", required=True, type=Path, nargs="+")
+
+
+def run(options: Namespace) -> None:
+    """Fit on the training rows and explain every row, seed by seed."""
+    require_settings(options.explainer, options.settings)
+    check_settings(options.settings, "explainers", options.explainer)
+    entry = explainer_entry(options.explainer)
+    for name in ("embeddings", "uncertainty", "uncertainty_timings"):
+        setattr(options, name, getattr(options, name) or [None] * len(options.seeds))
+    files = ("registrations", "embeddings", "uncertainty", "uncertainty_timings", "input_timings")
+    for seed, *inputs, predictions, timings in per_seed(options, *files, "predictions", "timings"):
+        explainer = entry.make(options.source, seed, **options.settings)
+        with recorded([predictions, timings], [path for path in inputs if path], options.settings, seed=seed):
+            registrations = _load(options.explainer, entry, *inputs)
+            train = registrations.rows("train")
+            if len(train):  # a design may cover the test samples alone; what reads it learns nothing
+                explainer.fit(registrations.subset(train))
+            observed = registrations if entry.oracle else registrations.without_labels()
+            attribution = explainer.explain(observed)
+            write_predictions(predictions, registrations, attribution)
+            write_timings(
+                timings,
+                registrations,
+                registrations.attached["earlier_seconds"] + attribution.seconds_N,
+                registrations.attached["earlier_icp_seconds"] + attribution.icp_seconds_N,
+            )
+
+
+def _load(name: str, entry: Entry, registrations: Path, embeddings, uncertainty, uncertainty_timings, timings: Path):
+    """Return the registrations that the explainer gets, with what it reads and the seconds spent before attached."""
+    loaded = Registrations.load(registrations)
+    seconds_S, icp_seconds_S = read_timings(timings, loaded)
+    earlier = {"earlier_seconds": seconds_S, "earlier_icp_seconds": icp_seconds_S}
+    loaded = replace(loaded, attached=earlier)
+    if entry.design:
+        if uncertainty is None or uncertainty_timings is None:
+            raise InputError(
+                f"explainer '{name}'",
+                f"reads the uncertainty of design '{entry.design}'",
+                "give it with --uncertainty and --uncertainty-timings",
+            )
+        outcomes = Outcomes.load(uncertainty)
+        return outcomes.attach_to(loaded, *read_seconds(uncertainty_timings, outcomes))
+    if entry.reads == "embeddings":
+        return _with_embedding(loaded, embeddings, name)
+    return loaded
+
+
+def _with_embedding(registrations: Registrations, path: Path | None, explainer: str) -> Registrations:
+    if path is None:
+        raise InputError(f"explainer '{explainer}'", "reads embeddings", "give them with --embeddings")
+    shapes = {"h": ("S", "d"), "head_logits": ("S", "C")}
+    arrays = load_embeddings(path, registrations, shapes, "python -m gpca embed")
+    own = {"embedding": arrays["h"], "head_logits": arrays["head_logits"]}
+    return replace(registrations, attached={**registrations.attached, **own})

@@ -1,0 +1,46 @@
+"""Step ``runtime``: model, registrations and embeddings -> ``runtime.csv``, the seconds of every stage."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from gpca.active_learning import make_task
+from gpca.dataset import Registrations, load_embeddings
+from gpca.model import Model
+from gpca.predictions import write_csv
+from gpca.provenance import recorded
+from gpca.runtime import measure
+from gpca.settings import check_settings
+from gpca.steps.active_learning import settings_from
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` holds ``runtime`` and ``active_learning`` of the config."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--model", required=True, type=Path)
+    parser.add_argument("--registrations", required=True, type=Path, help="that the model was made of")
+    parser.add_argument("--embeddings", required=True, type=Path, help="of its encoder")
+    parser.add_argument("--out", required=True, type=Path)
+
+
+def run(options: Namespace) -> None:
+    """Measure every component, repeat by repeat."""
+    torch.set_num_threads(options.threads)
+    runtime, learning = (options.settings.get(name) or {} for name in ("runtime", "active_learning"))
+    check_settings(runtime, "runtime")
+    check_settings(learning, "active_learning")
+    axes = (options.source, options.seed)
+    inputs = [options.model, options.registrations, options.embeddings]
+    with recorded([options.out], inputs, options.settings, seed=options.seed):
+        model = Model.load(options.model)
+        registrations = Registrations.load(options.registrations)
+        h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
+        settings = settings_from(learning)
+        task = make_task(replace(registrations, attached={"embedding": h_S_d}), "overlap", settings, *axes)
+        repeats = runtime.get("repeats", 100)
+        write_csv(options.out, measure(model, registrations, task, settings, repeats, options.threads, *axes))

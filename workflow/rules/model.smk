@@ -1,0 +1,133 @@
+MODEL_SOURCE, MODEL_ENCODER = config["model"]["source"], config["model"]["encoder"]
+MODEL_FRAMES = {
+    "title": config["real_world"]["title"],
+    "stand_in": not config["real_world"]["datasets"],
+}
+MODEL_SHOWN = {**SHOWN_SOURCES, REAL_WORLD: MODEL_FRAMES}[MODEL_SOURCE]
+MODEL_INPUTS = {
+    "registrations": f"results/{{run}}/registrations/{MODEL_SOURCE}/seed{SEEDS[0]}.npz",
+    "embeddings": f"results/{{run}}/embeddings/{MODEL_SOURCE}/{MODEL_ENCODER}/none/seed{SEEDS[0]}.npz",
+}
+
+
+rule model:
+    input:
+        **MODEL_INPUTS,
+        encoder=f"results/{{run}}/encoders/{MODEL_SOURCE}/{MODEL_ENCODER}/seed{SEEDS[0]}.pt",
+        code=code_files("gpca.steps.model", encoder_module(MODEL_ENCODER)),
+    output:
+        "results/{run}/model.pt",
+    log:
+        "results/{run}/logs/model.log",
+    benchmark:
+        "results/{run}/benchmarks/model.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        source=MODEL_SOURCE,
+        seed=SEEDS[0],
+        title=MODEL_SHOWN["title"],
+        stand_in="--stand-in" if MODEL_SHOWN["stand_in"] else "",
+        settings=json.dumps(
+            {
+                "encoder": config["encoders"][MODEL_ENCODER],
+                "gpc": config["explainers"].get("gpca") or {},
+                "registrations": {
+                    name: config["registrations"][name] for name in ("points", "icp")
+                },
+            },
+            sort_keys=True,
+        ),
+    shell:
+        "python -m gpca model --threads {threads} --source {params.source} --seed {params.seed} "
+        "--title {params.title:q} {params.stand_in} --registrations {input.registrations} --encoder {input.encoder} "
+        "--embeddings {input.embeddings} --settings {params.settings:q} --out {output} 2> {log}"
+
+
+rule runtime:
+    input:
+        **MODEL_INPUTS,
+        model="results/{run}/model.pt",
+        code=code_files("gpca.steps.runtime", encoder_module(MODEL_ENCODER)),
+    output:
+        "results/{run}/runtime.csv",
+    log:
+        "results/{run}/logs/runtime.log",
+    benchmark:
+        "results/{run}/benchmarks/runtime.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        source=MODEL_SOURCE,
+        seed=SEEDS[0],
+        settings=json.dumps(
+            {name: config[name] for name in ("runtime", "active_learning")},
+            sort_keys=True,
+        ),
+    shell:
+        "python -m gpca runtime --threads {threads} --source {params.source} --seed {params.seed} "
+        "--model {input.model} --registrations {input.registrations} --embeddings {input.embeddings} "
+        "--settings {params.settings:q} --out {output} 2> {log}"
+
+
+rule table7_runtime:
+    input:
+        runtime="results/{run}/runtime.csv",
+        code=code_files("gpca.reporting.runtime_table", "gpca.reporting.script"),
+    output:
+        csv=report(
+            "results/{run}/tables/table7_runtime.csv",
+            category="Tables",
+            labels={"table": "table7_runtime"},
+        ),
+        md="results/{run}/tables/table7_runtime.md",
+        tex="results/{run}/tables/table7_runtime.tex",
+    log:
+        "results/{run}/logs/tables/table7_runtime.log",
+    benchmark:
+        "results/{run}/benchmarks/tables/table7_runtime.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        title=title_of(MODEL_SHOWN),
+    script:
+        "../scripts/runtime_table.py"
+
+
+rule runtime_figure:
+    input:
+        runtime="results/{run}/runtime.csv",
+        code=code_files("gpca.reporting.runtime_figure", "gpca.reporting.script"),
+    output:
+        pdf="results/{run}/figures/runtime.pdf",
+        png=report(
+            "results/{run}/figures/runtime.png",
+            category="Figures",
+            labels={"figure": "runtime"},
+        ),
+    log:
+        "results/{run}/logs/figures/runtime.log",
+    benchmark:
+        "results/{run}/benchmarks/figures/runtime.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        title=title_of(MODEL_SHOWN),
+    script:
+        "../scripts/runtime_figure.py"
