@@ -24,6 +24,7 @@ STEPS = {
     "explain": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
+    "recover": "settings -> failures on virtual scenes, and what every policy of recovery makes of them",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
 }
 
