@@ -55,7 +55,7 @@ def policy_metrics(rows: pd.DataFrame, treatments: Mapping[str, str], budget: in
         f"recovered_within_{k}": rows[rows["recovered"] & (rows["step"] <= k)]["episode"].nunique() / episodes
         for k in range(1, budget + 1)
     }
-    values |= {"episodes": episodes, "tries": first.groupby("cause")["tries"].first().sum()}
+    values |= {"episodes": episodes, "acted_first": len(acted), "tries": first.groupby("cause")["tries"].first().sum()}
     if len(acted):
         values["wrong_first"] = float((acted["action"] != acted["cause"].map(dict(treatments))).mean())
     values["queued"] = rows[rows["action"] == QUEUE]["episode"].nunique() / episodes
@@ -105,9 +105,13 @@ def wilson_interval(successes: float, trials: int, level: float = 0.95) -> tuple
 
 
 def pooled(metrics: pd.DataFrame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
-    """Return a share over the failures of all seeds, and their number; None where the metrics hold none."""
+    """Return a share over the failures of all seeds, and their number; None where the metrics hold none.
+
+    A wrong first action is a share of the failures that were acted on at all.
+    """
+    weight = "acted_first" if metric == "wrong_first" else "episodes"
     of_policy = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
-    share_R, count_R = (of_policy[of_policy["metric"] == m].set_index("seed")["value"] for m in (metric, "episodes"))
+    share_R, count_R = (of_policy[of_policy["metric"] == m].set_index("seed")["value"] for m in (metric, weight))
     if share_R.empty:
         return None
     weight_R = count_R[share_R.index]

@@ -140,10 +140,15 @@ class Situation:
         return Shot(self.camera, T_world_camera, depth_m, view.mesh == 0)
 
     def estimate(self, shot: Shot, points_m: np.ndarray, *axes: object) -> np.ndarray:
-        """Return ``T_world_object`` by the pose estimator, from the object's points (P, 3) of a shot, in the world."""
+        """Return ``T_world_object`` by the pose estimator, from the object's points (P, 3) of a shot, in the world.
+
+        Where it finds nothing, far from what was measured, its orientation is taken at the middle of that.
+        """
         in_camera_m = transform(inverse(shot.T_world_camera), points_m)
         seed = seed_of(*self.axes, "estimate", *axes)
         T_camera_object = self.shelf.estimator(self.model).register(in_camera_m, seed)
+        if np.linalg.norm(T_camera_object[:3, 3] - in_camera_m.mean(axis=0)) > self.diameter_m:
+            T_camera_object[:3, 3] = in_camera_m.mean(axis=0)
         return shot.T_world_camera @ T_camera_object @ self.T_object_estimated
 
     def visible(self) -> np.ndarray:

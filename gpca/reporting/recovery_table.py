@@ -32,13 +32,13 @@ def table8_recovery(
     rows, cells = [], {}
     seeds = metrics["seed"].nunique()
     within = [f"recovered_within_{k}" for k in range(1, budget + 1)]
-    shares = {*within, *(f"{within[-1]}_{cause}" for cause in CONCEPTS), "wrong_first", "queued"}
+    shares = {key: (key, ALL) for key in (*within, "wrong_first", "queued")}
+    shares |= {f"{within[-1]}_{cause}": (within[-1], cause) for cause in CONCEPTS}
     for name, title in policies.items():
         if pooled(metrics, name, within[0]) is None:
             continue
         row = len(rows)
-        for key in shares:
-            metric, cause = (within[-1], key.rsplit("_", 1)[1]) if key.rsplit("_", 1)[1] in CONCEPTS else (key, ALL)
+        for key, (metric, cause) in shares.items():
             if (found := pooled(metrics, name, metric, cause)) is not None:
                 cells[row, key] = share_cell(*found, seeds)
         for key, value in (("actions", pooled(metrics, name, "actions")), ("seconds", seconds.get(name))):
