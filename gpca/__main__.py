@@ -27,6 +27,7 @@ STEPS = {
     "kernels": "embeddings -> every kernel, learning rate and number of iterations",
     "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
     "learn": "embeddings -> predictions of every learner, on test samples and on shifted ones",
+    "recover": "settings -> failures on virtual scenes, and what every policy of recovery makes of them",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
     "model": "encoder and embeddings -> one file with all that an explanation needs",
     "explain": "two files of points -> why their registration is uncertain, and what to do",

@@ -7,14 +7,18 @@ import sys
 from pathlib import Path
 
 from gpca.acquisition import STRATEGIES, STREAMS
+from gpca.actions import action_of
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry, require_settings
 from gpca.frames.rgbd_scene import SceneSettings
+from gpca.frames.situations import SituationSettings
 from gpca.frames.source import REAL_WORLD, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.source import resolve
+from gpca.policies import policy_entry
 from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
+from gpca.recovery import Thresholds
 from gpca.settings import check_settings, load_schema, require_valid
 from gpca.synthesis import RegistrationSettings
 
@@ -55,6 +59,7 @@ def check(config: dict) -> dict[str, dict]:
             raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
     with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
     _check_real_world(config)
+    _check_recovery(config)
     sources = {
         name: {"stand_in": entry["kind"] == "procedural"}
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
@@ -88,6 +93,30 @@ def _check_real_world(config: dict) -> None:
             if not entry.get("results"):
                 key = f"config key real_world.datasets.{name}.results"
                 raise InputError(key, "is needed by initial_pose form results", "name the file, or take another form")
+
+
+def _check_recovery(config: dict) -> None:
+    section = config["recovery"]
+    for name, settings in section["actions"].items():
+        with_key(f"recovery.actions.{name}", action_of, name, settings or {})
+    for concept, action in section["treatments"].items():
+        if action not in section["actions"]:
+            known = ", ".join(section["actions"])
+            raise InputError(f"config key recovery.treatments.{concept}", f"no action '{action}'", f"known are {known}")
+    if len(set(section["treatments"].values())) < len(section["treatments"]):
+        raise InputError("config key recovery.treatments", "one action treats two concepts", "give each its own")
+    for name in section["policies"]:
+        entry = with_key("recovery.policies", policy_entry, name, tuple(section["actions"]))
+        if entry.explainer:
+            given = config["explainers"].get(entry.explainer) or {}
+            with_key(f"explainers.{entry.explainer}", require_settings, entry.explainer, given)
+            if (design := explainer_entry(entry.explainer).design) and design not in config["uncertainty"]:
+                raise InputError(f"config key recovery.policies: {name}", f"no uncertainty '{design}'", "name it there")
+    declared = {name: section["thresholds"][name] for name in ("uncertain", "dominant", "improvement")}
+    declared = {name: value for name, value in declared.items() if value is not None}
+    with_key("recovery.thresholds", lambda: Thresholds(**declared))
+    ranges = {name: tuple(section[name]) for name in ("noise_scale", "hidden")}
+    with_key("recovery", lambda: SituationSettings(**ranges))
 
 
 def with_key(key: str, function, *arguments):

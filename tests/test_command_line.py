@@ -100,7 +100,8 @@ STEP_OPTIONS = {
     },
     "explain": {"meshes/brick.stl": [], "meshes/cone.ply": [], "--unit": "mm", "--model": "model.pt", "--json": []},
 }  # fmt: skip
-FRAME_STEPS = {"scenes", "instances", "frame_registrations"}  # of depth frames: tests/frames/test_steps.py
+# Of depth frames and of recovery: tests/frames/test_steps.py, tests/test_recover_step.py.
+FRAME_STEPS = {"scenes", "instances", "frame_registrations", "recover"}
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
 
 
@@ -409,7 +410,7 @@ FAULTS = {
         (truncated("model.pt"), {}, r"model.pt: is damaged or no model"),
         (truncated("meshes/cone.ply"), {}, r"cone.ply: is truncated or not a readable .ply file"),
         (removed("meshes/brick.stl"), {}, r"brick.stl: no such file; give one of .ply"),
-        (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit looks wrong"),
+        (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit"),
         (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: holds 3 numbers; give 4×4"),
         (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
         (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),

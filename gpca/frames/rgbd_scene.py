@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from gpca.seeds import generator
 
 DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
 TABLE_M = 1.2  # edge length of the table
+TABLE_COLOUR = (0.72, 0.65, 0.55)
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
 
     Everything random is named by source, scene and view. The folder appears when it is complete.
     """
-    surfaces = [_centred(surface) for surface in surfaces]
+    surfaces = [centred(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
         _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **asdict(settings)})
@@ -87,11 +88,16 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
             _write_scene(partial / f"test/{scene:06d}", surfaces, standing, views, settings, (source, scene))
 
 
-def lay_table(surfaces: list[Surface], settings: SceneSettings, source: str, scene: int) -> list[Placed]:
+def lay_table(
+    surfaces: list[Surface], settings: SceneSettings, source: str, scene: int, resting: Sequence[tuple] = ()
+) -> list[Placed]:
     """Stand different objects on the table z = 0, each as it rests by itself, close together but not touching.
 
     Each takes one of its stable poses, by their probability, turned at random, and comes from a random direction as
     near to the middle as its convex outline on the table allows.
+
+    Args:
+        resting: what :func:`stable_poses` returns for each surface, where many tables are laid.
     """
     from shapely import MultiPoint
     from shapely.affinity import translate
@@ -100,7 +106,7 @@ def lay_table(surfaces: list[Surface], settings: SceneSettings, source: str, sce
     count = min(int(random.integers(settings.objects[0], settings.objects[1] + 1)), len(surfaces))
     standing, outlines = [], []
     for model in random.permutation(len(surfaces))[:count]:
-        T_world_object = _resting(surfaces[model], random)
+        T_world_object = rest(*(resting[model] if resting else stable_poses(surfaces[model])), random)
         flat_m = transform(T_world_object, surfaces[model].vertices_m)[:, :2]
         outline = MultiPoint(flat_m - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2).convex_hull
         azimuth = random.uniform(0, 2 * np.pi)
@@ -137,17 +143,23 @@ def table() -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _centred(surface: Surface) -> Surface:
+def centred(surface: Surface) -> Surface:
+    """Return the surface with its bounding box's centre at the origin."""
     centre_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
     return Surface(surface.name, surface.vertices_m - centre_m, surface.faces)
 
 
-def _resting(surface: Surface, random: np.random.Generator) -> np.ndarray:
+def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Return the poses (n, 4, 4) in which an object rests on the plane z = 0, and their probabilities (n,)."""
     import trimesh
 
     mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
-    poses, probabilities = trimesh.poses.compute_stable_poses(mesh, sigma=0.0, threshold=0.0)
-    chosen = poses[random.choice(len(poses), p=probabilities / probabilities.sum())]
+    return trimesh.poses.compute_stable_poses(mesh, sigma=0.0, threshold=0.0)
+
+
+def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Draw one of the stable poses and turn it about the vertical."""
+    chosen = poses_n[random.choice(len(poses_n), p=probabilities_n / probabilities_n.sum())]
     turn = np.eye(4)
     turn[:3, :3] = Rotation.from_euler("z", random.uniform(0, 2 * np.pi)).as_matrix()
     return turn @ chosen
@@ -176,7 +188,7 @@ def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
 def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings: SceneSettings, axes: tuple) -> None:
     meshes = [(transform(p.T_world_object, surfaces[p.model].vertices_m), surfaces[p.model].faces) for p in standing]
     scene, alone = MeshScene([*meshes, table()]), [MeshScene([mesh]) for mesh in meshes]
-    colours_M_3 = np.array([*(_colour(p.model, len(surfaces)) for p in standing), (0.72, 0.65, 0.55)])
+    colours_M_3 = np.array([*(model_colour(p.model, len(surfaces)) for p in standing), TABLE_COLOUR])
     for name in ("depth", "rgb", "mask", "mask_visib"):
         (folder / name).mkdir(parents=True)
     camera_json, truth_json, info_json = {}, {}, {}
@@ -235,7 +247,8 @@ def _box(mask: np.ndarray) -> list[int]:
     return [int(u.min()), int(v.min()), int(np.ptp(u)) + 1, int(np.ptp(v)) + 1] if len(u) else [-1, -1, -1, -1]
 
 
-def _colour(model: int, count: int) -> tuple[float, float, float]:
+def model_colour(model: int, count: int) -> tuple[float, float, float]:
+    """Return the colour of a model among so many, in [0, 1]."""
     from colorsys import hsv_to_rgb
 
     return hsv_to_rgb(model * 0.618034 % 1, 0.55 if model % 2 else 0.75, 0.85)

@@ -19,6 +19,7 @@ class Cell:
     """Mean over `seeds` repeats, the half-width of its 95 % t-interval (NaN for one seed), test samples in all.
 
     A mean that is `at_least` so large, since some repeats were stopped before they were done, has no interval.
+    An interval that is not symmetric has `bounds` too.
     """
 
     mean: float
@@ -26,6 +27,7 @@ class Cell:
     seeds: int
     test_samples: int
     at_least: bool = False
+    bounds: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ class Table:
                 least, most = column.limits
                 low, high = (
                     "" if cell.at_least or math.isnan(cell.half_width) else round(min(max(bound, least), most), 6)
-                    for bound in (cell.mean - cell.half_width, cell.mean + cell.half_width)
+                    for bound in cell.bounds or (cell.mean - cell.half_width, cell.mean + cell.half_width)
                 )
                 keys = (key for key, _ in labels)
                 counts = (cell.seeds, cell.test_samples, cell.at_least)

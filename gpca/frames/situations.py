@@ -1,0 +1,266 @@
+"""Situations: an object in a scene of the virtual camera whose registration is disturbed by one known cause."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from gpca.errors import InputError
+from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
+from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
+from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, centred, lay_table, rest, stable_poses, table
+from gpca.frames.shots import Shot, median_depth
+from gpca.objects.canonical import ObjectClouds, canonical_cloud
+from gpca.objects.surface import Surface
+from gpca.objects.symmetry import found_symmetries
+from gpca.perturbation import Severities, move
+from gpca.rigid import inverse, scale_translation, transform
+from gpca.seeds import generator, seed_of
+
+COARSE = 4  # the factor by which the image is thinned where only shares of pixels count
+LEAST_VISIBLE = 0.7  # of the object, before anything is put in front of it
+REDRAWS = 40  # of a situation that has no room for its cause
+OCCLUDERS = 6  # that are tried in front of an object
+OCCLUDER_TURN_DEG = 20.0  # the occluder stands so far off the line to the camera, at most
+
+
+@dataclass(frozen=True)
+class SituationSettings:
+    """What disturbs a registration, and the scenes.
+
+    Attributes:
+        scenes: tables, cameras and the sensor's usual noise; its camera is the region of interest about the object.
+        noise_scale: range of the factor on the sensor's noise, where noise is the cause.
+        hidden: range of the share of the visible part that an occluder hides, where overlap is the cause.
+        severities: of the error of the estimated pose, where pose is the cause.
+    """
+
+    scenes: SceneSettings = field(default_factory=SceneSettings)
+    noise_scale: tuple[float, float] = (3.0, 8.0)
+    hidden: tuple[float, float] = (0.5, 0.9)
+    severities: Severities = field(default_factory=Severities)
+
+    def __post_init__(self) -> None:
+        for name in ("noise_scale", "hidden"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise InputError(f"recovery.{name}", f"[{low}, {high}] runs downwards", "swap the two")
+
+
+class Shelf:
+    """The objects that the tables are laid with, and what is known of each.
+
+    Args:
+        points: sampled on each model.
+        estimator: how a pose is estimated from one shot.
+    """
+
+    def __init__(
+        self, surfaces: Sequence[Surface], source: str, points: int = 4096, estimator: InitialPoseSettings | None = None
+    ) -> None:
+        self.surfaces = [centred(surface) for surface in surfaces]
+        self.resting = [stable_poses(surface) for surface in self.surfaces]
+        self._hulls_m = [surface.vertices_m[ConvexHull(surface.vertices_m).vertices] for surface in self.surfaces]
+        clouds = [canonical_cloud(surface, source, points) for surface in self.surfaces]
+        names = tuple(surface.name for surface in self.surfaces)
+        diameters_m = np.array([diameter_m for *_, diameter_m in clouds])
+        self.objects = ObjectClouds(names, diameters_m, tuple((p, n) for p, n, _ in clouds))
+        self.symmetric = [bool(found_symmetries(p[:4096], d)) for p, _, d in clouds]
+        self._settings = estimator or InitialPoseSettings()
+        self._estimators: dict[int, GlobalRegistration] = {}
+
+    def outline(self, object_: Placed):
+        """Return the convex outline of an object on the table, as a polygon in metres."""
+        from shapely import MultiPoint
+
+        return MultiPoint(transform(object_.T_world_object, self._hulls_m[object_.model])[:, :2]).convex_hull
+
+    def estimator(self, model: int) -> GlobalRegistration:
+        """Return the pose estimator of an object."""
+        if model not in self._estimators:
+            given = (*self.objects.clouds[model], float(self.objects.diameters_m[model]), self._settings)
+            self._estimators[model] = GlobalRegistration(*given)
+        return self._estimators[model]
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """The truth of one case; a robot gets only the model and what :meth:`shoot` and :meth:`estimate` return.
+
+    Attributes:
+        shelf: the objects.
+        standing: what is on the table, the object in question first.
+        T_world_camera: where the case is seen from at first.
+        T_object_estimated: by how much the pose estimator is off, whatever it is shown: the cause pose.
+        camera, noise: of every shot.
+        cause: what disturbs the registration; empty for nothing.
+        axes: names of its random numbers.
+    """
+
+    shelf: Shelf
+    standing: tuple[Placed, ...]
+    T_world_camera: np.ndarray
+    T_object_estimated: np.ndarray
+    camera: Camera
+    noise: DepthNoise
+    cause: str
+    axes: tuple
+
+    @property
+    def model(self) -> int:
+        """The number of the object on the shelf."""
+        return self.standing[0].model
+
+    @property
+    def T_world_object(self) -> np.ndarray:
+        """The true pose."""
+        return self.standing[0].T_world_object
+
+    @property
+    def diameter_m(self) -> float:
+        """The object's diameter."""
+        return float(self.shelf.objects.diameters_m[self.model])
+
+    @cached_property
+    def meshes(self) -> MeshScene:
+        """The scene, ready to be looked at; mesh 0 is the object."""
+        surfaces = self.shelf.surfaces
+        placed = [(transform(p.T_world_object, surfaces[p.model].vertices_m), p.model) for p in self.standing]
+        return MeshScene([*((vertices_m, surfaces[model].faces) for vertices_m, model in placed), table()])
+
+    def shoot(self, T_world_camera: np.ndarray, frames: int, *axes: object) -> Shot:
+        """Measure from a viewpoint: the median depth of so many frames, whose noise is named by the axes."""
+        view = self.meshes.look(self.camera, T_world_camera)
+        depth_n_H_W = [self.noise.measure(view, generator(*self.axes, "shot", *axes, n)) for n in range(frames)]
+        depth_m = median_depth(np.array(depth_n_H_W)) if frames > 1 else depth_n_H_W[0]
+        return Shot(self.camera, T_world_camera, depth_m, view.mesh == 0)
+
+    def estimate(self, shot: Shot, points_m: np.ndarray, *axes: object) -> np.ndarray:
+        """Return ``T_world_object`` by the pose estimator, from the object's points (P, 3) of a shot, in the world.
+
+        Where it finds nothing, far from what was measured, its orientation is taken at the middle of that.
+        """
+        in_camera_m = transform(inverse(shot.T_world_camera), points_m)
+        seed = seed_of(*self.axes, "estimate", *axes)
+        T_camera_object = self.shelf.estimator(self.model).register(in_camera_m, seed)
+        if np.linalg.norm(T_camera_object[:3, 3] - in_camera_m.mean(axis=0)) > self.diameter_m:
+            T_camera_object[:3, 3] = in_camera_m.mean(axis=0)
+        return shot.T_world_camera @ T_camera_object @ self.T_object_estimated
+
+    def visible(self) -> np.ndarray:
+        """Return the pixels, of a thinned image, that show the object from the first viewpoint."""
+        return self.meshes.look(coarse(self.camera), self.T_world_camera).mesh == 0
+
+
+def coarse(camera: Camera) -> Camera:
+    """Return the same camera with fewer pixels."""
+    return Camera(camera.width // COARSE, camera.height // COARSE, camera.focal_px / COARSE)
+
+
+class Situations:
+    """Draws situations on the tables of one part of a run, so that no two parts share a table.
+
+    Args:
+        part: names the tables, e.g. ``("recovery", 0, "train")``.
+    """
+
+    def __init__(self, shelf: Shelf, settings: SituationSettings, part: tuple) -> None:
+        self._shelf, self._settings, self._part = shelf, settings, part
+        self._alone: dict[int, MeshScene] = {}
+        self._tables: dict[int, list[Placed]] = {}
+
+    def draw(self, cause: str, *axes: object) -> tuple[Situation, Situation]:
+        """Return a situation with the cause, and the same one without it.
+
+        Raises:
+            InputError: none of `REDRAWS` draws has the object in sight, or an occluder that hides the wanted share.
+        """
+        for redraw in range(REDRAWS):
+            axes_now = (*self._part, *axes, redraw)
+            random = generator(*axes_now)
+            clean = self._clean(random, axes_now)
+            if clean is not None and (disturbed := self._disturbed(clean, cause, random)) is not None:
+                return disturbed, clean
+        raise InputError(f"recovery: situation {axes}", f"no room for cause '{cause}'", "widen recovery.hidden")
+
+    def _clean(self, random: np.random.Generator, axes: tuple) -> Situation | None:
+        scenes = self._settings.scenes
+        number = int(random.integers(scenes.scenes))
+        if number not in self._tables:
+            source = "/".join(map(str, self._part))
+            self._tables[number] = lay_table(self._shelf.surfaces, scenes, source, number, self._shelf.resting)
+        standing = list(self._tables[number])
+        standing.insert(0, standing.pop(int(random.integers(len(standing)))))
+        T_world_object = standing[0].T_world_object
+        azimuth, elevation = random.uniform(0, 2 * np.pi), np.deg2rad(random.uniform(*scenes.elevation_deg))
+        toward = np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
+        centre_m = T_world_object[:3, 3]
+        situation = Situation(
+            self._shelf,
+            tuple(standing),
+            look_at(centre_m + random.uniform(*scenes.distance_m) * toward, centre_m),
+            np.eye(4),
+            scenes.camera,
+            scenes.noise,
+            "",
+            axes,
+        )
+        whole = self._silhouette(situation, situation.standing[0]).sum()
+        return situation if whole and situation.visible().sum() >= LEAST_VISIBLE * whole else None
+
+    def _silhouette(self, situation: Situation, object_: Placed) -> np.ndarray:
+        """Return the pixels of a thinned image that an object by itself would fill."""
+        if object_.model not in self._alone:
+            surface = self._shelf.surfaces[object_.model]
+            self._alone[object_.model] = MeshScene([(surface.vertices_m, surface.faces)])
+        T_object_camera = inverse(object_.T_world_object) @ situation.T_world_camera
+        return self._alone[object_.model].silhouette(coarse(situation.camera), T_object_camera)
+
+    def _disturbed(self, clean: Situation, cause: str, random: np.random.Generator) -> Situation | None:
+        settings = self._settings
+        if cause == "noise":
+            scale = settings.scenes.noise.scale * random.uniform(*settings.noise_scale)
+            return replace(clean, noise=replace(clean.noise, scale=scale), cause=cause)
+        if cause == "pose":
+            T_error = move(np.zeros((1, 3)), settings.severities, random).T_target_source_true
+            return replace(clean, T_object_estimated=scale_translation(T_error, clean.diameter_m), cause=cause)
+        if cause == "overlap":
+            occluder = self._occluder(clean, random)
+            return replace(clean, standing=(*clean.standing, occluder), cause=cause) if occluder else None
+        raise InputError(f"cause '{cause}'", "unknown", "known are noise, pose, overlap")
+
+    def _occluder(self, clean: Situation, random: np.random.Generator) -> Placed | None:
+        """Return an object in front of the one in question that hides the wanted share, or None where none does."""
+        low, high = self._settings.hidden
+        visible = clean.visible()
+        outlines = [self._shelf.outline(object_) for object_ in clean.standing]
+        for _ in range(OCCLUDERS):
+            occluder = self._in_front(clean, outlines, random)
+            if occluder and low <= (self._silhouette(clean, occluder) & visible).sum() / visible.sum() <= high:
+                return occluder
+        return None
+
+    def _in_front(self, clean: Situation, outlines: list, random: np.random.Generator) -> Placed | None:
+        """Stand another object on the table, towards the camera and as near to the object as there is room."""
+        from shapely.affinity import translate
+
+        taken = [object_.model for object_ in clean.standing]
+        free = [model for model in range(len(self._shelf.surfaces)) if model not in taken]
+        if not free:
+            return None
+        model = int(random.choice(free))
+        T_world_object = rest(*self._shelf.resting[model], random)
+        mine, target_m = self._shelf.outline(Placed(model, T_world_object)), clean.T_world_object[:2, 3]
+        turn = np.deg2rad(random.uniform(-OCCLUDER_TURN_DEG, OCCLUDER_TURN_DEG))
+        along = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        way = along @ (clean.T_world_camera[:2, 3] - target_m)
+        for share in np.arange(0.05, 0.6, 0.02):
+            at = target_m + share * way
+            if all(translate(mine, *at).distance(o) >= self._settings.scenes.gap_m for o in outlines):
+                T_world_object[:2, 3] += at
+                return Placed(model, T_world_object) if np.abs(at).max() < TABLE_M / 2 else None
+        return None

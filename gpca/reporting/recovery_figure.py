@@ -1,0 +1,75 @@
+"""Recovery rates: the share of failures that each policy recovers within 1, 2, … actions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gpca.errors import InputError
+from gpca.perturbation import CONCEPTS
+from gpca.recovery_metrics import pooled, wilson_interval
+from gpca.reporting.frame_views import COLOURS
+from gpca.reporting.style import BLUE, SKY_BLUE, TEXT_WIDTH_IN, VERMILION, save_figure, use_style
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SHADES = (SKY_BLUE, BLUE, VERMILION)
+
+
+def draw_recovery_rates(
+    metrics: pd.DataFrame, policies: Mapping[str, str], budget: int, pdf_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw (left) the rate within 1 to `budget` actions with its Wilson interval, (right) that within all by cause.
+
+    Args:
+        metrics: tidy, as :func:`gpca.recovery_metrics.collect_recovery` makes them.
+        policies: name -> title, from top to bottom; those without numbers are left out.
+
+    Raises:
+        InputError: the metrics hold none of these.
+    """
+    shown = [name for name in policies if pooled(metrics, name, "recovered_within_1") is not None]
+    if not shown:
+        raise InputError("metrics", "hold no recovery rates", "run the step recover first")
+    use_style()
+    import matplotlib.pyplot as plt
+
+    height_in = 0.75 + 0.24 * len(shown)
+    figure, axes = plt.subplots(1, 2, figsize=(TEXT_WIDTH_IN, height_in), sharey=True, width_ratios=(1.5, 1))
+    for k in range(1, budget + 1):
+        label = f"within {k} action{'s' * (k > 1)}"
+        offset = 0.22 * (k - (budget + 1) / 2)
+        _draw(axes[0], metrics, shown, f"recovered_within_{k}", "all", offset, SHADES[(k - 1) % len(SHADES)], label)
+    for n, cause in enumerate(CONCEPTS):
+        metric = f"recovered_within_{budget}"
+        _draw(axes[1], metrics, shown, metric, cause, 0.22 * (n - 1), COLOURS[cause], cause)
+    axes[0].set_yticks(range(len(shown)), [policies[name] for name in shown])
+    axes[0].set_ylim(len(shown) - 0.4, -0.6)
+    for panel in axes:
+        panel.set_xlim(-2, 102)
+        panel.set_xlabel("recovered (%)")
+        panel.grid(axis="x", color="#DDDDDD", linewidth=0.5)
+        panel.set_axisbelow(True)
+        panel.tick_params(axis="y", length=0)
+        panel.legend(
+            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.2, columnspacing=1.0, borderpad=0
+        )
+    title = "Failures on tables of the virtual depth camera (procedural stand-in)"
+    episodes = pooled(metrics, shown[0], "recovered_within_1")[1]
+    figure.text(0.005, 0.99, f"{title}: {episodes} failures; right: within {budget} actions, by cause", va="top")
+    figure.tight_layout(rect=(0, 0, 1, 1 - 0.16 / height_in), pad=0.4)
+    save_figure(figure, pdf_path, png_path)
+
+
+def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, colour: str, label: str) -> None:
+    for row, name in enumerate(shown):
+        found = pooled(metrics, name, metric, concept)
+        if found is None:
+            continue
+        share, trials = found
+        low, high = wilson_interval(share * trials, trials)
+        axes.plot([100 * low, 100 * high], [row + offset] * 2, color=colour, linewidth=0.8)
+        axes.plot(100 * share, row + offset, "o", color=colour, label=label, markersize=3.5)
+        label = "_"  # one entry of the legend is enough

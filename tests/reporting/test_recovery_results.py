@@ -1,0 +1,118 @@
+"""Table VIII and the three figures of recovery."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gpca.errors import InputError
+from gpca.files import read_image, save_arrays
+from gpca.metrics import tidy
+from gpca.perturbation import CONCEPTS
+from gpca.recovery_metrics import wilson_interval
+from gpca.reporting.mitigation_figure import draw_mitigation, read_policy
+from gpca.reporting.recovery_example import draw_recovery_example
+from gpca.reporting.recovery_figure import draw_recovery_rates
+from gpca.reporting.recovery_table import table8_recovery
+
+POLICIES = {"gpca": "GP-CA", "random": "Random action", "absent": "Absent"}
+POLICY = {
+    "thresholds": {"uncertain": 0.25, "dominant": 0.4, "improvement": 0.1, "attempts": 3},
+    "treatments": {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"},
+}
+
+
+@pytest.fixture
+def metrics():
+    records = []
+    for policy, shares in {"gpca": (0.5, 0.75, 0.75), "random": (0.25, 0.5, 0.5)}.items():
+        for cause, episodes in (("all", 12), *((cause, 4) for cause in CONCEPTS)):
+            values = {f"recovered_within_{k}": share for k, share in enumerate(shares, start=1)}
+            values |= {
+                "episodes": episodes,
+                "tries": 10 * episodes,
+                "acted_first": episodes,
+                "wrong_first": 0.5,
+                "queued": 0.0,
+                "actions": 1.5,
+            }
+            for seed in (0, 1):
+                records += [("recovery", "recovery", policy, m, cause, seed, v) for m, v in values.items()]
+    return tidy(records, "recovery")
+
+
+def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
+    table = table8_recovery(metrics, {"gpca": 0.25}, POLICIES, 3)
+    assert [labels[0][0] for labels in table.rows] == ["gpca", "random"]
+    cell = table.cells[0, "recovered_within_1"]
+    low, high = wilson_interval(12, 24)
+    assert (cell.mean, cell.test_samples) == (pytest.approx(50), 24)
+    records = {(r[0], r[1]): r for r in table.records()}
+    assert records["gpca", "recovered_within_1"][3:5] == (pytest.approx(100 * low), pytest.approx(100 * high))
+    assert table.cells[0, "recovered_within_3_pose"].test_samples == 8
+    assert table.cells[0, "seconds"].mean == 0.25
+    assert (1, "seconds") not in table.cells
+    assert {key for key in table.best() if key[1].startswith("recovered")} == {
+        (0, f"recovered_within_{k}") for k in (1, 2, 3)
+    }
+    text = table.markdown()
+    assert "24 failures over 2 seeds: 8 by noise among 80 registrations" in text
+    assert "procedural stand-in" in text
+    with pytest.raises(InputError, match="hold no recovery"):
+        table8_recovery(metrics, {}, {"absent": "Absent"}, 3)
+
+
+def drawn_twice(draw, tmp_path):
+    for turn in "ab":
+        draw(tmp_path / f"{turn}.pdf", tmp_path / f"{turn}.png")
+    for kind in ("pdf", "png"):
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+    return read_image(tmp_path / "a.png", "")
+
+
+def test_rates_are_drawn(metrics, tmp_path):
+    image = drawn_twice(lambda *out: draw_recovery_rates(metrics, POLICIES, 3, *out), tmp_path)
+    assert np.ptp(image) > 100
+    with pytest.raises(InputError, match="hold no recovery rates"):
+        draw_recovery_rates(metrics, {"absent": "Absent"}, 3, tmp_path / "c.pdf", tmp_path / "c.png")
+
+
+def test_the_mapping_is_drawn_from_the_thresholds(tmp_path):
+    path = tmp_path / "policy.json"
+    path.write_text(json.dumps(POLICY))
+    first = drawn_twice(lambda *out: draw_mitigation(path, *out), tmp_path)
+    path.write_text(json.dumps(POLICY | {"thresholds": POLICY["thresholds"] | {"uncertain": 0.125}}))
+    assert (drawn_twice(lambda *out: draw_mitigation(path, *out), tmp_path) != first).any()
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"thresholds": {}}'])
+def test_a_faulty_policy_file_is_refused(text, tmp_path):
+    (tmp_path / "policy.json").write_text(text)
+    with pytest.raises(InputError, match="no policy with its thresholds"):
+        read_policy(tmp_path / "policy.json")
+    with pytest.raises(InputError, match="no such file"):
+        read_policy(tmp_path / "none.json")
+
+
+def test_the_example_is_drawn_and_one_without_its_second_view_refused(tmp_path):
+    image, mask = np.full((48, 64, 3), 128, np.uint8), np.zeros((48, 64), bool)
+    mask[20:30, 25:40] = True
+    T = np.eye(4)
+    T[2, 3] = 0.7
+    arrays = {
+        "camera_3_3": np.array([[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]),
+        "model_m": np.random.default_rng(0).normal(scale=0.03, size=(200, 3)),
+        "object": np.array("brick"),
+        "cause": np.array("overlap"),
+        "action": np.array("new_view"),
+        "scores": np.array([0.1, 0.2, 0.7]),
+        "errors": np.array([0.4, 0.02]),
+    }
+    for view in ("first", "next"):
+        arrays |= {f"image_{view}": image, f"mask_{view}": mask, f"T_camera_object_{view}": T}
+    save_arrays(tmp_path / "example.npz", arrays)
+    shown = drawn_twice(lambda *out: draw_recovery_example(tmp_path / "example.npz", *out), tmp_path)
+    assert np.ptp(shown) > 100
+    save_arrays(tmp_path / "half.npz", {name: a for name, a in arrays.items() if not name.endswith("_next")})
+    with pytest.raises(InputError, match="_next' is missing"):
+        draw_recovery_example(tmp_path / "half.npz", tmp_path / "c.pdf", tmp_path / "c.png")

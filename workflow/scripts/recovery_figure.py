@@ -1,0 +1,17 @@
+"""What came of recovery -> one of its figures."""
+
+from gpca.metrics import read_metrics
+from gpca.reporting.mitigation_figure import draw_mitigation
+from gpca.reporting.recovery_example import draw_recovery_example
+from gpca.reporting.recovery_figure import draw_recovery_rates
+from gpca.reporting.script import job
+
+with job(snakemake):
+    files = (snakemake.output.pdf, snakemake.output.png)
+    if snakemake.wildcards.figure == "recovery_rates":
+        given = snakemake.params
+        draw_recovery_rates(read_metrics(snakemake.input.data), given.policies, given.budget, *files)
+    elif snakemake.wildcards.figure == "fig6_mitigation":
+        draw_mitigation(snakemake.input.data, *files)
+    else:
+        draw_recovery_example(snakemake.input.data, *files)

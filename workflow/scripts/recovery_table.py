@@ -1,0 +1,11 @@
+"""Metrics and seconds of recovery -> table8_recovery as CSV, Markdown, LaTeX."""
+
+from gpca.metrics import read_metrics
+from gpca.recovery_metrics import mean_seconds
+from gpca.reporting.recovery_table import table8_recovery
+from gpca.reporting.script import job
+
+with job(snakemake):
+    metrics, seconds = read_metrics(snakemake.input.metrics), mean_seconds(snakemake.input.timings)
+    table = table8_recovery(metrics, seconds, snakemake.params.policies, snakemake.params.budget)
+    table.write(snakemake.output.csv, snakemake.output.md, snakemake.output.tex)
