@@ -51,6 +51,9 @@ def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     policy = json.loads((tmp_path / "policy.json").read_text())
     assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
     assert 0 <= policy["thresholds"]["uncertain"] < 1.1
+    assert call(tmp_path / "again", settings()) == 0
+    for name in ("seed7.csv", "policy.json", "example.npz"):
+        assert (tmp_path / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
     for name in ("seed7.csv", "t/seed7.csv", "policy.json", "example.npz"):
         assert (tmp_path / f"{name}.provenance.json").is_file()
 
