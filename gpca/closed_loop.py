@@ -223,8 +223,11 @@ def labelled(
 
     Args:
         situations: of ``train`` and ``test``, which share no table.
+
+    Returns:
+        the registrations, and which of them failed (S,).
     """
-    records = []
+    records, failed = [], []
     for split, count in (("train", train), ("test", calibration)):
         for number in progress(range(count), f"situations of split {split}"):
             cause, start, redraw = CONCEPTS[number % len(CONCEPTS)], None, 0
@@ -232,4 +235,5 @@ def labelled(
                 situation, _ = situations[split].draw(cause, cause, number, redraw)
                 start, redraw = first(situation, settings.points, settings.icp), redraw + 1
             records.append(start.record | {"sample": number, "split": split})
-    return as_registrations(records)
+            failed.append(start.error > CORRECT)
+    return as_registrations(records)[0], np.array(failed)

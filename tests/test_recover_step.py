@@ -10,7 +10,14 @@ from gpca.__main__ import main
 from gpca.perturbation import CONCEPTS
 from gpca.settings import SCHEMA
 
+from .frames.tiny import surfaces
 from .test_config import load
+
+
+@pytest.fixture(autouse=True)
+def tiny_objects(monkeypatch):
+    """Five simple objects in place of a family; to find how those of a family rest takes seconds."""
+    monkeypatch.setattr("gpca.objects.procedural.surfaces", lambda family: surfaces())
 
 
 def settings(**changed):
@@ -26,7 +33,7 @@ def settings(**changed):
     encoder = config["encoders"]["dgcnn"] | {"points": 32, "epochs": 1, "draws": 1, "options": {"k": 4}}
     given = {
         "recovery": recovery | changed,
-        "scenes": config["real_world"]["scenes"] | {"families": ["coffee_cup"]},
+        "scenes": config["real_world"]["scenes"] | {"objects": [3, 3]},
         "registrations": config["registrations"] | {"points": 256},
         "encoder": encoder,
         "uncertainty": {"starts": 13, "points": 32},
@@ -51,6 +58,9 @@ def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     policy = json.loads((tmp_path / "policy.json").read_text())
     assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
     assert 0 <= policy["thresholds"]["uncertain"] < 1.1
+    assert call(tmp_path / "again", settings()) == 0
+    for name in ("seed7.csv", "policy.json", "example.npz"):
+        assert (tmp_path / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
     for name in ("seed7.csv", "t/seed7.csv", "policy.json", "example.npz"):
         assert (tmp_path / f"{name}.provenance.json").is_file()
 

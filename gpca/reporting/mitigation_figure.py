@@ -50,6 +50,7 @@ def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str
     axes.set_axis_off()
     figure.subplots_adjust(0.005, 0.01, 0.995, 0.99)
     _box(axes, 0.5, 14, 17, 12, "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD", GREY)
+    axes.text(0.5, 39, "Thresholds of this run, on virtual\ntables (procedural stand-in)", va="top", fontsize=7)
     branches = [(_queue_condition(limits), "Abstain\nqueue for labelling, retrain", GREY)]
     branches += [
         (rf"{ASKED.get(concept, concept)}", WORDS.get(action, action.replace("_", " ")), COLOURS[concept])

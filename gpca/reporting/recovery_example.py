@@ -46,7 +46,7 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
         panel.imshow(found[f"image_{view}"], alpha=0.75 if posed else 1.0)
         if posed:
             seen = transform(found[f"T_camera_object_{view}"], found["model_m"]) @ found["camera_3_3"].T
-            ahead = seen[:, 2] > 0
+            ahead = seen[:, 2] > 0.05  # metres before the camera
             panel.scatter(*(seen[ahead, :2] / seen[ahead, 2:]).T, s=0.6, color=MODEL_RED, linewidths=0)
         else:
             panel.contour(found[f"mask_{view}"], [0.5], colors="#FFD400", linewidths=0.9)
@@ -65,7 +65,7 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
     solved = "solved" if after <= 100 * CORRECT else "not solved"
     captions = (
         f"(a) Occluded: pose {before:.0f} % $d$ off" if str(found["cause"]) == "overlap" else f"(a) {before:.0f} % off",
-        f"(b) Attributed to {CONCEPTS[int(np.argmax(shown))]}",
+        f"(b) Attributed to {CONCEPTS[int(np.argmax(shown))]}{_instead(str(found['action']))}",
         "(c) New viewpoint",
         f"(d) After it: {after:.1f} % $d$ off, {solved}",
     )
@@ -76,3 +76,8 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
     )
     figure.text(0.003, 0.99, title, ha="left", va="top")
     save_figure(figure, pdf_path, png_path)
+
+
+def _instead(action: str) -> str:
+    """Return what the policy did where it did not change the viewpoint, as the panels show it."""
+    return "" if action == "new_view" else f" ({action.replace('_', ' ')})"

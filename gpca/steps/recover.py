@@ -8,6 +8,7 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from gpca.actions import action_of
@@ -24,7 +25,7 @@ from gpca.objects import procedural
 from gpca.policies import policy_entry
 from gpca.predictions import write_csv
 from gpca.provenance import recorded
-from gpca.recovery import RecoveryPolicy, Thresholds, choose_uncertain
+from gpca.recovery import FEWEST_ABOVE, RecoveryPolicy, Thresholds, choose_uncertain
 from gpca.recovery_example import save_example
 from gpca.settings import check_settings
 from gpca.synthesis import RegistrationSettings
@@ -66,7 +67,7 @@ def run(options: Namespace) -> None:
         surfaces = [surface for family in situation.scenes.families for surface in procedural.surfaces(family)]
         shelf = Shelf(surfaces, SOURCE, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
         tables = {part: Situations(shelf, situation, (*axes, part)) for part in ("train", "test", "failures")}
-        registrations, _ = labelled(tables, recovery["train"], recovery["calibration"], loop)
+        registrations, failed_S = labelled(tables, recovery["train"], recovery["calibration"], loop)
         explainers = learn_explainers(
             [name for name in dict.fromkeys(entry.explainer for entry in entries.values()) if name],
             registrations,
@@ -76,7 +77,7 @@ def run(options: Namespace) -> None:
             recovery["remedied"],
             *axes,
         )
-        policy = robot_policy(recovery, explainers)
+        policy = robot_policy(recovery, explainers, failed_S[registrations.rows("test")])
         _write_policy(options.policy, policy, explainers)
         episodes = find_failures(tables["failures"], loop)
         rows, seconds = Loop(episodes, actions, explainers.explain, policy, loop, axes).run(policies)
@@ -95,15 +96,18 @@ def situation_settings(given: dict, registration: RegistrationSettings) -> Situa
     return SituationSettings(scenes, **ranges, severities=registration.severities)
 
 
-def robot_policy(recovery: dict, explainers: LoopExplainers) -> RecoveryPolicy:
-    """Return the declared thresholds, and the one that is chosen on the calibration samples unless it is declared."""
+def robot_policy(recovery: dict, explainers: LoopExplainers, failed_N: np.ndarray) -> RecoveryPolicy:
+    """Return the declared thresholds, and the one that is chosen on the calibration samples unless it is declared.
+
+    Chosen on those that failed (N,), since a policy is asked about such; on all where hardly any did.
+    """
     declared = dict(recovery["thresholds"])
-    least_accuracy = declared.pop("least_accuracy")
+    least_accuracy, gpca = declared.pop("least_accuracy"), explainers.calibration.get("gpca")
+    if declared["uncertain"] is None and gpca is None:
+        declared["uncertain"] = float("inf")
     if declared["uncertain"] is None:
-        gpca = explainers.calibration.get("gpca")
-        declared["uncertain"] = (
-            float("inf") if gpca is None else choose_uncertain(gpca.bald_N, explainers.right("gpca"), least_accuracy)
-        )
+        rows = failed_N if failed_N.sum() >= FEWEST_ABOVE else np.ones(len(failed_N), bool)
+        declared["uncertain"] = choose_uncertain(gpca.bald_N[rows], explainers.right("gpca")[rows], least_accuracy)
     return RecoveryPolicy(Thresholds(**declared, attempts=recovery["loop"]["budget"]), recovery["treatments"])
 
 
