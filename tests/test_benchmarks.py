@@ -225,6 +225,19 @@ def test_active_learning_compares_equal_bald_and_ends_with_its_numbers(capsys):
     assert "BALD of 30 embeddings, 20 draws" in out
 
 
+def test_latency_compares_explanations_of_equal_scores(capsys):
+    from benchmarks import latency
+
+    latency.main(["--points", "64", "--pairs", "3", "--repeats", "3", "--draws", "400"])
+    out = capsys.readouterr().out
+    result = last_line(out)
+    assert list(result) == ["median_ms", "speedup", "speedup_all_draws", "max_score_difference"]
+    assert min(result["median_ms"], result["speedup"]) > 0
+    assert result["speedup_all_draws"] > result["speedup"]
+    assert 0 < result["max_score_difference"] < 0.15  # four standard errors of two means of 400 draws
+    assert "one explanation, 64 points, 400 posterior draws, 1 thread(s)" in out
+
+
 def test_gpc_compares_equal_fits_and_ends_with_its_numbers(capsys):
     from benchmarks import gpc
 

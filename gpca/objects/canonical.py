@@ -18,6 +18,7 @@ from gpca.objects.surface import Surface
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
 NORMAL_NEIGHBOURS = 30
+FEW_POINTS = 600  # whose distances take less time than their hull
 
 
 def require_points(points: np.ndarray, subject: object) -> None:
@@ -32,13 +33,13 @@ def require_points(points: np.ndarray, subject: object) -> None:
 def diameter(points: np.ndarray, subject: object) -> float:
     """Largest distance between two of the (P, 3) points, in their unit (the diameter of the BOP benchmark).
 
-    The two farthest points are vertices of the convex hull, so only those are compared.
+    The two farthest points are vertices of the convex hull, so only those are compared; of few points, all are.
 
     Raises:
         InputError: no points, NaN, or all points on one line.
     """
     from scipy.spatial import ConvexHull
-    from scipy.spatial.distance import cdist
+    from scipy.spatial.distance import cdist, pdist
 
     require_points(points, subject)
     centred = points - points.mean(axis=0)
@@ -46,6 +47,8 @@ def diameter(points: np.ndarray, subject: object) -> float:
     rank = int((extents > 1e-6 * extents[0]).sum())
     if rank < 2:
         raise InputError(subject, "all its points lie on one point or line", "an object needs a surface")
+    if len(points) <= FEW_POINTS:
+        return float(pdist(points).max())
     # In the plane or space that the points span: Qhull refuses a flat cloud in 3-D.
     hull = points[ConvexHull(centred @ axes[:rank].T).vertices]
     blocks = np.array_split(hull, len(hull) // 1024 + 1)  # a sphere has thousands of hull vertices: bounded memory

@@ -1,7 +1,8 @@
+import numpy as np
 import pytest
 import torch
 
-from gpca.encoders import edge_conv
+from gpca.encoders import edge_conv, edge_kernels
 from gpca.encoders.edge_conv import EdgeConv, knn_indices
 from tests.encoders.per_edge import PerEdgeConv
 
@@ -77,3 +78,31 @@ def test_neighbours_are_the_nearest():
 
 def test_ties_go_to_the_lower_index():
     assert knn_indices(torch.zeros(1, 9, 2), 3).sort().values.tolist() == [[[0, 1, 2]] * 9]
+
+
+def rows_of_all_kinds():
+    random = np.random.default_rng(0)
+    yield from random.normal(size=(20, 60))
+    yield from random.integers(-2, 3, size=(20, 60)).astype(float)
+    yield from 1e6 + random.integers(0, 3, size=(5, 60)) * 0.0625  # the first step is lost in rounding
+    yield np.r_[np.full(8, 5.0), -np.arange(52.0)]  # equal ones first, smaller ones later
+    yield np.zeros(60)
+    yield np.r_[np.full(10, -np.inf), np.arange(50.0)]
+    yield 10.0 ** random.uniform(-30, 30, size=60)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("k", [1, 8, 60])
+def test_the_smallest_are_those_of_a_stable_sort(dtype, k):
+    rows = np.array(list(rows_of_all_kinds()), dtype)
+    chosen = edge_kernels.smallest_k(rows.reshape(7, 7, 60), k).reshape(-1, k)
+    np.testing.assert_array_equal(np.sort(chosen), np.sort(np.argsort(rows, kind="stable")[:, :k]))
+
+
+def test_a_row_with_nan_still_names_points():
+    rows = np.random.default_rng(0).normal(size=(1, 20, 30)).astype(np.float32)
+    rows[0, ::2, 3] = np.nan
+    rows[0, 5] = np.nan
+    chosen = edge_kernels.smallest_k(rows, 8)
+    assert chosen.min() >= 0
+    assert chosen.max() < 30
