@@ -105,6 +105,7 @@ def make_explainer(options: argparse.Namespace):
     from gpca.gpc import GPC, GPCSettings
     from gpca.model import Model
     from gpca.perturbation import CONCEPTS
+    from gpca.recovery import RecoveryPolicy
     from gpca.registration import ICPSettings
     from gpca.registration_explainer import Explainer
 
@@ -117,7 +118,7 @@ def make_explainer(options: argparse.Namespace):
         h_N_d = encoder.eval()(torch.from_numpy(np.stack(clouds))).numpy()
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, draws=options.draws), "benchmark", 0)
     gpc.fit(h_N_d, np.array([CONCEPTS[n % 3] for n in range(TRAINING)]))
-    model = Model(encoder, settings, gpc, ICPSettings(), options.points, "ellipsoids", stand_in=True)
+    model = Model(encoder, settings, gpc, ICPSettings(), options.points, RecoveryPolicy(), "ellipsoids", stand_in=True)
     return Explainer(model, device="cpu")
 
 

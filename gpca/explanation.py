@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ACTIONS = {
-    "pose": "reinitialise with a broader search",
-    "overlap": "change the viewpoint",
-    "noise": "filter and check the sensor",
+from gpca.recovery import QUEUE
+
+WORDS = {  # of the branches, for a reader
+    "reinitialise": "reinitialise ICP with a broader search",
+    "new_view": "change the viewpoint",
+    "denoise": "filter and check the sensor",
+    QUEUE: "queue for labelling: tell the cause, and learn it",
 }
-ABSTAIN = "abstain and ask for a label"
-MOST_ENTROPY = math.log(2)  # nats: that of two causes which are equally likely
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ class Explanation:
         scores, variances: by concept, over the posterior draws (Eqs. 4, 5).
         bald, entropy: of the attribution in nats: Eq. 7, and H of the scores.
         concept: that of the largest score (Eq. 6).
-        action: what to do next.
+        action: what to do next: a branch of the policy (:mod:`gpca.recovery`).
+        reason: of the action, in words.
         spread: of the pose by Monte-Carlo ICP, where it was asked for.
         unit: of all lengths.
         seconds: by stage, and ``total``.
@@ -61,6 +63,7 @@ class Explanation:
     entropy: float
     concept: str
     action: str
+    reason: str
     spread: Spread | None
     unit: str
     seconds: dict[str, float]
@@ -84,7 +87,7 @@ class Explanation:
         """Return it for a reader."""
         lines = [
             f"concept   {self.concept}",
-            f"action    {self.action}",
+            f"action    {WORDS.get(self.action, self.action)} ({self.reason})",
             "",
             f"{'':10}{'score':>8}{'variance':>10}",
             *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
@@ -99,8 +102,3 @@ class Explanation:
         lines += [" ".join(f"{number:12.6g}" for number in row) for row in self.T_target_source]
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
         return "\n".join([*lines, "", f"milliseconds   {stages}", ""])
-
-
-def recommended_action(concept: str, entropy: float, most_entropy: float) -> str:
-    """Return what to do about a cause; where the scores are too close to each other, or it is unknown, to ask."""
-    return ABSTAIN if entropy > most_entropy else ACTIONS.get(concept, ABSTAIN)

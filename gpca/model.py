@@ -18,9 +18,10 @@ from gpca.encoders.training import EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.gpc import GPC
+from gpca.recovery import RecoveryPolicy, Thresholds
 from gpca.registration import ICPSettings
 
-FORMAT, VERSION = "GP-CA model", 1
+FORMAT, VERSION = "GP-CA model", 2
 VARIABLE = "GPCA_MODEL"  # of the environment: the file that is taken where none is named
 RESULTS = Path(__file__).resolve().parent.parent / "results"
 BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
@@ -37,6 +38,7 @@ class Model:
         gpc: the classifier; its classes are the concepts.
         icp: how ICP ran.
         points: of source and of target, at most.
+        policy: what to do about which scores.
         title, stand_in: of the objects of the training, and whether they were drawn by the package.
     """
 
@@ -45,6 +47,7 @@ class Model:
     gpc: GPC
     icp: ICPSettings
     points: int
+    policy: RecoveryPolicy
     title: str
     stand_in: bool
 
@@ -63,6 +66,8 @@ class Model:
             "gpc": self.gpc.state(),
             "icp": asdict(self.icp),
             "points": self.points,
+            "thresholds": asdict(self.policy.thresholds),
+            "treatments": dict(self.policy.treatments),
             "title": self.title,
             "stand_in": self.stand_in,
         }
@@ -91,8 +96,14 @@ class Model:
             settings = EncoderSettings(**content["encoder_settings"])
             encoder = make_encoder(settings.backbone, settings.options)
             encoder.load_state_dict(content["encoder"])
-            rest = {name: content[name] for name in ("points", "title", "stand_in")}
-            return cls(encoder.eval(), settings, GPC.from_state(content["gpc"]), ICPSettings(**content["icp"]), **rest)
+            return cls(
+                encoder=encoder.eval(),
+                encoder_settings=settings,
+                gpc=GPC.from_state(content["gpc"]),
+                icp=ICPSettings(**content["icp"]),
+                policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
+                **{name: content[name] for name in ("points", "title", "stand_in")},
+            )
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
             raise InputError(path, f"is a model with something missing or damaged ({fault})", REMEDY) from fault
 

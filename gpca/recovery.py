@@ -18,7 +18,6 @@ from gpca.perturbation import CONCEPTS
 
 QUEUE = "queue"  # the branch that acts no more: a person labels the case, and the classifier learns it
 TREATMENTS = {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"}  # as the paper maps them
-FEWEST_ABOVE = 5  # calibration samples above a threshold, for their accuracy to mean something
 
 
 @dataclass(frozen=True)
@@ -78,6 +77,22 @@ class RecoveryPolicy:
     thresholds: Thresholds = field(default_factory=Thresholds)
     treatments: Mapping[str, str] = field(default_factory=lambda: dict(TREATMENTS))
 
+    @classmethod
+    def of_settings(
+        cls, thresholds: Mapping[str, float | None], treatments: Mapping[str, str], attempts: int, bald_N: np.ndarray
+    ) -> RecoveryPolicy:
+        """Build it from the config's thresholds; its `uncertain`, where null, is chosen on calibration samples.
+
+        Args:
+            attempts: see :class:`Thresholds`.
+            bald_N: of the calibration samples (:func:`choose_uncertain`).
+        """
+        declared = dict(thresholds)
+        queued_share = declared.pop("queued_share")
+        if declared["uncertain"] is None:
+            declared["uncertain"] = choose_uncertain(bald_N, queued_share)
+        return cls(Thresholds(**declared, attempts=attempts), dict(treatments))
+
     def decide(
         self,
         scores_C: np.ndarray,
@@ -111,26 +126,21 @@ class RecoveryPolicy:
         return Decision(self.treatments[chosen], chosen, f"{chosen} has {scores_C[concepts.index(chosen)]:.2f}")
 
 
-def choose_uncertain(bald_N: np.ndarray, right_N: np.ndarray, least_accuracy: float) -> float:
-    """Return the BALD above which attributions are mostly wrong, from samples that the classifier did not learn.
+def choose_uncertain(bald_N: np.ndarray, queued_share: float) -> float:
+    """Return the BALD in nats that at most so large a share of calibration samples exceeds.
 
-    It is the lowest of their values above which at least `FEWEST_ABOVE` of them lie and fewer than `least_accuracy`
-    of those are right; where there is none, the highest value, since nothing is known of cases beyond it.
+    So the share of cases that are left to a person is declared, and what is queued are those that the classifier
+    knows least about.
 
     Args:
-        bald_N: uncertainties in nats. right_N: whether each attribution is right.
-        least_accuracy: in (0, 1].
+        bald_N: uncertainties of samples that the classifier did not learn.
+        queued_share: in [0, 1).
 
     Raises:
-        InputError: no samples, or an accuracy out of range.
+        InputError: no samples, or a share out of range.
     """
-    if not 0 < least_accuracy <= 1:
-        raise InputError("recovery.least_accuracy", f"{least_accuracy} is not in (0, 1]", "give a share")
+    if not 0 <= queued_share < 1:
+        raise InputError("recovery.thresholds.queued_share", f"{queued_share} is not in [0, 1)", "give a share")
     if not len(bald_N):
         raise InputError("recovery", "has no calibration samples", "raise recovery.calibration")
-    order = np.argsort(bald_N, kind="stable")
-    sorted_N, right_N = np.asarray(bald_N, float)[order], np.asarray(right_N, bool)[order]
-    above_N = len(sorted_N) - np.searchsorted(sorted_N, sorted_N, side="right")
-    right_above_N = np.array([right_N[len(right_N) - above :].sum() for above in above_N])
-    wrong = (above_N >= FEWEST_ABOVE) & (right_above_N < least_accuracy * above_N)
-    return float(sorted_N[np.argmax(wrong)] if wrong.any() else sorted_N[-1])
+    return float(np.quantile(bald_N, 1 - queued_share, method="inverted_cdf"))

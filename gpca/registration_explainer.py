@@ -19,9 +19,10 @@ from gpca.batched_icp import BatchedICP
 from gpca.canonical_frame import CanonicalFrame, require_cloud_points, thinned
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
-from gpca.explanation import MOST_ENTROPY, Explanation, Spread, recommended_action
+from gpca.explanation import Explanation, Spread
 from gpca.model import Model, model_path
 from gpca.objects.canonical import estimated_normals
+from gpca.recovery import RecoveryPolicy
 from gpca.rigid import require_rigid, transform
 from gpca.seeds import generator
 from gpca.uncertainty import UncertaintySettings, run_from_starts
@@ -34,15 +35,15 @@ class Explainer:
 
     Args:
         model: by default that of :func:`gpca.model.model_path`.
-        most_entropy: of the scores in nats; above it, the action is to ask for a label.
+        policy: from scores to what to do; by default the model's own.
         device: of the encoder; by default a GPU where torch finds one.
     """
 
     def __init__(
-        self, model: Model | None = None, most_entropy: float = MOST_ENTROPY, device: str | None = None
+        self, model: Model | None = None, policy: RecoveryPolicy | None = None, device: str | None = None
     ) -> None:
         self.model = Model.load(model_path()) if model is None else model
-        self.most_entropy = most_entropy
+        self.policy = self.model.policy if policy is None else policy
         self._device = best_device() if device is None else torch.device(device)
         self.model.encoder.to(self._device)
 
@@ -96,7 +97,7 @@ class Explainer:
                 spread = _spread(icp, source, T_icp, uncertainty, frame.diameter)
         if fitness == 0:
             notes.append("no source point is near the target at the initial pose, so the scores mean nothing")
-        concept, uncertain = self.model.concepts[scores_C.argmax()], float(entropy(scores_C))
+        decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
         return Explanation(
             T_target_source=frame.pose_outside(T_icp) @ T_init,
             fitness=float(fitness),
@@ -104,9 +105,10 @@ class Explainer:
             scores=dict(zip(self.model.concepts, scores_C.tolist(), strict=True)),
             variances=dict(zip(self.model.concepts, variances_C.tolist(), strict=True)),
             bald=float(bald),
-            entropy=uncertain,
-            concept=concept,
-            action=recommended_action(concept, uncertain, self.most_entropy),
+            entropy=float(entropy(scores_C)),
+            concept=self.model.concepts[scores_C.argmax()],
+            action=decision.action,
+            reason=decision.reason,
             spread=spread,
             unit=unit,
             seconds=seconds | {"total": perf_counter() - started},

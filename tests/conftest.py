@@ -49,6 +49,7 @@ def model(registrations):
     from gpca.gpc import GPC, GPCSettings
     from gpca.model import Model
     from gpca.perturbation import CONCEPTS
+    from gpca.recovery import RecoveryPolicy, Thresholds
     from gpca.registration import ICPSettings
 
     settings = EncoderSettings(points=64, draws=2, options={"k": 8, "point_features": 16})
@@ -58,4 +59,5 @@ def model(registrations):
     h_S_d, _ = embed(network, train, "tiny", 0, settings)
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, iterations=40, inducing=12, draws=200), "tiny", 0)
     gpc.fit(h_S_d, train.concept)
-    return Model(network.encoder, settings, gpc, ICPSettings(), 256, "Tiny", stand_in=True)
+    policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
+    return Model(network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", stand_in=True)

@@ -16,8 +16,15 @@ from gpca import __main__ as command_line
 from gpca.__main__ import STEPS, main
 from gpca.code_files import ROOT
 from gpca.files import save_arrays
+from gpca.model import Model
+from gpca.recovery import RecoveryPolicy, Thresholds
 
 ENCODER = {"points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
+POLICY = {
+    "thresholds": {"uncertain": None, "queued_share": 0.1, "dominant": 0.4, "improvement": 0.1},
+    "treatments": {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"},
+    "loop": {"budget": 3},
+}
 LEARNING = {
     "held_out": ["noise", "overlap"], "initial": 6, "labels": 4, "batch": 2, "rare_share": 0.2, "rare_labels": 2,
     "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
@@ -90,7 +97,7 @@ STEP_OPTIONS = {
     },
     "model": COMMON | {
         "--settings": {"encoder": ENCODER, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
-                       "registrations": {"points": 128}},
+                       "registrations": {"points": 128}, "recovery": POLICY},
         "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
         "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--out": "model.pt",
     },
@@ -449,6 +456,16 @@ def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys
     text = capsys.readouterr().out
     for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
         assert word in text
+
+
+def test_the_model_holds_the_policy_of_the_config_with_a_threshold_of_its_own(folder, made):
+    assert Model.load(made / "model.pt").policy.thresholds.uncertain > 0
+    declared = STEP_OPTIONS["model"]["--settings"] | {
+        "recovery": POLICY | {"thresholds": POLICY["thresholds"] | {"uncertain": 0.125}}
+    }
+    assert main(arguments("model", {"--settings": declared, "--out": "declared.pt"})) == 0
+    policy = Model.load(folder / "declared.pt").policy
+    assert policy == RecoveryPolicy(Thresholds(0.125, 0.4, 0.1, 3), POLICY["treatments"])
 
 
 def test_a_model_made_anew_is_the_same_to_the_byte(folder, made):

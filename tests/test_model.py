@@ -28,7 +28,7 @@ def test_a_loaded_model_says_the_same(model, path):
         model.gpc.attribute(embeddings(model)), loaded.gpc.attribute(embeddings(model)), strict=True
     ):
         np.testing.assert_array_equal(actual, expected)
-    for name in ("encoder_settings", "icp", "points", "title", "stand_in", "concepts"):
+    for name in ("encoder_settings", "icp", "points", "policy", "title", "stand_in", "concepts"):
         assert getattr(loaded, name) == getattr(model, name)
 
 
@@ -61,7 +61,7 @@ def changed(**changes):
         (lambda path: os.truncate(path, 1000), "is damaged or no model"),
         (lambda path: path.write_bytes(pickle.dumps(print, protocol=2)), "is damaged or no model"),
         (lambda path: torch.save({"weights": torch.zeros(3)}, path), "is no model"),
-        (changed(version=7), "is a model of version 7, not of version 1; make one with"),
+        (changed(version=7), "is a model of version 7, not of version 2; make one with"),
         (changed(gpc=None), "something missing or damaged .*'gpc'"),
         (changed(encoder={}), "something missing or damaged"),
     ],

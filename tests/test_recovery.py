@@ -3,7 +3,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
-from gpca.recovery import FEWEST_ABOVE, QUEUE, RecoveryPolicy, Thresholds, Treated, choose_uncertain
+from gpca.recovery import QUEUE, RecoveryPolicy, Thresholds, Treated, choose_uncertain
 
 POLICY = RecoveryPolicy(Thresholds(uncertain=0.3, dominant=0.4, improvement=0.1, attempts=3))
 
@@ -51,23 +51,21 @@ def test_a_concept_that_nothing_treats_is_queued():
     assert policy.decide(scores(noise=0.1, pose=0.8, overlap=0.1)).action == "reinitialise"
 
 
-def test_the_chosen_uncertainty_is_the_lowest_above_which_most_are_wrong():
-    bald_N = np.arange(20) / 20
-    right_N = np.arange(20) < 12  # the eight most uncertain are wrong
-    chosen = choose_uncertain(bald_N, right_N, 0.5)
-    above = right_N[bald_N > chosen]
-    assert above.mean() < 0.5
-    lower = bald_N[bald_N < chosen]
-    assert all(right_N[bald_N > value].mean() >= 0.5 for value in lower)
-    order = np.random.default_rng(0).permutation(20)
-    assert choose_uncertain(bald_N[order], right_N[order], 0.5) == chosen
+def test_the_chosen_uncertainty_is_exceeded_by_the_declared_share_at_most():
+    bald_N = np.random.default_rng(0).permutation(20) / 20
+    for share, above in ((0.0, 0), (0.04, 0), (0.05, 1), (0.25, 5)):
+        assert (bald_N > choose_uncertain(bald_N, share)).sum() == above
+    assert choose_uncertain(np.array([0.2]), 0.5) == 0.2
 
 
-def test_where_none_is_mostly_wrong_only_what_is_more_uncertain_than_all_is_queued():
-    bald_N = np.linspace(0, 0.4, 30)
-    assert choose_uncertain(bald_N, np.ones(30, bool), 0.5) == 0.4
-    few_wrong = np.arange(30) < 30 - FEWEST_ABOVE // 2  # too few to tell
-    assert choose_uncertain(bald_N, few_wrong, 0.5) == 0.4
+def test_the_policy_of_a_config_chooses_only_what_is_not_declared():
+    thresholds = {"uncertain": None, "queued_share": 0.25, "dominant": 0.4, "improvement": 0.1}
+    bald_N = np.arange(8) / 8
+    chosen = RecoveryPolicy.of_settings(thresholds, {"pose": "reinitialise"}, 2, bald_N)
+    assert chosen.thresholds == Thresholds(0.625, 0.4, 0.1, 2)
+    assert chosen.treatments == {"pose": "reinitialise"}
+    declared = RecoveryPolicy.of_settings(thresholds | {"uncertain": 0.2}, {}, 2, bald_N)
+    assert declared.thresholds.uncertain == 0.2
 
 
 @pytest.mark.parametrize(
@@ -88,6 +86,6 @@ def test_thresholds_out_of_order_or_range_are_refused(given, fault):
 
 def test_no_calibration_samples_and_a_share_out_of_range_are_refused():
     with pytest.raises(InputError, match="no calibration samples"):
-        choose_uncertain(np.zeros(0), np.zeros(0, bool), 0.5)
-    with pytest.raises(InputError, match=r"not in \(0, 1\]"):
-        choose_uncertain(np.zeros(3), np.ones(3, bool), 0.0)
+        choose_uncertain(np.zeros(0), 0.5)
+    with pytest.raises(InputError, match=r"not in \[0, 1\)"):
+        choose_uncertain(np.zeros(3), 1.0)

@@ -9,7 +9,8 @@ import pytest
 from gpca import CanonicalFrame, Explainer
 from gpca.code_files import ROOT
 from gpca.errors import InputError
-from gpca.explanation import ABSTAIN, ACTIONS, recommended_action
+from gpca.explanation import WORDS
+from gpca.recovery import QUEUE, RecoveryPolicy, Thresholds
 from gpca.registration import ICP, ICPSettings
 from gpca.rigid import inverse, transform
 from gpca.twist import exp
@@ -133,25 +134,26 @@ def test_an_explanation_is_json_and_text(explainer, pair):
     assert np.array(plain["T_target_source"]).shape == (4, 4)
     assert plain["spread"]["starts"] == 13
     text = explanation.text()
-    for word in (explanation.concept, explanation.action, "variance", "BALD", "over 13 starts"):
+    for word in (explanation.concept, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
         assert word in text
     stages = ["preparation", "icp", "embedding", "attribution", "uncertainty"]
     assert list(plain["seconds"]) == [*stages, "total"]
     assert plain["seconds"]["total"] >= sum(plain["seconds"][stage] for stage in stages)
 
 
-@pytest.mark.parametrize(
-    ("concept", "entropy", "action"),
-    [
-        ("pose", 0.1, ACTIONS["pose"]),
-        ("overlap", 0.1, ACTIONS["overlap"]),
-        ("noise", 0.1, ACTIONS["noise"]),
-        ("noise", 0.8, ABSTAIN),
-        ("rain", 0.1, ABSTAIN),
-    ],
-)
-def test_what_to_do(concept, entropy, action):
-    assert recommended_action(concept, entropy, most_entropy=0.5) == action
+def test_the_action_is_that_of_the_models_policy(explainer, model, pair):
+    said = explainer.explain(*pair)
+    decision = model.policy.decide(scores(said), said.bald)
+    assert (said.action, said.reason) == (decision.action, decision.reason)
+    assert said.action == model.policy.treatments[said.concept]
+    assert f"{WORDS[said.action]} ({said.reason})" in said.text()
+
+
+@pytest.mark.parametrize("thresholds", [Thresholds(uncertain=0.0), Thresholds(dominant=0.999)])
+def test_a_policy_of_ones_own_queues_what_it_finds_uncertain(model, pair, thresholds):
+    said = Explainer(model, RecoveryPolicy(thresholds), device="cpu").explain(*pair)
+    assert said.action == QUEUE
+    assert WORDS[QUEUE] in said.text()
 
 
 def changed(**changes):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from gpca.dataset import Registrations, load_embeddings
@@ -13,12 +14,21 @@ from gpca.gpc import GPC, GPCSettings
 from gpca.model import Model
 from gpca.perturbation import CONCEPTS
 from gpca.provenance import recorded
+from gpca.recovery import RecoveryPolicy
 from gpca.registration import ICPSettings
 from gpca.settings import check_settings
 
+SECTIONS = {
+    "encoder": ("encoders", "*"),
+    "gpc": ("explainers", "gpca"),
+    "registrations": ("registrations",),
+    "recovery": ("recovery",),
+}
+CALIBRATION = 5  # one training sample of so many is kept from a first classifier, which the threshold is chosen with
+
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` holds ``encoder``, ``gpc`` and ``registrations`` of the config."""
+    """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config."""
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=int)
     parser.add_argument("--title", required=True, help="of the objects, as explanations name them")
@@ -30,26 +40,40 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Fit the classifier to the training samples and write it with the encoder."""
+    """Fit the classifier to the training samples and write it with the encoder and the policy."""
     torch.set_num_threads(options.threads)
-    encoder, gpc, made = (options.settings.get(name) or {} for name in ("encoder", "gpc", "registrations"))
-    check_settings(encoder, "encoders", "*")
-    check_settings(gpc, "explainers", "gpca")
-    check_settings(made, "registrations")
+    given = {name: options.settings.get(name) or {} for name in SECTIONS}
+    for name, section in SECTIONS.items():
+        check_settings(given[name], *section)
     inputs = [options.registrations, options.encoder, options.embeddings]
     with recorded([options.out], inputs, options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
         train = registrations.rows("train")
-        settings = EncoderSettings(**encoder)
+
+        def fitted(rows: np.ndarray) -> GPC:
+            gpc = GPC(CONCEPTS, GPCSettings(**given["gpc"]), options.source, options.seed)
+            return gpc.fit(h_S_d[rows], registrations.concept[rows])
+
+        settings = EncoderSettings(**given["encoder"])
         Model(
             encoder=load_model(options.encoder, settings).encoder,
             encoder_settings=settings,
-            gpc=GPC(CONCEPTS, GPCSettings(**gpc), options.source, options.seed).fit(
-                h_S_d[train], registrations.concept[train]
-            ),
-            icp=ICPSettings(**made.get("icp", {})),
-            points=made.get("points", 2048),
+            gpc=fitted(train),
+            icp=ICPSettings(**given["registrations"].get("icp", {})),
+            points=given["registrations"].get("points", 2048),
+            policy=_policy(given["recovery"], train, fitted, h_S_d),
             title=options.title,
             stand_in=options.stand_in,
         ).save(options.out)
+
+
+def _policy(recovery: dict, train: np.ndarray, fitted, h_S_d: np.ndarray) -> RecoveryPolicy:
+    """Return the config's policy; its threshold is chosen on training samples that a classifier did not learn."""
+    if not recovery:
+        return RecoveryPolicy()
+    kept = np.arange(len(train)) % CALIBRATION == CALIBRATION - 1
+    _, _, bald_N = fitted(train[~kept]).attribute(h_S_d[train[kept]])
+    return RecoveryPolicy.of_settings(
+        recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"], bald_N
+    )

@@ -25,13 +25,14 @@ from gpca.objects import procedural
 from gpca.policies import policy_entry
 from gpca.predictions import write_csv
 from gpca.provenance import recorded
-from gpca.recovery import FEWEST_ABOVE, RecoveryPolicy, Thresholds, choose_uncertain
+from gpca.recovery import RecoveryPolicy
 from gpca.recovery_example import save_example
 from gpca.settings import check_settings
 from gpca.synthesis import RegistrationSettings
 from gpca.uncertainty import UncertaintySettings
 
 SOURCE = "recovery"  # names every random number of this step, tables included
+FEWEST_FAILED = 10  # calibration samples, for a threshold to be chosen on the failed ones alone
 SECTIONS = {
     "recovery": ("recovery",),
     "scenes": ("real_world", "scenes"),
@@ -101,14 +102,11 @@ def robot_policy(recovery: dict, explainers: LoopExplainers, failed_N: np.ndarra
 
     Chosen on those that failed (N,), since a policy is asked about such; on all where hardly any did.
     """
-    declared = dict(recovery["thresholds"])
-    least_accuracy, gpca = declared.pop("least_accuracy"), explainers.calibration.get("gpca")
-    if declared["uncertain"] is None and gpca is None:
-        declared["uncertain"] = float("inf")
-    if declared["uncertain"] is None:
-        rows = failed_N if failed_N.sum() >= FEWEST_ABOVE else np.ones(len(failed_N), bool)
-        declared["uncertain"] = choose_uncertain(gpca.bald_N[rows], explainers.right("gpca")[rows], least_accuracy)
-    return RecoveryPolicy(Thresholds(**declared, attempts=recovery["loop"]["budget"]), recovery["treatments"])
+    gpca = explainers.calibration.get("gpca")
+    bald_N = np.full(len(failed_N), np.inf) if gpca is None else gpca.bald_N
+    rows = failed_N if failed_N.sum() >= FEWEST_FAILED else np.ones(len(failed_N), bool)
+    attempts = recovery["loop"]["budget"]
+    return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N[rows])
 
 
 def _check(given: dict) -> None:

@@ -282,17 +282,18 @@ FIGURES = [
     "active_learning_curves",
     "kernel_learning_curves",
     *LEARNER_FIGURES,
+    *RECOVERY_FIGURES,
+    "runtime",
     *(f"objects_{source}" for source in SOURCES),
 ]
-# Not yet part of `all`, but made by their names: model.pt, runtime.csv, recovery.csv, Tables VII and VIII, their figures.
 RESULTS = [
     *("metrics.csv", "timings.csv", "active_learning.csv"),
-    *("real_world.csv", "diagnostics.csv"),
+    *("real_world.csv", "diagnostics.csv", "model.pt", "runtime.csv", "recovery.csv"),
     *(
         f"tables/{table}.md"
         for tables in (TABLE_EXPLAINERS, LEARNING_TABLES, KERNEL_TABLES, LEARNER_TABLES)
         for table in tables
     ),
-    "tables/table6_backbones.md",
+    *("tables/table6_backbones.md", "tables/table7_runtime.md", "tables/table8_recovery.md"),
     *(f"figures/{figure}.png" for figure in FIGURES),
 ]

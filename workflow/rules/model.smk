@@ -39,6 +39,11 @@ rule model:
                 "registrations": {
                     name: config["registrations"][name] for name in ("points", "icp")
                 },
+                "recovery": {
+                    "thresholds": RECOVERY["thresholds"],
+                    "treatments": RECOVERY["treatments"],
+                    "loop": {"budget": RECOVERY["loop"]["budget"]},
+                },
             },
             sort_keys=True,
         ),
