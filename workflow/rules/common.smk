@@ -294,6 +294,10 @@ RESULTS = [
         for tables in (TABLE_EXPLAINERS, LEARNING_TABLES, KERNEL_TABLES, LEARNER_TABLES)
         for table in tables
     ),
-    *("tables/table6_backbones.md", "tables/table7_runtime.md", "tables/table8_recovery.md"),
+    *(
+        "tables/table6_backbones.md",
+        "tables/table7_runtime.md",
+        "tables/table8_recovery.md",
+    ),
     *(f"figures/{figure}.png" for figure in FIGURES),
 ]
