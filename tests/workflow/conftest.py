@@ -19,10 +19,35 @@ NEEDED = ("Snakefile", "config", "gpca", "baselines", "workflow", "profiles", "e
 
 @dataclass(frozen=True)
 class DryRun:
-    """What Snakemake would do: how many jobs of each rule (`all` left out), and the files that they write."""
+    """What Snakemake would do: how many jobs of each rule (`all` left out), and the files that they write.
+
+    Attributes:
+        plan: rule, inputs and outputs of every job, in the order in which they would run.
+        messages: what was said besides.
+    """
 
     jobs: Counter
     outputs: set[str]
+    plan: tuple[tuple[str, set[str], set[str]], ...]
+    messages: str
+
+    def behind(self, path):
+        """How many jobs of each rule read the file, or what comes of it."""
+        changed, jobs = {path}, Counter()
+        for rule, inputs, outputs in self.plan:
+            if rule != "all" and inputs & changed:
+                changed |= outputs
+                jobs[rule] += 1
+        return jobs
+
+    def before(self, path):
+        """How many jobs of each rule it takes to make the file."""
+        needed, jobs = {path}, Counter()
+        for rule, inputs, outputs in reversed(self.plan):
+            if outputs & needed:
+                needed |= inputs
+                jobs[rule] += 1
+        return jobs
 
 
 @dataclass(frozen=True)
@@ -38,11 +63,17 @@ class Project:
         return self._python("-m", "gpca", *arguments, check=check)
 
     def dry_run(self, *arguments):
-        lines = self.snakemake("-n", *arguments).stdout.splitlines()
-        outputs = [line.split(": ", 1)[1].split(", ") for line in lines if line.startswith("    output: ")]
-        counts = re.findall(r"^(\w+) +(\d+)$", "\n".join(lines), flags=re.MULTILINE)
+        done = self.snakemake("-n", *arguments)
+        counts = re.findall(r"^(\w+) +(\d+)$", done.stdout, flags=re.MULTILINE)
         jobs = Counter({rule: int(count) for rule, count in counts if rule not in ("all", "total")})
-        return DryRun(jobs, {path for paths in outputs for path in paths})
+        plan = []
+        for job in re.split(r"^(?:local)?rule ", done.stdout, flags=re.MULTILINE)[1:]:
+            files = {
+                name: set(paths.split(", ")) for name, paths in re.findall(r"^    (input|output): (.+)$", job, re.M)
+            }
+            plan.append((job.split(":")[0], files.get("input", set()), files.get("output", set())))
+        outputs = {path for _, _, written in plan for path in written}
+        return DryRun(jobs, outputs, tuple(plan), done.stderr)
 
     def start(self, *arguments):
         """Start Snakemake as the leader of a process group of its own."""
@@ -96,6 +127,13 @@ def _sources_copied(origin, folder):
 def project(tmp_path):
     """A fresh copy without results."""
     return _sources_copied(ROOT, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def planned(tmp_path_factory):
+    """The whole smoke run, planned in a copy without results."""
+    project = _sources_copied(ROOT, tmp_path_factory.mktemp("planned"))
+    return project.dry_run("all", "--configfile", "config/smoke.yaml")
 
 
 @pytest.fixture(scope="session")

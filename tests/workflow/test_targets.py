@@ -34,30 +34,25 @@ def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project)
     assert not [path for path in table1.outputs if "lazy" in path or "removal" in path or "figures" in path]
 
 
-def test_table3_needs_no_uncertainty_and_no_explainer(project):
-    planned = project.dry_run("results/smoke/tables/table3_active_learning.md", "--configfile", "config/smoke.yaml")
-    assert planned.jobs == {
+def test_table3_needs_no_uncertainty_and_no_explainer(planned):
+    assert planned.before("results/smoke/tables/table3_active_learning.md") == {
         "objects": 3, "registrations": 6, "encoder": 6, "embeddings": 6, "embeddings_without": 6, "active_learning": 6,
         "active_learning_metrics": 1, "learning_table": 1,
     }  # fmt: skip
 
 
-def test_table4_needs_its_sources_alone_and_table5_no_explainer(project):
-    smoke = ("--configfile", "config/smoke.yaml")
-    planned = project.dry_run("results/smoke/tables/table4_kernels.md", *smoke)
-    assert planned.jobs == {
+def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
+    assert planned.before("results/smoke/tables/table4_kernels.md") == {
         "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "kernels": 1, "kernel_table": 1,
     }  # fmt: skip
-    planned = project.dry_run("results/smoke/tables/table5_learners.md", *smoke)
-    assert planned.jobs == {
+    assert planned.before("results/smoke/tables/table5_learners.md") == {
         "objects": 3, "registrations": 6, "encoder": 6, "embeddings": 6, "shift": 3, "learn": 3, "diagnostics": 1,
         "learner_table": 1,
     }  # fmt: skip
 
 
-def test_table6_needs_the_frames_alone(project):
-    planned = project.dry_run("results/smoke/tables/table6_backbones.md", "--configfile", "config/smoke.yaml")
-    assert planned.jobs == {
+def test_table6_needs_the_frames_alone(planned):
+    assert planned.before("results/smoke/tables/table6_backbones.md") == {
         "scenes": 1, "instances": 1, "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2,
         "explain": 2, "explain_with_backbone": 4, "real_world_metrics": 1, "table6_backbones": 1,
     }  # fmt: skip
@@ -109,7 +104,12 @@ EDITS = {
 
 
 @pytest.mark.parametrize("module", EDITS)
-def test_an_edit_reruns_the_rules_that_use_the_module_and_no_other(finished, module):
+def test_the_rules_that_use_a_module_depend_on_it_and_no_other(planned, module):
+    assert planned.behind(module) == EDITS[module]
+
+
+@pytest.mark.parametrize("module", ["gpca/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/uw_rgbd.py"])
+def test_an_edit_reruns_what_depends_on_the_module(finished, module):
     finished.append(module, "\n# edited\n")
     assert finished.dry_run(*SMOKE).jobs == EDITS[module]
 
