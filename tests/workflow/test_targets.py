@@ -10,7 +10,11 @@ DIAGNOSED = {"learn": 3, "diagnostics": 1, "learner_table": 3, "learner_figure":
 KERNELS = {"kernels": 1, "kernel_table": 2, "kernel_learning_curves": 1}
 PICTURES = {"fig5_real_world_example": 1, "real_world_failures": 1}
 REAL_WORLD = {"real_world_metrics": 1, "table6_backbones": 1, "confusion_real_world": 1} | PICTURES
-BACKBONES = {"explain_with_backbone": 4} | REAL_WORLD
+BACKBONES = {"explain_with_backbone": 2} | REAL_WORLD
+RUNTIME = {"runtime": 1, "table7_runtime": 1, "runtime_figure": 1}
+MODEL = {"model": 1} | RUNTIME
+RECOVERY_FIGURES = {"recovery_figure": 3}
+RECOVERY = {"recover": 2, "recovery_metrics": 1, "table8_recovery": 1} | RECOVERY_FIGURES
 # Explainers times three sources: those with a GPC, those on embeddings, those on uncertainties, all.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 3 * explainers} for explainers in (4, 4, 13))
 WITH_GPC["explain"] += 2  # classic features on depth frames
@@ -53,8 +57,18 @@ def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
 
 def test_table6_needs_the_frames_alone(planned):
     assert planned.before("results/smoke/tables/table6_backbones.md") == {
-        "scenes": 1, "instances": 1, "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2,
-        "explain": 2, "explain_with_backbone": 4, "real_world_metrics": 1, "table6_backbones": 1,
+        "scenes": 1, "instances": 1, "frame_registrations": 2, "encoder": 2, "embeddings": 2, "reduced_embeddings": 1,
+        "explain": 2, "explain_with_backbone": 2, "real_world_metrics": 1, "table6_backbones": 1,
+    }  # fmt: skip
+
+
+def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
+    assert planned.before("results/smoke/tables/table7_runtime.md") == {
+        "scenes": 1, "instances": 1, "frame_registrations": 1, "encoder": 1, "embeddings": 1, "model": 1, "runtime": 1,
+        "table7_runtime": 1,
+    }  # fmt: skip
+    assert planned.before("results/smoke/tables/table8_recovery.md") == {
+        "recover": 2, "recovery_metrics": 1, "table8_recovery": 1,
     }  # fmt: skip
 
 
@@ -64,29 +78,31 @@ def test_a_finished_run_has_nothing_to_do(finished):
 
 
 EDITS = {
-    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED | DIAGNOSED | KERNELS | BACKBONES,
+    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED | DIAGNOSED | KERNELS | BACKBONES
+    | MODEL | RECOVERY,
     "gpca/shift.py": {"shift": 3} | DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/kernel_figure.py": {"kernel_learning_curves": 1},
-    "gpca/acquisition.py": {"active_learning": 6} | LEARNED,
-    "gpca/stream.py": {"active_learning": 6} | LEARNED,
+    "gpca/acquisition.py": {"active_learning": 6} | LEARNED | RUNTIME,
+    "gpca/stream.py": {"active_learning": 6} | LEARNED | RUNTIME,
     "gpca/reporting/learning_figure.py": {"active_learning_curves": 1},
     # Not Table II: it shows GP-CA alone.
-    "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2},
-    "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
+    "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2} | RUNTIME | RECOVERY,
+    "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1} | RECOVERY,
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
-    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | PICTURES,
+    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | PICTURES | RECOVERY_FIGURES,
     # Not the pictures: they show an encoder without reduction.
     "gpca/reduction.py": {
-        "reduced_embeddings": 2, "explain_with_backbone": 2, "real_world_metrics": 1, "table6_backbones": 1,
+        "reduced_embeddings": 1, "explain_with_backbone": 1, "real_world_metrics": 1, "table6_backbones": 1,
         "confusion_real_world": 1,
     },
     "gpca/frames/occlusion.py": {
-        "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2, "explain": 2,
-    } | BACKBONES,
+        "frame_registrations": 2, "encoder": 2, "embeddings": 2, "reduced_embeddings": 1, "explain": 2,
+    } | BACKBONES | MODEL,
     "gpca/frames/bop.py": {
-        "instances": 1, "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2, "explain": 2,
-    } | BACKBONES,
+        "instances": 1, "frame_registrations": 2, "encoder": 2, "embeddings": 2, "reduced_embeddings": 1, "explain": 2,
+    } | BACKBONES | MODEL | RECOVERY,
+    "gpca/recovery.py": MODEL | RECOVERY,
     "gpca/reporting/tables.py": {
         "table": 3, "learning_table": 3, "learner_table": 3, "kernel_table": 2, "kernel_learning_curves": 1,
     },
@@ -94,7 +110,7 @@ EDITS = {
     "gpca/encoders/dgcnn.py": {
         "encoder": 8, "embeddings": 8, "embeddings_without": 6, "active_learning": 6, "shift": 3,
         "reduced_embeddings": 1,
-    } | BACKBONES | {"explain_with_backbone": 2} | ON_EMBEDDINGS | COLLECTORS | LEARNED | DIAGNOSED | KERNELS,
+    } | BACKBONES | ON_EMBEDDINGS | COLLECTORS | LEARNED | DIAGNOSED | KERNELS | MODEL | RECOVERY,
     "gpca/objects/uw_rgbd.py": {},
     "gpca/objects/shapes/cups.py": {
         "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
