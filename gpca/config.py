@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.actions import action_of
+from gpca.comparison import Tolerance
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry, require_settings
@@ -58,6 +59,8 @@ def check(config: dict) -> dict[str, dict]:
         if explainer_entry(name).reads != "embeddings":
             raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
     with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
+    for unit, tolerance in config["comparison"]["tolerances"].items():
+        with_key(f"comparison.tolerances.{unit}", lambda given: Tolerance(**given), tolerance)
     _check_real_world(config)
     _check_recovery(config)
     sources = {
