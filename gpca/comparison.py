@@ -14,7 +14,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.learning_metrics import CENSORED_BY
 from gpca.metrics import mean_interval, read_metrics
-from gpca.published import UNITS, Counterpart, Number
+from gpca.published import TIMES, UNITS, Counterpart, Number
 from gpca.reasons import Reason, reason_of
 from gpca.reporting.tables import STAND_IN, title_of
 from gpca.runtime_file import read_runtime
@@ -26,7 +26,7 @@ REPRODUCED, CLOSE, NOT_REPRODUCED = "reproduced", "close", "not reproduced"
 NOT_COMPARABLE, NOT_RUN = "not comparable", "not run"
 VERDICTS = (REPRODUCED, CLOSE, NOT_REPRODUCED, NOT_COMPARABLE, NOT_RUN)
 COLUMNS = ("table", "row", "column", "unit", "published", "upper", "deviation", "decimals", "reproduced", "ci_low",
-           "ci_high", "n", "at_least", "difference", "factor", "verdict", "reason", "objects")  # fmt: skip
+           "ci_high", "n", "at_least", "difference", "factor", "verdict", "reason", "objects", "hardware")  # fmt: skip
 RUNTIME = "runtime.csv"
 
 
@@ -99,7 +99,8 @@ def compare(
                 **_columns(number, found, tolerance),
                 "verdict": verdict,
                 "reason": reason,
-                "objects": _objects(number, objects, results, hardware),
+                "objects": _objects(number.counterpart, objects),
+                "hardware": _hardware(number, results, hardware),
             }
         )
     return pd.DataFrame(records, columns=list(COLUMNS)).astype({"n": "Int64"})
@@ -240,18 +241,20 @@ def _of_runtime(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | No
     return Reproduced(mean, mean - half_width, mean + half_width, n)
 
 
-def _objects(number: Number, objects: Mapping, results: Mapping, hardware: str) -> str:
-    """Say which objects the reproduced value is of and, of times, on what it was measured."""
+def _objects(counterpart: Counterpart | None, objects: Mapping[str, Mapping]) -> str:
+    sources = counterpart.sources if counterpart else ()
+    return ", ".join(title_of(objects[source]) for source in sources if source in objects)
+
+
+def _hardware(number: Number, results: Mapping[str, pd.DataFrame], hardware: str) -> str:
+    """Say on what a time was measured; empty of all else."""
     counterpart = number.counterpart
-    if counterpart is None:
+    if counterpart is None or counterpart.file not in results or number.unit not in TIMES:
         return ""
-    titles = [title_of(objects[source]) for source in counterpart.sources if source in objects]
-    if number.unit in ("s", "ms"):
-        if counterpart.file == RUNTIME and RUNTIME in results:
-            rows = results[RUNTIME]
-            hardware = ", ".join(rows.loc[rows["device"] == counterpart.concept, "hardware"].unique())
-        titles += [f"on {hardware}"] if hardware else []
-    return ", ".join(titles)
+    if counterpart.file != RUNTIME:
+        return hardware
+    rows = results[RUNTIME]
+    return ", ".join(rows.loc[rows["device"] == counterpart.concept, "hardware"].unique())
 
 
 def _deviation_of(counterpart: Counterpart | None) -> Counterpart | None:

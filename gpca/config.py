@@ -23,6 +23,9 @@ from gpca.recovery import Thresholds
 from gpca.settings import check_settings, load_schema, require_valid
 from gpca.synthesis import RegistrationSettings
 
+# Where data lies, and how results are judged: two runs that differ in nothing else are runs of one config.
+_OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
+
 
 def check(config: dict) -> dict[str, dict]:
     """Check a configuration against the schema and against what exists.
@@ -135,5 +138,5 @@ def export(config: dict) -> None:
 
     Jobs call ``python``, which need not be the one that runs the workflow where its environment is not activated.
     """
-    os.environ[CONFIG_VARIABLE] = sha256_of_settings(config)
+    os.environ[CONFIG_VARIABLE] = sha256_of_settings({k: v for k, v in config.items() if k not in _OF_NO_RESULT})
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])

@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.diagnostics import calibration_error, negative_log_likelihood
 from gpca.errors import InputError
-from gpca.metrics import ALL, source_method_seed, tidy
+from gpca.metrics import source_method_seed
 from gpca.predictions import numbers, read_csv, write_csv
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from gpca.dataset import Registrations
 
 MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
-TABLE = "kernels"  # what `table` of the tidy rows reads
 COLUMNS = ("kernel", "learning_rate", "iterations", *MEASURES)
 
 
@@ -101,23 +100,3 @@ def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
     if not parts:
         raise InputError("kernels", "no files were given", "name a source in kernels.sources")
     return pd.concat(parts, ignore_index=True)
-
-
-def collect_grids(files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return the tidy metrics (`MEASURES`) of such files, with `method` as :func:`setting_name` has it.
-
-    Raises:
-        InputError: as :func:`read_grids`.
-    """
-    records = [
-        (TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations), measure, ALL, row.seed, value)
-        for row in read_grids(files).itertuples()
-        for measure in MEASURES
-        for value in [float(getattr(row, measure))]
-    ]
-    return tidy(records, "kernels")
-
-
-def setting_name(kernel: str, learning_rate: float, iterations: int) -> str:
-    """Return e.g. ``rbf-0.01-100``."""
-    return f"{kernel}-{learning_rate:g}-{iterations}"

@@ -39,6 +39,7 @@ UNITS = {
     "risk": Unit(1, most=1),  # area under risk and coverage
     "share": Unit(1, most=1),
 }
+TIMES = ("s", "ms")
 _SOURCES = ("Coffee Cup", "LINEMOD", "YCB")
 _REDUCTIONS = ("No Reduction", "PCA", "UMAP", "AE")
 

@@ -105,5 +105,9 @@ def _numbered(rows: pd.DataFrame) -> dict[str, int]:
 
 
 def _objects(rows: pd.DataFrame) -> list[str]:
-    objects = list(dict.fromkeys(text for text in rows["objects"] if text))
-    return [f"Here: {'; '.join(objects)}."] if objects else []
+    shown = rows[rows["reproduced"].notna()]
+    told = []
+    for name in ("objects", "hardware"):
+        if texts := list(dict.fromkeys(text for text in shown[name] if text)):
+            told.append(f"{name.capitalize()} here: {'; '.join(texts)}.")
+    return [" ".join(told)] if told else []

@@ -11,7 +11,7 @@ COMPARED = sorted(
 rule kernel_metrics:
     input:
         grids=KERNEL_GRIDS,
-        code=code_files("gpca.kernel_grid", "gpca.reporting.script"),
+        code=code_files("gpca.kernel_metrics", "gpca.reporting.script"),
     output:
         "results/{run}/kernels.csv",
     log:

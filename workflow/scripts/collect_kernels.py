@@ -1,6 +1,6 @@
 """What every kernel and schedule gives -> kernels.csv."""
 
-from gpca.kernel_grid import collect_grids
+from gpca.kernel_metrics import collect_grids
 from gpca.metrics import write_metrics
 from gpca.reporting.script import job
 
