@@ -117,7 +117,7 @@ def _compared(file: str, here: Mapping, there: Mapping, tolerances: Mapping, hal
     for one, other, told in ((there, here, "lacks"), (here, there, "has beyond the reference")):
         if beyond := [key for key in one if key not in other]:
             return Outcome(file, "differs", f"{told} {len(beyond)} of {len(one)} values, such as {_named(beyond[0])}")
-    worst, detail = 0.0, "no value"
+    worst, detail = 0.0, f"all {len(there)} values are the same"
     for key, mean in there.items():
         kind = kind_of(file, mean.quantity)
         if kind not in tolerances:
@@ -125,10 +125,10 @@ def _compared(file: str, here: Mapping, there: Mapping, tolerances: Mapping, hal
         allowed = max(tolerances[kind], half_widths * mean.half_width)
         difference = here[key].value - mean.value
         excess = abs(difference) / allowed if allowed else (math.inf if difference else 0.0)
-        if excess >= worst:
+        if excess > worst:
             worst = excess
-            detail = f"{difference:+.4g} where {allowed:.4g} is allowed ({kind}), at {_named(key)}"
-    return Outcome(file, "differs" if worst > 1 else "agrees", f"largest difference {detail}")
+            detail = f"largest difference {difference:+.4g} where {allowed:.4g} is allowed ({kind}), at {_named(key)}"
+    return Outcome(file, "differs" if worst > 1 else "agrees", detail)
 
 
 def _of_tidy(path: Path, rows: list[dict]) -> Iterator[tuple[tuple[str, ...], Mean]]:

@@ -187,16 +187,17 @@ def test_the_first_reason_that_fits_counts():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"table": "VIII"}, "line 3: VIII / * / SHAP is no printed number"),
-        ({"row": "Tea*"}, r"line 3: I / Tea\* / SHAP is no printed number; take names of published.csv, or \*"),
-        ({"column": "shap"}, "line 3: I / * / shap is no printed number".replace("*", r"\*")),
-        ({"reason": ""}, "line 3: 'reason' is empty"),
+        ({"table": "VIII"}, "line 3: VIII / * / SHAP is no printed number; take names of published.csv, or *"),
+        ({"row": "Tea*"}, "line 3: I / Tea* / SHAP is no printed number"),
+        ({"column": "shap"}, "line 3: I / * / shap is no printed number"),
+        ({"reason": ""}, "line 3: 'reason' is empty; say what was found, or remove the line"),
     ],
 )
 def test_a_reason_of_nothing_is_refused(tmp_path, changes, message):
     path = written(tmp_path / "reasons.csv", REASON, REASON | changes, columns=tuple(REASON))
-    with pytest.raises(InputError, match=message.replace("/ * /", r"/ \* /")):
+    with pytest.raises(InputError) as fault:
         read_reasons(NUMBERS, path)
+    assert message in str(fault.value)
 
 
 def test_a_reason_with_a_comma_out_of_quotes_is_refused(tmp_path):

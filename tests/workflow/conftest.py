@@ -63,7 +63,10 @@ class Project:
         """The paths and bytes of all results with one of the suffixes; seconds and memory differ from run to run."""
         files = sorted(path for path in self.folder.glob("results/smoke/**/*") if path.suffix in suffixes)
         relative = {path.relative_to(self.folder / "results/smoke"): path for path in files}
-        measured, drawn_from = ("timings", "timings.csv", "benchmarks", "logs"), ("runtime", "table7_runtime")
+        measured, drawn_from = (
+            ("timings", "timings.csv", "benchmarks", "logs"),
+            ("runtime", "table7_runtime", "comparison"),
+        )
         kept = [name for name in relative if name.parts[0] not in measured and name.stem not in drawn_from]
         return {str(name): relative[name].read_bytes() for name in kept}
 

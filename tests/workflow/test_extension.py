@@ -11,7 +11,7 @@ SMOKE = ("--configfile", "config/smoke.yaml")
 ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19}
 ROW |= {"shift": 1, "learn": 1}
 ROW |= {"objects_figure": 1, "embeddings_without": 2, "active_learning": 2}
-COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
+COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1, "comparison": 1}
 LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
 LEARNED |= {"diagnostics": 1, "learner_table": 3, "learner_figure": 3}
 

@@ -4,12 +4,12 @@ import json
 import pytest
 
 SMOKE = ("all", "--configfile", "config/smoke.yaml")
-COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
-LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
-DIAGNOSED = {"learn": 3, "diagnostics": 1, "learner_table": 3, "learner_figure": 3}
-KERNELS = {"kernels": 1, "kernel_table": 2, "kernel_learning_curves": 1}
+COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1, "comparison": 1}
+LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1, "comparison": 1}
+DIAGNOSED = {"learn": 3, "diagnostics": 1, "learner_table": 3, "learner_figure": 3, "comparison": 1}
+KERNELS = {"kernels": 1, "kernel_metrics": 1, "kernel_table": 2, "kernel_learning_curves": 1, "comparison": 1}
 PICTURES = {"fig5_real_world_example": 1, "real_world_failures": 1}
-REAL_WORLD = {"real_world_metrics": 1, "table6_backbones": 1, "confusion_real_world": 1} | PICTURES
+REAL_WORLD = {"real_world_metrics": 1, "table6_backbones": 1, "confusion_real_world": 1, "comparison": 1} | PICTURES
 BACKBONES = {"explain_with_backbone": 4} | REAL_WORLD
 # Explainers times three sources: those with a GPC, those on embeddings, those on uncertainties, all.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 3 * explainers} for explainers in (4, 4, 13))
@@ -84,7 +84,7 @@ EDITS = {
     # Not the pictures: they show an encoder without reduction.
     "gpca/reduction.py": {
         "reduced_embeddings": 2, "explain_with_backbone": 2, "real_world_metrics": 1, "table6_backbones": 1,
-        "confusion_real_world": 1,
+        "confusion_real_world": 1, "comparison": 1,
     },
     "gpca/frames/occlusion.py": {
         "frame_registrations": 2, "encoder": 4, "embeddings": 4, "reduced_embeddings": 2, "explain": 2,
