@@ -94,6 +94,7 @@ EDITS = {
     } | BACKBONES,
     "gpca/reporting/tables.py": {
         "table": 3, "learning_table": 3, "learner_table": 3, "kernel_table": 2, "kernel_learning_curves": 1,
+        "comparison": 1,
     },
     "gpca/reporting/confusions_figure.py": {"fig_attribution_confusions": 1, "confusion_real_world": 1},
     "gpca/encoders/dgcnn.py": {
