@@ -4,10 +4,11 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: results test smoke lint environment lock clean-environment help
+.PHONY: results test smoke lint check-reference environment lock clean-environment help
 
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
+CHECKED ?= embedded
 PYTEST_ARGS ?=
 # Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
@@ -28,6 +29,9 @@ lint: environment ## ruff, snakefmt and snakemake's own linter
 	ruff format --check .
 	snakefmt --check Snakefile workflow
 	snakemake --lint
+
+check-reference: environment ## whether the numbers of results/CHECKED agree with its reference; reruns nothing
+	$(RUN) python -m gpca check-reference results/$(CHECKED)
 
 environment: .venv/complete ## only the virtual environment
 

@@ -32,15 +32,19 @@ STEPS = {
     "model": "encoder and embeddings -> one file with all that an explanation needs",
     "explain": "two files of points -> why their registration is uncertain, and what to do",
     "runtime": "model, registrations and embeddings -> seconds of every stage",
+    "check-reference": "folder of a run -> whether its numbers agree with the reference's",
 }
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one step; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130."""
+    """Run one step; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130.
+
+    A step that checks something ends with status 1 where the check fails.
+    """
     arguments = sys.argv[1:] if arguments is None else arguments
     chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
     try:
-        _run(arguments, chosen)
+        return _run(arguments, chosen)
     except (InputError, OSError) as fault:
         print(f"gpca {chosen}: {fault}", file=sys.stderr)
         return 2
@@ -53,10 +57,9 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
         return 130
-    return 0
 
 
-def _run(arguments: list[str], chosen: str | None) -> None:
+def _run(arguments: list[str], chosen: str | None) -> int:
     parser = argparse.ArgumentParser(prog="python -m gpca", description=__doc__)
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
     for name, summary in STEPS.items():
@@ -66,12 +69,12 @@ def _run(arguments: list[str], chosen: str | None) -> None:
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
             _keep_freed_memory()
-            module = import_module(f"gpca.steps.{name}")
+            module = import_module(f"gpca.steps.{name.replace('-', '_')}")
             module.add_arguments(step)
             step.set_defaults(run=module.run)
     options = parser.parse_args(arguments)
     options.settings = _mapping(options.settings)
-    options.run(options)
+    return options.run(options) or 0
 
 
 def _set_threads(arguments: list[str]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.actions import action_of
+from gpca.comparison import Tolerance
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.explainer import explainer_entry, require_settings
@@ -21,6 +22,9 @@ from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
 from gpca.recovery import Thresholds
 from gpca.settings import check_settings, load_schema, require_valid
 from gpca.synthesis import RegistrationSettings
+
+# Where data lies, and how results are judged: two runs that differ in nothing else are runs of one config.
+_OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
 
 
 def check(config: dict) -> dict[str, dict]:
@@ -58,6 +62,8 @@ def check(config: dict) -> dict[str, dict]:
         if explainer_entry(name).reads != "embeddings":
             raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
     with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
+    for unit, tolerance in config["comparison"]["tolerances"].items():
+        with_key(f"comparison.tolerances.{unit}", lambda given: Tolerance(**given), tolerance)
     _check_real_world(config)
     _check_recovery(config)
     sources = {
@@ -132,5 +138,5 @@ def export(config: dict) -> None:
 
     Jobs call ``python``, which need not be the one that runs the workflow where its environment is not activated.
     """
-    os.environ[CONFIG_VARIABLE] = sha256_of_settings(config)
+    os.environ[CONFIG_VARIABLE] = sha256_of_settings({k: v for k, v in config.items() if k not in _OF_NO_RESULT})
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])

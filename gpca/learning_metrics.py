@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 TABLE = "active_learning/"  # and the setting: what `table` of the tidy rows reads
 RANDOM = "random"  # the strategy that the others are compared with, seed by seed
+# A count that ended with the budget where the share beside it is below 1: its mean is a lower bound then.
+CENSORED_BY = {"labels_to_target": "reached", "epochs_to_target": "reached", "delay": "recognised"}
 RECOGNISED = 0.5  # share of a new concept's test samples named right, from which on it counts as recognised
 
 

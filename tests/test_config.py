@@ -77,6 +77,10 @@ FAULTS = [
     ("sources.ycb.famly", "ycb", "sources.ycb.famly: unknown; did you mean family?"),
     ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
     ("recovery.thresholds.dominnat", 0.4, "recovery.thresholds.dominnat: unknown; did you mean dominant?"),
+    ("comparison.tolerances.labels.close", 1, "comparison.tolerances.labels: tolerance: 4 and 1; it has to be 0 <= "),
+    ("comparison.tolerances.s.reproduced", 0.5, "comparison.tolerances.s: tolerance: 0.5 and 3; it has to be 1 <= "),
+    ("comparison.tolerances.weeks", {"reproduced": 1, "close": 2}, "comparison.tolerances.weeks: unknown; known are %"),
+    ("reference.tolerances.share", -1, "reference.tolerances.share: -1 is less than the minimum of 0"),
     ("recovery.thresholds.dominant", 1.5, "recovery.thresholds.dominant: 1.5 is greater than the maximum of 1"),
     ("recovery.thresholds.improvement", 0.5, "recovery.thresholds: recovery thresholds: improvement 0.5 is not below"),
     ("recovery.policies", ["gpac"], "recovery.policies: recovery policy 'gpac': unknown; known are gpca, "),
@@ -234,10 +238,12 @@ def test_jobs_inherit_the_hash_of_the_config_and_this_python(monkeypatch):
     monkeypatch.setenv("GPCA_CONFIG_SHA256", "")
     monkeypatch.setenv("PATH", "/bin")
     hashes = []
-    for config in (load(), dict(reversed(load().items())), changed("seeds", [7])):
+    same = (load(), dict(reversed(load().items())), changed("data_dir", "/data"), changed("comparison.tolerances", {}))
+    for config in (*same, changed("seeds", [7])):
         run_config.export(config)
         hashes.append(os.environ["GPCA_CONFIG_SHA256"])
-    assert hashes[0] == hashes[1] != hashes[2]
+    assert len(set(hashes[:4])) == 1
+    assert hashes[4] != hashes[0]
     assert os.path.dirname(shutil.which("python")) == os.path.dirname(sys.executable)
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.errors import InputError
-from gpca.learning_metrics import TABLE
+from gpca.learning_metrics import CENSORED_BY, TABLE
 from gpca.metrics import mean_interval
 from gpca.reporting.table import Cell, Column, Table
 from gpca.reporting.tables import STAND_IN, title_of
@@ -175,7 +175,7 @@ def table3_stream(
 
 
 LEARNING_TABLES = {table.__name__: table for table in (table3_active_learning, table3_extended, table3_stream)}
-_CENSORED_BY = {"labels_to_target": "reached", "epochs_to_target": "reached", "delay": "recognised"}
+
 _SHARES = ("reached", "area_under_curve", "area_gain")  # and every accuracy: in [0, 1], printed in %
 
 
@@ -208,7 +208,7 @@ def _cell(metrics: pd.DataFrame, quantity: Quantity) -> Cell | None:
         return None
     scale = 100 if quantity.metric in _SHARES or "accuracy" in quantity.metric else 1
     mean, low, _ = mean_interval(values_R * scale)
-    done = metrics.loc[metrics["metric"] == _CENSORED_BY.get(quantity.metric), "value"]
+    done = metrics.loc[metrics["metric"] == CENSORED_BY.get(quantity.metric), "value"]
     return Cell(mean, mean - low, len(values_R), 0, at_least=bool((done < 1).any()))
 
 

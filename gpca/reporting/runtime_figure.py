@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
-from gpca.reporting.runtime_table import PUBLISHED, PUBLISHED_HARDWARE
+from gpca.published import HARDWARE, Number, printed_seconds
 from gpca.reporting.style import BLUE, GREEN, ORANGE, TEXT_WIDTH_IN, VERMILION, save_figure, use_style
 from gpca.runtime_file import COMPONENTS, OF_ONE_EXPLANATION
 
@@ -16,17 +17,20 @@ if TYPE_CHECKING:
 COLOURS = dict(zip(OF_ONE_EXPLANATION, (BLUE, ORANGE, GREEN, VERMILION), strict=True))
 
 
-def draw_runtime(runtime: pd.DataFrame, title: str, pdf_path: str | Path, png_path: str | Path) -> None:
+def draw_runtime(
+    runtime: pd.DataFrame, title: str, numbers: Iterable[Number], pdf_path: str | Path, png_path: str | Path
+) -> None:
     """Draw the stages of one explanation as stacked bars.
 
     Args:
         runtime: as :func:`gpca.runtime_file.read_runtime` reads it.
         title: of the objects that were registered.
+        numbers: that the paper prints.
 
     Raises:
         InputError: a stage was not measured.
     """
-    bars = _bars(runtime)
+    bars = _bars(runtime, numbers)
     use_style()
     import matplotlib.pyplot as plt
 
@@ -48,11 +52,12 @@ def draw_runtime(runtime: pd.DataFrame, title: str, pdf_path: str | Path, png_pa
     save_figure(figure, pdf_path, png_path)
 
 
-def _bars(runtime: pd.DataFrame) -> dict[str, dict[str, float]]:
+def _bars(runtime: pd.DataFrame, numbers: Iterable[Number]) -> dict[str, dict[str, float]]:
     """Return for each bar the milliseconds of its stages: the paper's, and here without and with a GPU."""
     mean_ms = {(row.component, row.device): 1e3 * row.mean_s for row in runtime.itertuples()}
     hardware = {row.device: row.hardware for row in runtime.itertuples()}
-    bars = {f"Paper, {' and '.join(PUBLISHED_HARDWARE.values())}": {c: 1e3 * PUBLISHED[c][0] for c in COLOURS}}
+    printed = printed_seconds(numbers)
+    bars = {f"Paper, {' and '.join(HARDWARE.values())}": {c: 1e3 * printed[c].value for c in COLOURS}}
     for device, name in hardware.items():
         stages = {c: mean_ms.get((c, device), mean_ms.get((c, "CPU"))) for c in COLOURS}
         if missing := [c for c, milliseconds in stages.items() if milliseconds is None]:

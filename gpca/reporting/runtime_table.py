@@ -2,44 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf, nan
 from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
+from gpca.published import HARDWARE, Number, printed_seconds
 from gpca.reporting.table import Cell, Column, Table
 from gpca.runtime_file import COMPONENTS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# Seconds and device as the paper prints them, means over 100 runs.
-PUBLISHED = {
-    "icp": (3.0, "CPU"),
-    "features": (1.2, "GPU"),
-    "sampling": (0.010, "CPU"),
-    "scores": (0.015, "CPU"),
-    "bald": (0.007, "CPU"),
-    "retraining": (10.0, "CPU"),
-}
-AT_LEAST = ("retraining",)  # printed as 10 to 30 s
-PUBLISHED_HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}
 
-
-def table7_runtime(runtime: pd.DataFrame, title: str) -> Table:
+def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number]) -> Table:
     """Mean, standard deviation and median of each component in milliseconds, and what the paper prints.
 
     Args:
         runtime: as :func:`gpca.runtime_file.read_runtime` reads it.
         title: of the objects that were registered.
+        numbers: that the paper prints.
 
     Raises:
         InputError: no rows.
     """
     if runtime.empty:
         raise InputError("runtime", "holds no rows", "run the step 'runtime' first")
+    published = printed_seconds(numbers)
     rows, cells = [], {}
     for row, of_row in enumerate(runtime.itertuples()):
-        published_s, published_on = PUBLISHED.get(of_row.component, (nan, ""))
+        printed = published.get(of_row.component)
+        published_on = printed.device if printed else ""
         repeats = int(of_row.repeats)
         rows.append(
             (
@@ -50,10 +43,15 @@ def table7_runtime(runtime: pd.DataFrame, title: str) -> Table:
         )
         for name in ("mean", "deviation", "median"):
             cells[row, name] = Cell(1e3 * getattr(of_row, f"{name}_s"), nan, 1, repeats)
-        if published_on:
-            cells[row, "published"] = Cell(1e3 * published_s, nan, 1, 100, of_row.component in AT_LEAST)
+        if printed:
+            cells[row, "published"] = Cell(1e3 * printed.value, nan, 1, 100, printed.upper > printed.value)
     here = "; ".join(f"{row.device}: {row.hardware}" for row in runtime.drop_duplicates("device").itertuples())
-    there = "; ".join(f"{device}: {hardware}" for device, hardware in PUBLISHED_HARDWARE.items())
+    there = "; ".join(f"{device}: {hardware}" for device, hardware in HARDWARE.items())
+    ranges = [
+        f"{COMPONENTS[component]} takes {number.text()} {number.unit}"
+        for component, number in published.items()
+        if number.upper > number.value
+    ]
     threads, repeats = int(runtime["threads"].iloc[0]), int(runtime["repeats"].iloc[0])
 
     def milliseconds(name: str, decimals: int = 2) -> Column:
@@ -73,8 +71,8 @@ def table7_runtime(runtime: pd.DataFrame, title: str) -> Table:
         },
         cells=cells,
         footnotes=(
-            f"Over {repeats} runs, {threads} thread{'s' * (threads != 1)}. Here {here}. Paper: {there}; its retraining "
-            "takes 10 to 30 s.",
+            f"Over {repeats} runs, {threads} thread{'s' * (threads != 1)}. Here {here}. Paper: {there}"
+            f"{''.join(f'; {text}' for text in ranges)}.",
             "ICP from one initial pose, between clouds of up to as many points as in the protocol; feature extraction "
             "of all draws of one cloud; sampling and scores of one registration. BALD selection scores the whole pool "
             "and picks a batch; retraining learns that batch.",

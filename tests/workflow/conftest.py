@@ -17,6 +17,14 @@ ROOT = Path(__file__).resolve().parents[2]
 NEEDED = ("Snakefile", "config", "gpca", "baselines", "workflow", "profiles", "environment.lock")
 
 
+ENDS = ("comparison", "page")  # the rules that nearly every other one leads to
+
+
+def without_ends(jobs):
+    """The jobs less those of `ENDS`."""
+    return {rule: count for rule, count in jobs.items() if rule not in ENDS}
+
+
 @dataclass(frozen=True)
 class DryRun:
     """What Snakemake would do: how many jobs of each rule (`all` left out), and the files that they write.
@@ -94,7 +102,10 @@ class Project:
         """The paths and bytes of all results with one of the suffixes; seconds and memory differ from run to run."""
         files = sorted(path for path in self.folder.glob("results/smoke/**/*") if path.suffix in suffixes)
         relative = {path.relative_to(self.folder / "results/smoke"): path for path in files}
-        measured, drawn_from = ("timings", "timings.csv", "benchmarks", "logs"), ("runtime", "table7_runtime")
+        measured, drawn_from = (
+            ("timings", "timings.csv", "benchmarks", "logs"),
+            ("runtime", "table7_runtime", "comparison"),
+        )
         kept = [name for name in relative if name.parts[0] not in measured and name.stem not in drawn_from]
         return {str(name): relative[name].read_bytes() for name in kept}
 

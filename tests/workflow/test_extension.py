@@ -7,6 +7,8 @@ import pytest
 
 from gpca.objects.canonical import ObjectClouds
 
+from .conftest import without_ends
+
 SMOKE = ("--configfile", "config/smoke.yaml")
 ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19}
 ROW |= {"shift": 1, "learn": 1}
@@ -35,7 +37,7 @@ def test_a_folder_of_meshes_becomes_a_row_by_one_entry(finished, meshes):
     )
     data_dir = ("--config", f"data_dir={meshes.parent}")
     planned = finished.dry_run("all", *SMOKE, *data_dir)
-    assert planned.jobs == ROW | COLLECTORS | LEARNED
+    assert without_ends(planned.jobs) == ROW | COLLECTORS | LEARNED
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in planned.outputs
 
     path = "results/smoke/objects/my_parts.npz"
@@ -72,7 +74,10 @@ def test_a_rule_of_an_own_source_becomes_a_row(finished):
     (folder / "ball.smk").write_text(RULE)
     (finished.folder / "ball.py").write_text(BALL)
     planned = finished.dry_run("all", *SMOKE)
-    assert planned.jobs == {rule: ROW[rule] for rule in ROW if rule != "objects"} | {"ball": 1} | COLLECTORS | LEARNED
+    assert (
+        without_ends(planned.jobs)
+        == {rule: ROW[rule] for rule in ROW if rule != "objects"} | {"ball": 1} | COLLECTORS | LEARNED
+    )
     assert "results/smoke/predictions/ball/gpca_paper/seed0.csv" in planned.outputs
     registrations = "results/smoke/registrations/ball/seed0.npz"
     finished.snakemake("-j1", registrations, *SMOKE)
@@ -111,7 +116,7 @@ def test_an_explainer_dropped_into_baselines_becomes_a_row(finished):
     assert not finished.dry_run("all", *SMOKE).jobs
     finished.append("config/smoke.yaml", "  fitness_only: {sharpness: 50.0}\n")
     planned = finished.dry_run("all", *SMOKE)
-    assert planned.jobs == COLLECTORS | {"explain": 3, "table": 1}
+    assert without_ends(planned.jobs) == COLLECTORS | {"explain": 3, "table": 1}
 
     finished.snakemake("-j2", "results/smoke/tables/table1_extended.md", *SMOKE)
     table = (finished.folder / "results/smoke/tables/table1_extended.md").read_text()

@@ -39,6 +39,8 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, config, ru
         "tables/table4_kernels.md",
         "tables/table5_claims.tex",
         "diagnostics.csv",
+        "kernels.csv",
+        "comparison.csv",
         "figures/reliability.pdf",
     ):
         assert f"results/{run}/{name}" in planned.outputs

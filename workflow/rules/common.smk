@@ -1,4 +1,5 @@
 import json
+import os
 import shlex
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
 from gpca.policies import policy_entry
+from gpca.published import PUBLISHED, read_published
+from gpca.reasons import REASONS
 from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES
 from gpca.reporting.kernel_tables import kernel_tables_of
 from gpca.reporting.learner_figures import LEARNER_FIGURES
@@ -17,6 +20,7 @@ from gpca.reporting.learner_tables import LEARNER_TABLES
 from gpca.reporting.learning_tables import LEARNING_TABLES
 from gpca.reporting.tables import GPCA, TABLE1, title_of
 
+PUBLISHED_NUMBERS = os.path.relpath(PUBLISHED)
 SEEDS = config["seeds"]
 REDUCTIONS = list(config["reductions"])
 EMBEDDING = f"{config['embedding']['encoder']}/{config['embedding']['reduction']}"
@@ -288,7 +292,8 @@ FIGURES = [
 ]
 RESULTS = [
     *("metrics.csv", "timings.csv", "active_learning.csv"),
-    *("real_world.csv", "diagnostics.csv", "model.pt", "runtime.csv", "recovery.csv"),
+    *("real_world.csv", "diagnostics.csv", "kernels.csv", "model.pt", "runtime.csv"),
+    *("recovery.csv", "comparison.md"),
     *(
         f"tables/{table}.md"
         for tables in (TABLE_EXPLAINERS, LEARNING_TABLES, KERNEL_TABLES, LEARNER_TABLES)

@@ -86,6 +86,7 @@ rule runtime:
 rule table7_runtime:
     input:
         runtime="results/{run}/runtime.csv",
+        published=PUBLISHED_NUMBERS,
         code=code_files("gpca.reporting.runtime_table", "gpca.reporting.script"),
     output:
         csv=report(
@@ -114,6 +115,7 @@ rule table7_runtime:
 rule runtime_figure:
     input:
         runtime="results/{run}/runtime.csv",
+        published=PUBLISHED_NUMBERS,
         code=code_files("gpca.reporting.runtime_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/runtime.pdf",

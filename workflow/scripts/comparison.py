@@ -1,0 +1,25 @@
+"""A run's collected numbers beside the printed ones -> comparison.csv and .md."""
+
+from gpca.comparison import Tolerance, compare, measured_on, read_results
+from gpca.files import whole_file
+from gpca.published import read_published
+from gpca.reasons import read_reasons
+from gpca.reporting.comparison_table import comparison_markdown
+from gpca.reporting.script import job
+
+with job(snakemake):
+    given, params = snakemake.input, snakemake.params
+    numbers = read_published(given.published)
+    tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in params.tolerances.items()}
+    comparison = compare(
+        numbers,
+        read_results(given.collected),
+        params.objects,
+        tolerances,
+        read_reasons(numbers, given.reasons),
+        measured_on(given.collected),
+    )
+    with whole_file(snakemake.output.csv) as partial:
+        comparison.to_csv(partial, index=False, lineterminator="\n")
+    with whole_file(snakemake.output.md) as partial:
+        partial.write_text(comparison_markdown(comparison, params.tolerances), encoding="utf-8")
