@@ -11,6 +11,7 @@ KERNELS = {"kernels": 1, "kernel_table": 2, "kernel_learning_curves": 1}
 PICTURES = {"fig5_real_world_example": 1, "real_world_failures": 1}
 REAL_WORLD = {"real_world_metrics": 1, "table6_backbones": 1, "confusion_real_world": 1} | PICTURES
 BACKBONES = {"explain_with_backbone": 4} | REAL_WORLD
+PAGE = {"page": 1}  # made anew whenever anything on it is
 # Explainers times three sources: those with a GPC, those on embeddings, those on uncertainties, all.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 3 * explainers} for explainers in (4, 4, 13))
 WITH_GPC["explain"] += 2  # classic features on depth frames
@@ -80,6 +81,8 @@ EDITS = {
     "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2},
     "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
+    "gpca/reporting/page_samples.py": PAGE,
+    "gpca/reporting/templates/page.js": PAGE,
     "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | PICTURES,
     # Not the pictures: they show an encoder without reduction.
     "gpca/reduction.py": {
@@ -110,8 +113,8 @@ EDITS = {
 
 @pytest.mark.parametrize("module", EDITS)
 def test_an_edit_reruns_the_rules_that_use_the_module_and_no_other(finished, module):
-    finished.append(module, "\n# edited\n")
-    assert finished.dry_run(*SMOKE).jobs == EDITS[module]
+    finished.append(module, "\n# edited\n" if module.endswith(".py") else "\n// edited\n")
+    assert finished.dry_run(*SMOKE).jobs == (EDITS[module] | PAGE if EDITS[module] else {})
 
 
 @pytest.mark.parametrize("name", ["gpca", "gpca_paper"])
@@ -135,10 +138,10 @@ def test_a_touched_but_unchanged_module_reruns_nothing(finished):
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert planned.jobs == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES
+    assert planned.jobs == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES | PAGE
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"fig3_source": "ycb"}}))
-    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1}
+    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1} | PAGE
