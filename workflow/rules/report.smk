@@ -67,10 +67,10 @@ rule report:
     input:
         [f"results/{config['run']}/{file}" for file in RESULTS],
     output:
-        page=f"results/{config['run']}/report.html",
-        config=temp(f"results/{config['run']}/report.json"),
+        f"results/{config['run']}/report.html",
     log:
-        f"results/{config['run']}/logs/report.log",
+        text=f"results/{config['run']}/logs/report.log",
+        config=f"results/{config['run']}/logs/report.json",
     benchmark:
         f"results/{config['run']}/benchmarks/report.tsv"
     conda:
@@ -82,5 +82,5 @@ rule report:
     params:
         config=json.dumps(config, sort_keys=True),
     shell:
-        "(printf '%s' {params.config:q} > {output.config} && python -m snakemake all --report {output.page} "
-        "--configfile {output.config} --nolock) > {log} 2>&1"
+        "(printf '%s' {params.config:q} > {log.config} && python -m snakemake all --report {output} "
+        "--configfile {log.config} --nolock) > {log.text} 2>&1"
