@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: results test smoke lint check-reference environment lock clean-environment help
+.PHONY: results report test smoke lint check-reference environment lock clean-environment help
 
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
@@ -16,6 +16,9 @@ RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
 
 results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
 	$(RUN) snakemake -j$(CORES) all $(SNAKEMAKE_ARGS)
+
+report: environment ## Snakemake's report of the same run in one HTML file, results/{run}/report.html
+	$(RUN) snakemake -j$(CORES) report $(SNAKEMAKE_ARGS)
 
 test: environment ## the tests (PYTEST_ARGS passes through)
 	$(RUN) OMP_NUM_THREADS=1 python -m pytest $(PYTEST_ARGS)

@@ -126,6 +126,11 @@ def test_the_rules_that_use_a_module_depend_on_it_and_no_other(planned, module):
     assert without_ends(planned.behind(module)) == EDITS[module]
 
 
+@pytest.mark.parametrize("name", ["gpca/reporting/page_samples.py", "gpca/reporting/templates/page.js"])
+def test_what_the_page_alone_uses_makes_the_page_alone(planned, name):
+    assert planned.behind(name) == {"page": 1}
+
+
 def test_the_comparison_comes_after_every_number(planned):
     for name in ("metrics", "active_learning", "real_world", "diagnostics", "kernels", "runtime"):
         assert "comparison" in planned.behind(f"results/smoke/{name}.csv")
@@ -158,10 +163,10 @@ def test_a_touched_but_unchanged_module_reruns_nothing(finished):
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert planned.jobs == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES
+    assert without_ends(planned.jobs) == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES | MODEL | RECOVERY
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"fig3_source": "ycb"}}))
-    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1}
+    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1, "page": 1}

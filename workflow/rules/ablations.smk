@@ -130,11 +130,7 @@ rule kernel_table:
         grids=KERNEL_GRIDS,
         code=code_files("gpca.reporting.kernel_tables", "gpca.reporting.script"),
     output:
-        csv=report(
-            "results/{run}/tables/{table}.csv",
-            category="Tables",
-            labels={"table": "{table}"},
-        ),
+        csv=reported("results/{run}/tables/{table}.csv"),
         md="results/{run}/tables/{table}.md",
         tex="results/{run}/tables/{table}.tex",
     log:
@@ -161,11 +157,7 @@ rule learner_table:
         metrics="results/{run}/diagnostics.csv",
         code=code_files("gpca.reporting.learner_tables", "gpca.reporting.script"),
     output:
-        csv=report(
-            "results/{run}/tables/{table}.csv",
-            category="Tables",
-            labels={"table": "{table}"},
-        ),
+        csv=reported("results/{run}/tables/{table}.csv"),
         md="results/{run}/tables/{table}.md",
         tex="results/{run}/tables/{table}.tex",
     log:
@@ -193,11 +185,7 @@ rule kernel_learning_curves:
         code=code_files("gpca.reporting.kernel_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/kernel_learning_curves.pdf",
-        png=report(
-            "results/{run}/figures/kernel_learning_curves.png",
-            category="Figures",
-            labels={"figure": "kernels"},
-        ),
+        png=reported("results/{run}/figures/kernel_learning_curves.png"),
     log:
         "results/{run}/logs/figures/kernel_learning_curves.log",
     benchmark:
@@ -229,11 +217,7 @@ rule learner_figure:
         code=code_files("gpca.reporting.learner_figures", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/{figure}.pdf",
-        png=report(
-            "results/{run}/figures/{figure}.png",
-            category="Figures",
-            labels={"figure": "{figure}"},
-        ),
+        png=reported("results/{run}/figures/{figure}.png"),
     log:
         "results/{run}/logs/figures/{figure}.log",
     benchmark:

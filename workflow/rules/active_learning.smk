@@ -89,11 +89,7 @@ rule learning_table:
         metrics="results/{run}/active_learning.csv",
         code=code_files("gpca.reporting.learning_tables", "gpca.reporting.script"),
     output:
-        csv=report(
-            "results/{run}/tables/{table}.csv",
-            category="Tables",
-            labels={"table": "{table}"},
-        ),
+        csv=reported("results/{run}/tables/{table}.csv"),
         md="results/{run}/tables/{table}.md",
         tex="results/{run}/tables/{table}.tex",
     log:
@@ -123,11 +119,7 @@ rule active_learning_curves:
         code=code_files("gpca.reporting.learning_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/active_learning_curves.pdf",
-        png=report(
-            "results/{run}/figures/active_learning_curves.png",
-            category="Figures",
-            labels={"figure": "active learning"},
-        ),
+        png=reported("results/{run}/figures/active_learning_curves.png"),
     log:
         "results/{run}/logs/figures/active_learning_curves.log",
     benchmark:

@@ -18,6 +18,7 @@ from gpca.reporting.kernel_tables import kernel_tables_of
 from gpca.reporting.learner_figures import LEARNER_FIGURES
 from gpca.reporting.learner_tables import LEARNER_TABLES
 from gpca.reporting.learning_tables import LEARNING_TABLES
+from gpca.reporting.sections import caption_files, section_of, title_of_result
 from gpca.reporting.tables import GPCA, TABLE1, title_of
 
 PUBLISHED_NUMBERS = os.path.relpath(PUBLISHED)
@@ -43,6 +44,20 @@ wildcard_constraints:
     backbone="|".join(config["encoders"]),
     explainer="|".join(config["explainers"]),
     design="|".join(config["uncertainty"]),
+
+
+def reported(path):
+    """A table or figure as Snakemake's report shows it: by the paper's section, with title and caption."""
+
+    def name(wildcards):
+        return Path(path).stem.format(**wildcards)
+
+    return report(
+        path,
+        caption="../report/result.rst",
+        category=lambda wildcards: section_of(name(wildcards)),
+        labels=lambda wildcards: {"result": title_of_result(name(wildcards))},
+    )
 
 
 def settings(*keys):
@@ -305,4 +320,5 @@ RESULTS = [
         "tables/table8_recovery.md",
     ),
     *(f"figures/{figure}.png" for figure in FIGURES),
+    "index.html",
 ]

@@ -4,11 +4,7 @@ rule objects_figure:
         code=code_files("gpca.reporting.contact_sheet", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/objects_{source}.pdf",
-        png=report(
-            "results/{run}/figures/objects_{source}.png",
-            category="Objects",
-            labels={"source": "{source}"},
-        ),
+        png=reported("results/{run}/figures/objects_{source}.png"),
     log:
         "results/{run}/logs/figures/objects_{source}.log",
     benchmark:
@@ -32,11 +28,7 @@ rule fig3_concepts:
         code=code_files("gpca.reporting.concepts_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig3_concepts.pdf",
-        png=report(
-            "results/{run}/figures/fig3_concepts.png",
-            category="Figures",
-            labels={"figure": "3"},
-        ),
+        png=reported("results/{run}/figures/fig3_concepts.png"),
     log:
         "results/{run}/logs/figures/fig3_concepts.log",
     benchmark:
@@ -59,11 +51,7 @@ rule fig_attribution_confusions:
         code=code_files("gpca.reporting.confusions_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig_attribution_confusions.pdf",
-        png=report(
-            "results/{run}/figures/fig_attribution_confusions.png",
-            category="Figures",
-            labels={"figure": "confusions"},
-        ),
+        png=reported("results/{run}/figures/fig_attribution_confusions.png"),
     log:
         "results/{run}/logs/figures/fig_attribution_confusions.log",
     benchmark:

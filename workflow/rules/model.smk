@@ -89,11 +89,7 @@ rule table7_runtime:
         published=PUBLISHED_NUMBERS,
         code=code_files("gpca.reporting.runtime_table", "gpca.reporting.script"),
     output:
-        csv=report(
-            "results/{run}/tables/table7_runtime.csv",
-            category="Tables",
-            labels={"table": "table7_runtime"},
-        ),
+        csv=reported("results/{run}/tables/table7_runtime.csv"),
         md="results/{run}/tables/table7_runtime.md",
         tex="results/{run}/tables/table7_runtime.tex",
     log:
@@ -119,11 +115,7 @@ rule runtime_figure:
         code=code_files("gpca.reporting.runtime_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/runtime.pdf",
-        png=report(
-            "results/{run}/figures/runtime.png",
-            category="Figures",
-            labels={"figure": "runtime"},
-        ),
+        png=reported("results/{run}/figures/runtime.png"),
     log:
         "results/{run}/logs/figures/runtime.log",
     benchmark:

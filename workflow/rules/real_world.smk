@@ -200,11 +200,7 @@ rule table6_backbones:
         metrics="results/{run}/real_world.csv",
         code=code_files("gpca.reporting.backbone_table", "gpca.reporting.script"),
     output:
-        csv=report(
-            "results/{run}/tables/table6_backbones.csv",
-            category="Tables",
-            labels={"table": "table6_backbones"},
-        ),
+        csv=reported("results/{run}/tables/table6_backbones.csv"),
         md="results/{run}/tables/table6_backbones.md",
         tex="results/{run}/tables/table6_backbones.tex",
     log:
@@ -235,11 +231,7 @@ rule confusion_real_world:
         code=code_files("gpca.reporting.real_world_confusions", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/confusion_real_world.pdf",
-        png=report(
-            "results/{run}/figures/confusion_real_world.png",
-            category="Figures",
-            labels={"figure": "confusions on depth frames"},
-        ),
+        png=reported("results/{run}/figures/confusion_real_world.png"),
     log:
         "results/{run}/logs/figures/confusion_real_world.log",
     benchmark:
@@ -267,11 +259,7 @@ rule fig5_real_world_example:
         code=code_files("gpca.reporting.real_world_example", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig5_real_world_example.pdf",
-        png=report(
-            "results/{run}/figures/fig5_real_world_example.png",
-            category="Figures",
-            labels={"figure": "5"},
-        ),
+        png=reported("results/{run}/figures/fig5_real_world_example.png"),
     log:
         "results/{run}/logs/figures/fig5_real_world_example.log",
     benchmark:
@@ -302,11 +290,7 @@ rule real_world_failures:
         code=code_files("gpca.reporting.real_world_failures", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/real_world_failures.pdf",
-        png=report(
-            "results/{run}/figures/real_world_failures.png",
-            category="Figures",
-            labels={"figure": "most confident mistakes on depth frames"},
-        ),
+        png=reported("results/{run}/figures/real_world_failures.png"),
     log:
         "results/{run}/logs/figures/real_world_failures.log",
     benchmark:

@@ -74,11 +74,7 @@ rule table8_recovery:
         timings=collect("results/{{run}}/timings/recovery/seed{seed}.csv", seed=SEEDS),
         code=code_files("gpca.reporting.recovery_table", "gpca.reporting.script"),
     output:
-        csv=report(
-            "results/{run}/tables/table8_recovery.csv",
-            category="Tables",
-            labels={"table": "table8_recovery"},
-        ),
+        csv=reported("results/{run}/tables/table8_recovery.csv"),
         md="results/{run}/tables/table8_recovery.md",
         tex="results/{run}/tables/table8_recovery.tex",
     log:
@@ -107,11 +103,7 @@ rule recovery_figure:
         ),
     output:
         pdf="results/{run}/figures/{figure}.pdf",
-        png=report(
-            "results/{run}/figures/{figure}.png",
-            category="Figures",
-            labels={"figure": "{figure}"},
-        ),
+        png=reported("results/{run}/figures/{figure}.png"),
     log:
         "results/{run}/logs/figures/{figure}.log",
     benchmark:

@@ -5,11 +5,7 @@ rule table:
             "gpca.metrics", "gpca.reporting.tables", "gpca.reporting.script"
         ),
     output:
-        csv=report(
-            "results/{run}/tables/{table}.csv",
-            category="Tables",
-            labels={"table": "{table}"},
-        ),
+        csv=reported("results/{run}/tables/{table}.csv"),
         md="results/{run}/tables/{table}.md",
         tex="results/{run}/tables/{table}.tex",
     log:

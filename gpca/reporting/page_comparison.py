@@ -1,0 +1,61 @@
+"""The comparison as the page shows it: numbers with the digits that the paper prints, verdicts with a tone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.predictions import read_csv
+
+TONES = {"reproduced": "good", "close": "near", "not reproduced": "bad"}  # other verdicts judge nothing
+_COLUMNS = ("table", "row", "column", "unit", "published", "decimals", "reproduced", "ci_low", "ci_high", "n")
+_COLUMNS += ("difference", "verdict", "reason")
+_NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
+
+
+def page_comparison(path: str | Path) -> dict | None:
+    """Return the rows of ``comparison.csv`` in words, its tables, and verdicts with tone and number; None without it.
+
+    Raises:
+        InputError: an unreadable file, a missing column, no rows, a number that is none.
+    """
+    if not Path(path).is_file():
+        return None
+    rows = read_csv(path, _COLUMNS)
+    counts = Counter(rows["verdict"])
+    order = [*TONES, *sorted(set(counts) - set(TONES))]
+    return {
+        "rows": [_words(path, row) for row in rows.to_dict("records")],
+        "tables": list(dict.fromkeys(rows["table"])),
+        "verdicts": [(verdict, TONES.get(verdict, ""), counts[verdict]) for verdict in order if counts[verdict]],
+    }
+
+
+def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
+    """Return the entries of a row as they are printed; the texts stay as they are."""
+    printed = {name: _rounded(path, row, name) for name in _NUMBERS}
+    upper, deviation = (printed[name] for name in ("upper", "deviation"))
+    at_least = row.get("at_least", "").lower() == "true"
+    return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict", "reason")} | {
+        "tone": TONES.get(row["verdict"], ""),
+        "objects": row.get("objects", ""),
+        "published": printed["published"]
+        + (f" to {upper}" if upper else "")
+        + (f" ± {deviation}" if deviation else ""),
+        "reproduced": "> " * at_least + printed["reproduced"],
+        "interval": f"[{printed['ci_low']}, {printed['ci_high']}]" if printed["ci_low"] and printed["ci_high"] else "",
+        "difference": printed["difference"],
+    }
+
+
+def _rounded(path: str | Path, row: Mapping[str, str], name: str) -> str:
+    """Return a number with as many digits as the printed one, or one of its own where that would be 0; or nothing."""
+    if (text := row.get(name, "")) in ("", "nan"):
+        return ""
+    try:
+        value, decimals = float(text), int(row["decimals"])
+    except ValueError as fault:
+        raise InputError(path, f"'{name}' holds something that is not a number: '{text}'", "make it anew") from fault
+    return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"
