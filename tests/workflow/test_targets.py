@@ -78,7 +78,7 @@ EDITS = {
     "gpca/reporting/learning_figure.py": {"active_learning_curves": 1},
     # Not Table II: it shows GP-CA alone.
     "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2},
-    "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
+    "baselines/softmax_head.py": {"explain": 3, "fig2_overview": 1} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
     "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | PICTURES,
     # Not the pictures: they show an encoder without reduction.
@@ -135,10 +135,10 @@ def test_a_touched_but_unchanged_module_reruns_nothing(finished):
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert planned.jobs == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES
+    assert planned.jobs == {"explain": 3, "fig2_overview": 1} | COLLECTORS | DIAGNOSED | BACKBONES
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):
-    (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"fig3_source": "ycb"}}))
-    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1}
+    (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"source": "ycb"}}))
+    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig2_overview": 1, "fig3_concepts": 1}

@@ -10,7 +10,7 @@ from gpca.explainer import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
 from gpca.policies import policy_entry
-from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES
+from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES, encoder_title
 from gpca.reporting.kernel_tables import kernel_tables_of
 from gpca.reporting.learner_figures import LEARNER_FIGURES
 from gpca.reporting.learner_tables import LEARNER_TABLES
@@ -256,7 +256,19 @@ def table_inputs(wildcards):
     return {"predictions": [pattern.format(run=wildcards.run) for pattern in patterns]}
 
 
-REAL_WORLD_FIGURES = [
+REAL_WORLD_# One registration of the source that figures show, and what the stages of GP-CA make of it.
+GPCA_SHOWN = next((name for name in reversed(GPCA) if name in config["explainers"]), "")
+SHOWN_STAGES = {
+    name: f"results/{{run}}/{name}/{config['figures']['source']}{folder}/seed{SEEDS[0]}.{suffix}"
+    for name, folder, suffix in (
+        ("registrations", "", "npz"),
+        ("embeddings", f"/{EMBEDDING}", "npz"),
+        ("predictions", f"/{GPCA_SHOWN}", "csv"),
+    )
+}
+METHOD_FIGURES = ["fig2_overview"] if GPCA_SHOWN else []
+FIGURES = [
+    *METHOD_FIGURES,
     "fig5_real_world_example",
     "confusion_real_world",
     "real_world_failures",
@@ -275,7 +287,19 @@ RECOVERY_FIGURES = {  # and what each is drawn from
     "fig6_mitigation": f"recovery/policy_seed{SEEDS[0]}.json",
     "fig1_recovery_example": f"recovery/example_seed{SEEDS[0]}.npz",
 }
+# One registration of the source that figures show, and what the stages of GP-CA make of it.
+GPCA_SHOWN = next((name for name in reversed(GPCA) if name in config["explainers"]), "")
+SHOWN_STAGES = {
+    name: f"results/{{run}}/{name}/{config['figures']['source']}{folder}/seed{SEEDS[0]}.{suffix}"
+    for name, folder, suffix in (
+        ("registrations", "", "npz"),
+        ("embeddings", f"/{EMBEDDING}", "npz"),
+        ("predictions", f"/{GPCA_SHOWN}", "csv"),
+    )
+}
+METHOD_FIGURES = ["fig2_overview"] if GPCA_SHOWN else []
 FIGURES = [
+    *METHOD_FIGURES,
     *REAL_WORLD_FIGURES,
     "fig3_concepts",
     "fig_attribution_confusions",
