@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.perturbation import CONCEPTS
 from gpca.reporting.cloud_views import draw_clouds
 from gpca.reporting.diagram import Canvas
 from gpca.reporting.mitigation_figure import short_action

@@ -78,7 +78,7 @@ EDITS = {
     "gpca/reporting/learning_figure.py": {"active_learning_curves": 1},
     # Not Table II: it shows GP-CA alone.
     "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2},
-    "baselines/softmax_head.py": {"explain": 3, "fig2_overview": 1} | COLLECTORS | {"table": 1},
+    "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1},
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
     "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | PICTURES,
     # Not the pictures: they show an encoder without reduction.

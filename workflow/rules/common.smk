@@ -256,19 +256,7 @@ def table_inputs(wildcards):
     return {"predictions": [pattern.format(run=wildcards.run) for pattern in patterns]}
 
 
-REAL_WORLD_# One registration of the source that figures show, and what the stages of GP-CA make of it.
-GPCA_SHOWN = next((name for name in reversed(GPCA) if name in config["explainers"]), "")
-SHOWN_STAGES = {
-    name: f"results/{{run}}/{name}/{config['figures']['source']}{folder}/seed{SEEDS[0]}.{suffix}"
-    for name, folder, suffix in (
-        ("registrations", "", "npz"),
-        ("embeddings", f"/{EMBEDDING}", "npz"),
-        ("predictions", f"/{GPCA_SHOWN}", "csv"),
-    )
-}
-METHOD_FIGURES = ["fig2_overview"] if GPCA_SHOWN else []
-FIGURES = [
-    *METHOD_FIGURES,
+REAL_WORLD_FIGURES = [
     "fig5_real_world_example",
     "confusion_real_world",
     "real_world_failures",
