@@ -24,9 +24,11 @@ class Canvas:
         self.axes.set_axis_off()
 
     def panel(self, left_in: float, bottom_in: float, width_in: float, height_in: float):
-        """Return new axes at this place."""
+        """Return new axes at this place, through which boxes are seen."""
         w, h = self.width_in, self.height_in
-        return self.figure.add_axes((left_in / w, bottom_in / h, width_in / w, height_in / h))
+        axes = self.figure.add_axes((left_in / w, bottom_in / h, width_in / w, height_in / h))
+        axes.patch.set_visible(False)
+        return axes
 
     def text(self, x_in: float, y_in: float, words: str, **style) -> None:
         """Write at this place, centred unless the style says otherwise."""

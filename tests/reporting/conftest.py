@@ -14,7 +14,7 @@ def stage_files(registrations, tmp_path_factory):
     registrations.save(folder / "registrations.npz")
     random = np.random.default_rng(3)
     place_S = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
-    h_S_d = random.normal(size=(len(registrations), 12)) + 3 * np.eye(3, 12)[place_S]
+    h_S_d = random.normal(size=(len(registrations), 12)) + 8 * np.eye(3, 12)[place_S]
     names = {"sample": registrations.sample, "split": registrations.split}
     save_arrays(folder / "embeddings.npz", {"h": h_S_d.astype(np.float32), **names})
     score_S = 0.5 + registrations.sample / 100

@@ -15,6 +15,7 @@ from gpca.reporting.kernel_tables import kernel_tables_of
 from gpca.reporting.learner_figures import LEARNER_FIGURES
 from gpca.reporting.learner_tables import LEARNER_TABLES
 from gpca.reporting.learning_tables import LEARNING_TABLES
+from gpca.reporting.pipeline_figure import TITLES as PIPELINE_STRATEGIES
 from gpca.reporting.tables import GPCA, TABLE1, title_of
 
 SEEDS = config["seeds"]
@@ -285,7 +286,11 @@ SHOWN_STAGES = {
         ("predictions", f"/{GPCA_SHOWN}", "csv"),
     )
 }
-METHOD_FIGURES = ["fig2_overview"] if GPCA_SHOWN else []
+SHOWN_STRATEGIES = [name for name in PIPELINE_STRATEGIES if name in STRATEGIES]
+METHOD_FIGURES = [
+    *(["fig2_overview"] if GPCA_SHOWN else []),
+    *(["fig4_pipeline"] if GPCA_SHOWN and SHOWN_STRATEGIES else []),
+]
 FIGURES = [
     *METHOD_FIGURES,
     *REAL_WORLD_FIGURES,

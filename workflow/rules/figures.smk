@@ -82,6 +82,41 @@ rule fig3_concepts:
         "../scripts/concepts_figure.py"
 
 
+rule fig4_pipeline:
+    input:
+        **SHOWN_STAGES,
+        curves=collect(
+            "results/{{run}}/active_learning/{source}/{strategy}/seed{seed}.csv",
+            source=config["figures"]["source"],
+            strategy=SHOWN_STRATEGIES,
+            seed=SEEDS,
+        ),
+        code=code_files("gpca.reporting.pipeline_figure", "gpca.reporting.script"),
+    output:
+        pdf="results/{run}/figures/fig4_pipeline.pdf",
+        png=report(
+            "results/{run}/figures/fig4_pipeline.png",
+            category="Figures",
+            labels={"figure": "4"},
+        ),
+    log:
+        "results/{run}/logs/figures/fig4_pipeline.log",
+    benchmark:
+        "results/{run}/benchmarks/figures/fig4_pipeline.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        title=title_of(SOURCES[config["figures"]["source"]]),
+        encoder=encoder_title(**config["embedding"]),
+        batch=config["active_learning"]["batch"],
+    script:
+        "../scripts/pipeline_figure.py"
+
+
 rule fig_attribution_confusions:
     input:
         metrics="results/{run}/metrics.csv",
