@@ -71,8 +71,8 @@ def check(config: dict) -> dict[str, dict]:
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
         for name, entry in config["sources"].items()
     }
-    if (name := config["figures"]["fig3_source"]) not in sources:
-        raise InputError("config key figures.fig3_source", f"no source '{name}'", f"known are {', '.join(sources)}")
+    if (name := config["figures"]["source"]) not in sources:
+        raise InputError("config key figures.source", f"no source '{name}'", f"known are {', '.join(sources)}")
     for name in config["kernels"]["sources"]:
         if name not in sources:
             raise InputError("config key kernels.sources", f"no source '{name}'", f"known are {', '.join(sources)}")

@@ -158,7 +158,7 @@ FAULTS = [
     ("encoders.dgcnn.backbone", "dgcn", "encoders.dgcnn.backbone: backbone 'dgcn': unknown; known are dgcnn"),
     ("embedding.encoder", "voxelnet", "embedding.encoder: no encoder 'voxelnet'; known are dgcnn"),
     ("explainers.shapley", {}, "explainers.shapley: explainer 'shapley': unknown; known are gpca_paper, gpca"),
-    ("figures.fig3_source", "ycbv", "figures.fig3_source: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    ("figures.source", "ycbv", "figures.source: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
     ("model.source", "lab", "model.source: no source 'lab'; known are coffee_cup, linemod, ycb, real_rgbd"),
     ("model.encoder", "voxelnet", "model.encoder: no encoder 'voxelnet'; known are dgcnn"),
     ("runtime.repeats", 1, "runtime.repeats: 1 is less than the minimum of 2"),

@@ -24,6 +24,12 @@ CLASSIC = {
 }
 
 
+def encoder_title(encoder: str, reduction: str) -> str:
+    """Return what figures call an encoder and the reduction after it."""
+    named = BACKBONES.get(encoder, encoder)
+    return named if reduction == "none" else f"{named}, {REDUCTIONS.get(reduction, reduction)}"
+
+
 def table6_backbones(
     metrics: pd.DataFrame,
     title: str,

@@ -76,6 +76,11 @@ def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str
     save_figure(figure, pdf_path, png_path)
 
 
+def short_action(action: str) -> str:
+    """Return the words for an action of recovery, its purpose left out."""
+    return WORDS.get(action, action.replace("_", " ")).splitlines()[0].rstrip(",")
+
+
 def _queue_condition(limits: Mapping[str, float]) -> str:
     return f"BALD > {limits['uncertain']:.3f} nats\nor " + rf"$\max_c\,\hat{{s}}_c$ < {limits['dominant']:.2f}"
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.metrics import read_metrics
-from gpca.reporting.backbone_table import BACKBONES, REDUCTIONS
+from gpca.reporting.backbone_table import encoder_title
 from gpca.reporting.confusions_figure import pooled_confusions
 from gpca.reporting.style import BLUE, TEXT_WIDTH_IN, save_figure, use_style
 
@@ -48,8 +48,7 @@ def draw_real_world_confusions(
                 count = f"n = {counts_C_C[row, column]:.0f}"
                 axes.text(column, row + 0.22, count, ha="center", va="center", fontsize=5.5, color=colour)
         backbone, _, reduction = method.partition("-")
-        below = "" if reduction == "none" else f", {REDUCTIONS[reduction]}"
-        axes.set_title(f"{BACKBONES.get(backbone, backbone)}{below}", pad=3)
+        axes.set_title(encoder_title(backbone, reduction), pad=3)
         axes.set_xticks(range(len(concepts)), concepts)
         axes.set_yticks(range(len(concepts)), concepts if number == 0 else [], rotation=90, va="center")
         axes.tick_params(length=0, pad=2)

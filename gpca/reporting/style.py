@@ -13,6 +13,13 @@ TEXT_WIDTH_IN = 7.16  # both columns
 BLACK, ORANGE, SKY_BLUE, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 PALETTE = (BLUE, VERMILION, GREEN, ORANGE, SKY_BLUE, PURPLE, YELLOW, BLACK)
+GREY, LIGHT_GREY = "#666666", "#CCCCCC"  # of lines, boxes and what is not named; of what lies behind
+
+# One colour for one thing in every figure. Concepts have a marker too, which survives a print in grey.
+TARGET_COLOUR, SOURCE_COLOUR = VERMILION, BLUE
+CONCEPT_COLOURS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
+CONCEPT_MARKERS = {"noise": "o", "pose": "s", "overlap": "^"}
+SMALL_PT = 7  # the least size of letters
 
 
 def use_style() -> None:
@@ -53,6 +60,13 @@ def use_style() -> None:
             "svg.hashsalt": "gpca",
         }
     )
+
+
+def blues():
+    """Return the colour map of shares and densities: white to the palette's blue, dark in grey too."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("blues", ["white", BLUE])
 
 
 def save_figure(figure, pdf_path: str | Path, png_path: str | Path) -> None:

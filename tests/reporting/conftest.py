@@ -1,4 +1,4 @@
-"""What the tests of the page share."""
+"""What tests of the page and of the method's figures share."""
 
 import numpy as np
 import pytest
@@ -31,3 +31,47 @@ def predicted():
         return npz, csv
 
     return write
+
+
+@pytest.fixture(scope="session")
+def stage_files(registrations, tmp_path_factory):
+    """Paths (registrations, embeddings, predictions); pose of sample p has score 0.5 + p / 100, all named right."""
+    from gpca.files import save_arrays
+    from gpca.perturbation import CONCEPTS
+
+    folder = tmp_path_factory.mktemp("stages")
+    registrations.save(folder / "registrations.npz")
+    random = np.random.default_rng(3)
+    place_S = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
+    h_S_d = random.normal(size=(len(registrations), 12)) + 8 * np.eye(3, 12)[place_S]
+    names = {"sample": registrations.sample, "split": registrations.split}
+    save_arrays(folder / "embeddings.npz", {"h": h_S_d.astype(np.float32), **names})
+    score_S = 0.5 + registrations.sample / 100
+    rows = ["sample,split,object,concept_true,concept_predicted,score_noise,score_pose,score_overlap,"]
+    rows[0] += "variance_noise,variance_pose,variance_overlap,bald,entropy,abstained,icp_calls"
+    for i, score in enumerate(score_S):
+        scores = np.where(np.arange(3) == place_S[i], score, (1 - score) / 2)
+        head = f"{registrations.sample[i]},{registrations.split[i]},{registrations.object_name[i]},"
+        head += f"{registrations.concept[i]},{registrations.concept[i]}"
+        bald = f"{0.01 + i / 1000:.6f}"
+        rows.append(",".join([head, *(f"{s:.6f}" for s in scores), "0.01,0.0144,0.0025", bald, "0.5,False,0"]))
+    (folder / "predictions.csv").write_text("\n".join(rows) + "\n")
+    return tuple(folder / name for name in ("registrations.npz", "embeddings.npz", "predictions.csv"))
+
+
+@pytest.fixture
+def written(monkeypatch):
+    """Draw and return all words of the figure that was saved last, of its panels too."""
+    from gpca.reporting import style
+
+    words = []
+    save_png = style.save_png
+
+    def listening(figure, *args, **options):
+        from matplotlib.text import Text
+
+        words[:] = [text.get_text() for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
+        save_png(figure, *args, **options)
+
+    monkeypatch.setattr(style, "save_png", listening)
+    return words

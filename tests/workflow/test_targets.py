@@ -10,6 +10,7 @@ COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusion
 LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
 DIAGNOSED = {"learn": 3, "diagnostics": 1, "learner_table": 3, "learner_figure": 3}
 KERNELS = {"kernels": 1, "kernel_metrics": 1, "kernel_table": 2, "kernel_learning_curves": 1}
+METHOD = {"fig2_overview": 1, "fig4_pipeline": 1}
 PICTURES = {"fig5_real_world_example": 1, "real_world_failures": 1}
 REAL_WORLD = {"real_world_metrics": 1, "table6_backbones": 1, "confusion_real_world": 1} | PICTURES
 BACKBONES = {"explain_with_backbone": 2} | REAL_WORLD
@@ -81,18 +82,18 @@ def test_a_finished_run_has_nothing_to_do(finished):
 
 EDITS = {
     "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 6} | LEARNED | DIAGNOSED | KERNELS | BACKBONES
-    | MODEL | RECOVERY,
+    | MODEL | RECOVERY | METHOD,
     "gpca/shift.py": {"shift": 3} | DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/kernel_figure.py": {"kernel_learning_curves": 1},
-    "gpca/acquisition.py": {"active_learning": 6} | LEARNED | RUNTIME,
-    "gpca/stream.py": {"active_learning": 6} | LEARNED | RUNTIME,
-    "gpca/reporting/learning_figure.py": {"active_learning_curves": 1},
+    "gpca/acquisition.py": {"active_learning": 6, "fig4_pipeline": 1} | LEARNED | RUNTIME,
+    "gpca/stream.py": {"active_learning": 6, "fig4_pipeline": 1} | LEARNED | RUNTIME,
+    "gpca/reporting/learning_figure.py": {"active_learning_curves": 1, "fig4_pipeline": 1},
     # Not Table II: it shows GP-CA alone.
     "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2} | RUNTIME | RECOVERY,
     "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1} | RECOVERY,
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
-    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | PICTURES | RECOVERY_FIGURES,
+    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | METHOD | PICTURES | RECOVERY_FIGURES,
     # Not the pictures: they show an encoder without reduction.
     "gpca/reduction.py": {
         "reduced_embeddings": 1, "explain_with_backbone": 1, "real_world_metrics": 1, "table6_backbones": 1,
@@ -112,7 +113,8 @@ EDITS = {
     "gpca/encoders/dgcnn.py": {
         "encoder": 8, "embeddings": 8, "embeddings_without": 6, "active_learning": 6, "shift": 3,
         "reduced_embeddings": 1,
-    } | BACKBONES | ON_EMBEDDINGS | COLLECTORS | LEARNED | DIAGNOSED | KERNELS | MODEL | RECOVERY,
+    } | BACKBONES | ON_EMBEDDINGS | COLLECTORS | LEARNED | DIAGNOSED | KERNELS | MODEL | RECOVERY
+    | METHOD,
     "gpca/objects/uw_rgbd.py": {},
     "gpca/objects/shapes/cups.py": {
         "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
@@ -163,10 +165,10 @@ def test_a_touched_but_unchanged_module_reruns_nothing(finished):
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert without_ends(planned.jobs) == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES | MODEL | RECOVERY
+    assert without_ends(planned.jobs) == {"explain": 3} | COLLECTORS | DIAGNOSED | BACKBONES | MODEL | RECOVERY | METHOD
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):
-    (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"fig3_source": "ycb"}}))
-    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1, "page": 1}
+    (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"source": "ycb"}}))
+    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1, "page": 1} | METHOD

@@ -13,11 +13,12 @@ from gpca.objects.source import data_files
 from gpca.policies import policy_entry
 from gpca.published import PUBLISHED, read_published
 from gpca.reasons import REASONS
-from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES
+from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES, encoder_title
 from gpca.reporting.kernel_tables import kernel_tables_of
 from gpca.reporting.learner_figures import LEARNER_FIGURES
 from gpca.reporting.learner_tables import LEARNER_TABLES
 from gpca.reporting.learning_tables import LEARNING_TABLES
+from gpca.reporting.pipeline_figure import TITLES as PIPELINE_STRATEGIES
 from gpca.reporting.sections import caption_files, section_of, title_of_result
 from gpca.reporting.tables import GPCA, TABLE1, title_of
 
@@ -294,7 +295,23 @@ RECOVERY_FIGURES = {  # and what each is drawn from
     "fig6_mitigation": f"recovery/policy_seed{SEEDS[0]}.json",
     "fig1_recovery_example": f"recovery/example_seed{SEEDS[0]}.npz",
 }
+# One registration of the source that figures show, and what the stages of GP-CA make of it.
+GPCA_SHOWN = next((name for name in reversed(GPCA) if name in config["explainers"]), "")
+SHOWN_STAGES = {
+    name: f"results/{{run}}/{name}/{config['figures']['source']}{folder}/seed{SEEDS[0]}.{suffix}"
+    for name, folder, suffix in (
+        ("registrations", "", "npz"),
+        ("embeddings", f"/{EMBEDDING}", "npz"),
+        ("predictions", f"/{GPCA_SHOWN}", "csv"),
+    )
+}
+SHOWN_STRATEGIES = [name for name in PIPELINE_STRATEGIES if name in STRATEGIES]
+METHOD_FIGURES = [
+    *(["fig2_overview"] if GPCA_SHOWN else []),
+    *(["fig4_pipeline"] if GPCA_SHOWN and SHOWN_STRATEGIES else []),
+]
 FIGURES = [
+    *METHOD_FIGURES,
     *REAL_WORLD_FIGURES,
     "fig3_concepts",
     "fig_attribution_confusions",

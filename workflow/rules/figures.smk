@@ -21,10 +21,39 @@ rule objects_figure:
         "../scripts/contact_sheet.py"
 
 
+rule fig2_overview:
+    input:
+        **SHOWN_STAGES,
+        code=code_files("gpca.reporting.overview_figure", "gpca.reporting.script"),
+    output:
+        pdf="results/{run}/figures/fig2_overview.pdf",
+        png=report(
+            "results/{run}/figures/fig2_overview.png",
+            category="Figures",
+            labels={"figure": "2"},
+        ),
+    log:
+        "results/{run}/logs/figures/fig2_overview.log",
+    benchmark:
+        "results/{run}/benchmarks/figures/fig2_overview.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        title=title_of(SOURCES[config["figures"]["source"]]),
+        encoder=encoder_title(**config["embedding"]),
+        treatments=RECOVERY["treatments"],
+    script:
+        "../scripts/overview_figure.py"
+
+
 rule fig3_concepts:
     input:
-        objects=f"results/{{run}}/objects/{config['figures']['fig3_source']}.npz",
-        registrations=f"results/{{run}}/registrations/{config['figures']['fig3_source']}/seed{SEEDS[0]}.npz",
+        objects=f"results/{{run}}/objects/{config['figures']['source']}.npz",
+        registrations=f"results/{{run}}/registrations/{config['figures']['source']}/seed{SEEDS[0]}.npz",
         code=code_files("gpca.reporting.concepts_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig3_concepts.pdf",
@@ -40,9 +69,44 @@ rule fig3_concepts:
         mem_mb=2000,
         runtime=10,
     params:
-        title=title_of(SOURCES[config["figures"]["fig3_source"]]),
+        title=title_of(SOURCES[config["figures"]["source"]]),
     script:
         "../scripts/concepts_figure.py"
+
+
+rule fig4_pipeline:
+    input:
+        **SHOWN_STAGES,
+        curves=collect(
+            "results/{{run}}/active_learning/{source}/{strategy}/seed{seed}.csv",
+            source=config["figures"]["source"],
+            strategy=SHOWN_STRATEGIES,
+            seed=SEEDS,
+        ),
+        code=code_files("gpca.reporting.pipeline_figure", "gpca.reporting.script"),
+    output:
+        pdf="results/{run}/figures/fig4_pipeline.pdf",
+        png=report(
+            "results/{run}/figures/fig4_pipeline.png",
+            category="Figures",
+            labels={"figure": "4"},
+        ),
+    log:
+        "results/{run}/logs/figures/fig4_pipeline.log",
+    benchmark:
+        "results/{run}/benchmarks/figures/fig4_pipeline.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        title=title_of(SOURCES[config["figures"]["source"]]),
+        encoder=encoder_title(**config["embedding"]),
+        batch=config["active_learning"]["batch"],
+    script:
+        "../scripts/pipeline_figure.py"
 
 
 rule fig_attribution_confusions:
