@@ -9,6 +9,7 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
 import yaml
 
@@ -94,6 +95,17 @@ def test_every_snakemake_command_can_be_planned(command, tmp_path):
     assert plan.returncode == 0, plan.stderr
 
 
+@pytest.mark.parametrize("page", ["quick_start", "explain"])
+def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeypatch, capsys):
+    model.save(tmp_path / "model.pt")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GPCA_MODEL", str(tmp_path / "model.pt"))
+    [example] = re.findall(r"^```python\n(.*?)^```", (ROOT / f"docs/{page}.md").read_text(), re.MULTILINE | re.DOTALL)
+    clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
+    exec(example, clouds | {"T_target_source_init": np.eye(4)})
+    assert set(capsys.readouterr().out.split()) & {"noise", "pose", "overlap"}
+
+
 def test_every_page_of_the_docs_is_in_the_index():
     index = (ROOT / "docs/README.md").read_text()
     pages = {path.name for path in (ROOT / "docs").glob("*.md")} - {"README.md"}
@@ -133,8 +145,22 @@ def test_every_key_of_a_source_is_described():
     assert described == set(keys)
 
 
-def test_every_table_and_figure_of_the_readme_is_made():
-    listed = re.findall(r"^\| `(tables|figures)/([a-z0-9_]+)", (ROOT / "README.md").read_text(), re.MULTILINE)
+def test_the_resources_of_the_cluster_page_are_those_of_the_rules():
+    rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
+    page = (ROOT / "docs/cluster.md").read_text()
+    for declared, pattern in {
+        "threads": r"threads: (\d+)",
+        "mem_mb": r"mem_mb=(\d+)",
+        "runtime": r"runtime=(\d+)",
+    }.items():
+        values = sorted(set(map(int, re.findall(pattern, rules))))
+        [shown] = re.findall(rf"^\| `{declared}`.*\| (\d+(?: to \d+)?)\b[^|]*\|$", page, re.MULTILINE)
+        assert shown == (f"{values[0]} to {values[-1]}" if len(values) > 1 else str(values[0]))
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/reproducing.md"])
+def test_every_listed_table_and_figure_is_made(page):
+    listed = re.findall(r"`(tables|figures)/([a-z0-9_]+)[`.]", (ROOT / page).read_text())
     rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
     by_name = {*LEARNING_TABLES, *KERNEL_TABLES, *LEARNER_TABLES, *LEARNER_FIGURES}
     assert {kind for kind, _ in listed} == {"tables", "figures"}
