@@ -119,12 +119,12 @@ def read_stages(folder: Path) -> dict[str, Stage]:
         distinct.setdefault(path.read_bytes(), path)
     for path in distinct.values():
         stage = stages.setdefault(_stage_name(path.relative_to(folder)), Stage())
-        stage.work_s += _number(path, "seconds")
-        stage.peaks_mb += _number(path, "peak_memory_mb")
+        stage.work_s += number(path, "seconds")
+        stage.peaks_mb += number(path, "peak_memory_mb")
     for path in sorted((folder / "benchmarks").rglob("*.tsv")):
         stage = stages.setdefault(_stage_name(path.relative_to(folder / "benchmarks")), Stage())
-        stage.job_s += _number(path, "s")
-        stage.peaks_mb += _number(path, "max_rss")
+        stage.job_s += number(path, "s")
+        stage.peaks_mb += number(path, "max_rss")
     if not any(stage.work_s for stage in stages.values()):
         raise InputError(folder, f"holds no *{SIDECAR}", "make the run with this version of the workflow")
     return dict(sorted(stages.items(), key=lambda item: _place(item[0])))
@@ -133,7 +133,7 @@ def read_stages(folder: Path) -> dict[str, Stage]:
 def wall_time(folder: Path) -> float:
     """Return the seconds from the start of the first recorded job of a run to its last file."""
     files = (folder / "benchmarks").rglob("*.tsv")
-    starts = [path.stat().st_mtime - seconds for path in files for seconds in _number(path, "s")]
+    starts = [path.stat().st_mtime - seconds for path in files for seconds in number(path, "s")]
     if not starts:
         raise InputError(folder, "holds no benchmark files", "make the run with this version of the workflow")
     return max(path.stat().st_mtime for path in folder.rglob("*") if path.is_file()) - min(starts)
@@ -186,7 +186,7 @@ def _place(stage: str) -> int:
     return STAGES.index(stage) if stage in STAGES else len(STAGES)
 
 
-def _number(path: Path, key: str) -> list[float]:
+def number(path: Path, key: str) -> list[float]:
     """Return the record's number in a list; an empty one where psutil found none (a very short job)."""
     text = path.read_text(encoding="utf-8")
     try:

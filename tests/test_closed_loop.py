@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gpca import actions
 from gpca.actions import ACTIONS, action_of, best_start
 from gpca.attribution import Attribution
 from gpca.cases import RobotIn, after, first, registered
@@ -20,6 +21,7 @@ from gpca.recovery import QUEUE, RecoveryPolicy, Thresholds
 from gpca.registration import ICPSettings
 from gpca.rigid import inverse, rotation_angle_rad
 
+from .documents import block
 from .frames.tiny import scene_settings, surfaces
 
 LOOP = LoopSettings(failures=1, tries=12, budget=3, points=400)
@@ -85,6 +87,16 @@ def test_denoising_takes_more_frames_each_time_and_keeps_doing_so(start):
     assert once.holding.filtered
     looked = after(situation, once, ACTIONS["new_view"], ("denoise", "new_view"), LOOP.points, ICP)
     assert looked.holding.frames == 10
+
+
+def test_the_action_of_the_documentation_sees_the_object_from_closer(start):
+    situation, outcome = start
+    added = dict(vars(actions)) | {"ACTIONS": dict(ACTIONS)}
+    exec(block("gpca/actions.py"), added)
+    result = after(situation, outcome, added["ACTIONS"]["closer"], ("closer",), LOOP.points, ICP)
+    away, near = result.holding.shots
+    assert away is outcome.holding.shots[0]
+    assert near.mask.sum() > 1.5 * away.mask.sum()
 
 
 def test_the_pose_that_explains_the_shots_is_started_from(start):

@@ -7,6 +7,7 @@ import pytest
 
 from gpca.objects.canonical import ObjectClouds
 
+from ..documents import block, blocks_of
 from .conftest import without_ends
 
 SMOKE = ("--configfile", "config/smoke.yaml")
@@ -20,10 +21,10 @@ LEARNED |= {"diagnostics": 1, "learner_table": 3, "learner_figure": 3}
 
 @pytest.fixture
 def meshes(tmp_path):
-    """A folder with three meshes in three formats, in millimetres."""
+    """A folder with three meshes in three formats, in millimetres, as docs/adding.md has it."""
     import trimesh
 
-    folder = tmp_path / "data" / "parts"
+    folder = tmp_path / "data" / "my_parts"
     folder.mkdir(parents=True)
     trimesh.creation.box((40, 70, 100)).export(folder / "brick.stl")
     trimesh.creation.cone(30, 90).export(folder / "cone.ply")
@@ -31,57 +32,50 @@ def meshes(tmp_path):
     return folder
 
 
-def test_a_folder_of_meshes_becomes_a_row_by_one_entry(finished, meshes):
-    finished.append(
-        "config/sources.yaml", "  my_parts: {title: My parts, kind: mesh_folder, location: parts, unit: mm}\n"
-    )
+def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, meshes):
+    finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     planned = finished.dry_run("all", *SMOKE, *data_dir)
     assert without_ends(planned.jobs) == ROW | COLLECTORS | LEARNED
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in planned.outputs
 
-    path = "results/smoke/objects/my_parts.npz"
-    finished.snakemake("-j1", path, *SMOKE, *data_dir)
-    objects = ObjectClouds.load(finished.folder / path)
-    assert objects.names == ("brick", "cone", "ring")
-    assert objects.diameters_m[0] == pytest.approx(np.linalg.norm((0.04, 0.07, 0.10)))
+    for file, text in blocks_of("docs/adding.md"):
+        if "torus" in file:
+            (finished.folder / file).parent.mkdir(exist_ok=True)
+            (finished.folder / file).write_text(text)
+    planned = finished.dry_run("all", *SMOKE, *data_dir)
+    both = {rule: 2 * count for rule, count in ROW.items()} | {"objects": 1, "torus": 1}
+    assert without_ends(planned.jobs) == both | COLLECTORS | LEARNED
+    assert "results/smoke/predictions/torus/gpca_paper/seed0.csv" in planned.outputs
 
-
-RULE = """
-SOURCES["ball"] = {"title": "Ball", "stand_in": True}
-
-
-rule ball:
-    output:
-        "results/{run}/objects/ball.npz",
-    shell:
-        "python ball.py {output}"
-"""
-BALL = """
-import sys
-import trimesh
-from gpca.objects.canonical import write_objects
-from gpca.objects.surface import Surface
-
-ball = trimesh.creation.icosphere(radius=0.05)
-write_objects([Surface("ball", ball.vertices, ball.faces)], "ball", sys.argv[1], n_points=2048)
-"""
-
-
-def test_a_rule_of_an_own_source_becomes_a_row(finished):
-    folder = finished.folder / "workflow/rules/sources"
-    folder.mkdir(exist_ok=True)
-    (folder / "ball.smk").write_text(RULE)
-    (finished.folder / "ball.py").write_text(BALL)
-    planned = finished.dry_run("all", *SMOKE)
-    assert (
-        without_ends(planned.jobs)
-        == {rule: ROW[rule] for rule in ROW if rule != "objects"} | {"ball": 1} | COLLECTORS | LEARNED
+    table2 = "results/smoke/tables/table2_per_concept"
+    finished.snakemake("-j2", f"{table2}.md", *SMOKE, *data_dir)
+    parts, torus = (
+        ObjectClouds.load(finished.folder / f"results/smoke/objects/{name}.npz") for name in ("my_parts", "torus")
     )
-    assert "results/smoke/predictions/ball/gpca_paper/seed0.csv" in planned.outputs
-    registrations = "results/smoke/registrations/ball/seed0.npz"
-    finished.snakemake("-j1", registrations, *SMOKE)
-    assert (finished.folder / registrations).is_file()
+    assert parts.names == ("brick", "cone", "ring")
+    assert parts.diameters_m[0] == pytest.approx(np.linalg.norm((0.04, 0.07, 0.10)))
+    assert torus.diameters_m[0] == pytest.approx(0.11, rel=0.01)
+    markdown = (finished.folder / f"{table2}.md").read_text()
+    assert markdown.count("\n| My parts |") == markdown.count("\n| Torus (procedural stand-in) |") == 2
+    with (finished.folder / f"{table2}.csv").open() as file:
+        means = {row["source"]: float(row["mean"]) for row in csv.DictReader(file) if row["concept"] == "all"}
+    assert all(0 < means[name] <= 100 for name in ("my_parts", "torus"))
+
+
+def test_a_strategy_and_an_encoder_of_the_docs_are_planned(project):
+    """The config alone: that they run is tested without the workflow, in tests/test_adding.py."""
+    acquisition = project.folder / "gpca/acquisition.py"
+    acquisition.write_text(acquisition.read_text() + block("gpca/acquisition.py", "bald_dense"))
+    registry = project.folder / "gpca/encoders/registry.py"
+    registry.write_text(registry.read_text() + block("gpca/encoders/registry.py", "pointwise"))
+    (project.folder / "gpca/encoders/pointwise.py").write_text(block("gpca/encoders/pointwise.py"))
+    mine = [block("config/config.yaml", name) for name in ("bald_dense", "pointwise")]
+    (project.folder / "mine.yaml").write_text("".join(mine))
+    planned = project.dry_run("results/smoke/tables/table3_extended.md", *SMOKE, "mine.yaml")
+    assert "results/smoke/active_learning/ycb/bald_dense/seed1.csv" in planned.outputs
+    assert "results/smoke/embeddings/ycb/pointwise/none/seed0.npz" in planned.outputs
+    assert not [path for path in planned.outputs if "dgcnn" in path or "badge" in path]
 
 
 EXPLAINER = """

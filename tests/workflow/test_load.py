@@ -63,3 +63,12 @@ def test_every_rule_says_what_it_needs_and_where_it_logs(path):
         for keyword in ("log", "benchmark", "threads", "resources", "conda"):
             assert f"\n    {keyword}:" in rule, (rule.split(":")[0], keyword)
         assert "\n    run:" not in rule
+
+
+def test_the_slurm_profile_plans_everything_with_what_the_rules_declare(project):
+    pytest.importorskip("snakemake_executor_plugin_slurm")
+    done = project.snakemake("-n", "all", "--profile", "workflow/profiles/slurm")
+    assert "profiles/slurm and workflow specific profile profiles/default" in done.stderr
+    encoder = re.search(r"^rule encoder:\n(?:    .*\n)+", done.stdout, re.MULTILINE)[0]
+    assert "mem_mb=3000" in encoder
+    assert "runtime=60" in encoder

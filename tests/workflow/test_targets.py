@@ -119,7 +119,7 @@ EDITS = {
     "gpca/objects/shapes/cups.py": {
         "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
         "objects_figure": 1, "fig3_concepts": 1, "embeddings_without": 2, "active_learning": 2, "shift": 3,
-    } | COLLECTORS | LEARNED | DIAGNOSED,
+    } | COLLECTORS | LEARNED | DIAGNOSED | METHOD,
 }  # fmt: skip
 
 

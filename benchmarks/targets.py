@@ -1,0 +1,188 @@
+"""What each table and figure of a finished run takes: jobs, core time, wall time, memory.
+
+    python benchmarks/targets.py results/real [--configfile config/real.yaml] [--config data_dir=/data] [--cores 2]
+    python benchmarks/targets.py results/real --write docs/reproducing.md
+
+Snakemake's plan of the whole run (a dry run, nothing is made) says which jobs a target needs; the run's benchmark files
+say how long each took and how much memory it held. Core time is the sum over those jobs. Wall time is that of a
+schedule which starts the next job as soon as a core is free, the higher priority first: without Snakemake's own start,
+some ten seconds. A job that was killed and continued counts with its last part alone. --write puts the table between
+the two comments that the page has for the run. The last line is a JSON object of the target `all`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import heapq
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+from benchmarks.pipeline import number  # noqa: E402 (the script runs from a plain checkout)
+from gpca.errors import InputError  # noqa: E402
+from gpca.files import whole_file  # noqa: E402
+
+TARGETS = re.compile(r"(tables/\w+\.md|figures/\w+\.png|[\w.]+)$")  # and what lies in the run's folder itself
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job of the plan: files read and written, its benchmark file (relative to the run), how it is scheduled."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    benchmark: str
+    priority: int
+    threads: int
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a target takes: number of jobs, seconds on one core and on several, memory of its largest job in MB."""
+
+    jobs: int
+    core_s: float
+    wall_s: float
+    peak_mb: float
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="of the run, such as results/real")
+    parser.add_argument("--configfile", type=Path, help="as for snakemake; by default config/{run}.yaml where it is")
+    parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
+    parser.add_argument("--cores", type=int, default=2, help="of the wall time, default 2")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the table")
+    options = parser.parse_args(arguments)
+    try:
+        if not (options.folder / "benchmarks").is_dir():
+            raise InputError(options.folder, "holds no benchmark files", "name the folder of a finished run")
+        run = options.folder.resolve().name
+        jobs = read_plan(plan(run, options.configfile, options.config), run)
+        costs = {target: cost(needed, options.folder, options.cores) for target, needed in targets(jobs).items()}
+        lines = table(costs, options.cores)
+        if options.write:
+            write_between(options.write, f"results/{run}", lines)
+    except InputError as fault:
+        print(f"targets: {fault}", file=sys.stderr)
+        return 2
+    print("\n".join(lines))
+    print(json.dumps(vars(costs["all"]) if costs["all"] else {}))
+    return 0
+
+
+def plan(run: str, configfile: Path | None, config: list[str]) -> str:
+    """Return what Snakemake prints of a dry run of everything, done or not."""
+    named = ROOT / f"config/{run}.yaml"
+    configfile = configfile or (named if named.is_file() else None)
+    command = [sys.executable, "-m", "snakemake", "--dry-run", "--forceall", "--nolock", "all"]
+    command += ["--config", *config, f"run={run}", *(["--configfile", str(configfile)] if configfile else [])]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("SNAKEMAKE")}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode:
+        line = done.stderr.strip().splitlines()[-1]
+        raise InputError(f"the plan of run '{run}'", f"cannot be made: {line}", "give --configfile and --config")
+    return done.stdout
+
+
+def read_plan(text: str, run: str) -> list[Job]:
+    """Return the jobs that leave a benchmark file; paths below the run's folder are relative to it."""
+    jobs, prefix = [], f"results/{run}/"
+    for block in re.split(r"^(?:local)?rule \w+:$", text, flags=re.MULTILINE)[1:]:
+        given = dict(re.findall(r"^    (input|output|benchmark|priority|threads): (.*)$", block, flags=re.MULTILINE))
+        if "benchmark" in given:
+            inputs, outputs = (
+                tuple(path.removeprefix(prefix) for path in given.get(name, "").split(", "))
+                for name in ("input", "output")
+            )
+            scheduled = (int(given.get(name, default)) for name, default in (("priority", 0), ("threads", 1)))
+            jobs.append(Job(inputs, outputs, given["benchmark"].removeprefix(prefix), *scheduled))
+    return jobs
+
+
+def targets(jobs: list[Job]) -> dict[str, list[Job]]:
+    """Return the jobs that each target needs, by its path, and those of `all`."""
+    maker = {path: job for job in jobs for path in job.outputs}
+
+    def needed(target: str) -> list[Job]:
+        found: dict[str, Job] = {}
+        open_paths = [target]
+        while open_paths:
+            job = maker.get(open_paths.pop())
+            if job and job.benchmark not in found:
+                found[job.benchmark] = job
+                open_paths += job.inputs
+        return list(found.values())
+
+    shown = sorted(path for path in maker if TARGETS.match(path))
+    return {path: needed(path) for path in shown} | {"all": jobs}
+
+
+def cost(jobs: list[Job], folder: Path, cores: int) -> Cost | None:
+    """Return what the jobs took, by their benchmark files; None where one of them has none."""
+    records = {job.benchmark: folder / job.benchmark for job in jobs}
+    if not all(path.is_file() for path in records.values()):
+        return None
+    seconds = {name: sum(number(path, "s")) for name, path in records.items()}
+    peak_mb = max((mb for path in records.values() for mb in number(path, "max_rss")), default=0.0)
+    core_s = sum(seconds[job.benchmark] * job.threads for job in jobs)
+    return Cost(len(jobs), core_s, wall_time(jobs, seconds, cores), peak_mb)
+
+
+def wall_time(jobs: Iterable[Job], seconds: Mapping[str, float], cores: int) -> float:
+    """Return the seconds until the last job ends, where each starts once its inputs are there and its cores free."""
+    waiting = sorted(jobs, key=lambda job: (-job.priority, -seconds[job.benchmark], job.benchmark))
+    missing = {path for job in waiting for path in job.outputs}
+    running: list[tuple[float, str, Job]] = []
+    now, free = 0.0, cores
+    while waiting or running:
+        for job in list(waiting):
+            if min(job.threads, cores) <= free and not missing.intersection(job.inputs):
+                free -= min(job.threads, cores)
+                heapq.heappush(running, (now + seconds[job.benchmark], job.benchmark, job))
+                waiting.remove(job)
+        now, _, ended = heapq.heappop(running)
+        free += min(ended.threads, cores)
+        missing.difference_update(ended.outputs)
+    return now
+
+
+def table(costs: Mapping[str, Cost | None], cores: int) -> list[str]:
+    """Return the Markdown table, a row per target."""
+    lines = [f"| target | jobs | core time (min) | wall time on {cores} cores (min) | largest job (MB) |"]
+    lines.append("|---|---:|---:|---:|---:|")
+    for target, of_target in costs.items():
+        cells = ["not measured", "", "", ""]
+        if of_target:
+            minutes = (f"{value_s / 60:.1f}" for value_s in (of_target.core_s, of_target.wall_s))
+            cells = [str(of_target.jobs), *minutes, f"{of_target.peak_mb:.0f}"]
+        lines.append(f"| `{target}` | {' | '.join(cells)} |")
+    return lines
+
+
+def write_between(page: Path, name: str, lines: list[str]) -> None:
+    """Replace what stands between the page's comments `<!-- times of NAME -->` and `<!-- end of NAME -->`.
+
+    Raises:
+        InputError: no such page, or it has no such comments.
+    """
+    if not page.is_file():
+        raise InputError(page, "no such page", "name a Markdown file")
+    begin, end = f"<!-- times of {name} -->\n", f"<!-- end of {name} -->"
+    before, found_begin, rest = page.read_text(encoding="utf-8").partition(begin)
+    _, found_end, after = rest.partition(end)
+    if not found_begin or not found_end:
+        raise InputError(page, f"has no place for {name}", f"add the lines '{begin.strip()}' and '{end}'")
+    with whole_file(page) as partial:
+        partial.write_text(before + begin + "\n".join(["", *lines, "", ""]) + end + after, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,55 @@
+"""The project's texts, as several tests read them: pages, command lines, and blocks that belong into a file."""
+
+import os
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+NOT_OURS = {"__pycache__", "data", "build"}
+
+
+def our_files():
+    """All text files of the project; of results/ only what git keeps, of hidden ones .ci/ and .gitignore."""
+    for folder, folders, names in os.walk(ROOT):
+        here = Path(folder).relative_to(ROOT)
+        kept = {"reference"} if here == Path("results") else set(folders) - NOT_OURS
+        folders[:] = sorted(name for name in folders if name in kept and (name[0] != "." or name == ".ci"))
+        for name in sorted(name for name in names if name[0] != "." or name == ".gitignore"):
+            path = Path(folder, name)
+            if path.suffix not in {".png", ".pdf", ".npz", ".pt", ".log"}:
+                yield path
+
+
+def relative(path):
+    return str(path.relative_to(ROOT))
+
+
+PAGES = [path for path in our_files() if path.suffix == ".md" and "reference" not in path.parts]
+
+
+def code_in(text):
+    """Command lines in fenced blocks, without their comments, and spans of code in the running text."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
+    return [code for code in (*lines, *re.findall(r"`([^`\n]+)`", prose)) if code and not code.startswith("#")]
+
+
+def commands(program):
+    """Every different command of that program on any page."""
+    found = {code for page in PAGES for code in code_in(page.read_text()) if code.startswith(program)}
+    assert found, f"no page names a command of {program}"
+    return sorted(found)
+
+
+def blocks_of(page):
+    """Fenced blocks whose first line names the file they belong to, in order: (file, text)."""
+    fenced = re.findall(r"^```\w+\n# (\S+\.\w+)\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+    assert fenced
+    return fenced
+
+
+def block(file, containing="", page="docs/adding.md"):
+    """The one block of the page that belongs into that file and contains that text."""
+    [text] = [text for name, text in blocks_of(page) if name == file and containing in text]
+    return text

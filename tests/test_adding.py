@@ -1,0 +1,141 @@
+"""The examples of docs/adding.md, taken from that page and run; those that need the workflow: tests/workflow."""
+
+import sys
+from dataclasses import replace
+from importlib import import_module, invalidate_caches
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from snakemake.utils import update_config
+
+from gpca import acquisition
+from gpca.config import check
+
+from .documents import ROOT, block
+
+
+@pytest.fixture
+def config():
+    """The embedded default, as Snakemake puts it together."""
+    merged = {}
+    for name in ("sources", "config"):
+        update_config(merged, yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()))
+    return merged
+
+
+@pytest.fixture
+def added_modules(tmp_path, monkeypatch):
+    """Put an example's module beside its siblings without writing into the project."""
+    names = []
+
+    def add(file, containing=""):
+        path = tmp_path / file
+        path.parent.mkdir(parents=True)
+        path.write_text(block(file, containing))
+        package = import_module(".".join(Path(file).parent.parts))
+        monkeypatch.setattr(package, "__path__", [*package.__path__, str(path.parent)])
+        invalidate_caches()
+        names.append(".".join(Path(file).with_suffix("").parts))
+        return import_module(names[-1])
+
+    yield add
+    for name in names:
+        sys.modules.pop(name, None)
+
+
+def test_a_dataset_by_an_entry(config, tmp_path):
+    import trimesh
+
+    from gpca.objects.source import surfaces
+
+    (tmp_path / "my_parts").mkdir()
+    trimesh.creation.box((40, 50, 60)).export(tmp_path / "my_parts" / "brick.stl")
+    update_config(config, yaml.safe_load(block("config/sources.yaml", "my_parts")))
+    entry = check(config | {"data_dir": str(tmp_path)})["my_parts"]
+    assert entry["stand_in"] is False
+    [surface] = surfaces(entry, tmp_path)
+    assert surface.name == "brick"
+    assert surface.vertices_m.max() == pytest.approx(0.03)
+
+
+def test_an_explainer(config, added_modules, registrations, tmp_path):
+    import pandas as pd
+
+    from gpca.explainer import explainer_entry
+    from gpca.predictions import write_predictions
+
+    added_modules("baselines/nearest_quality.py")
+    update_config(config, yaml.safe_load(block("config/config.yaml", "nearest_quality")))
+    check(config)
+    explainer = explainer_entry("nearest_quality").make("tiny", 0, **config["explainers"]["nearest_quality"])
+    explainer.fit(registrations.subset(registrations.rows("train")))
+    attribution = explainer.explain(registrations.without_labels())
+    np.testing.assert_allclose(attribution.scores_N_C.sum(axis=1), 1)
+    write_predictions(tmp_path / "predictions.csv", registrations, attribution)
+    rows = pd.read_csv(tmp_path / "predictions.csv")
+    assert (rows["concept_predicted"] == rows["concept_true"]).mean() > 0.5  # chance is a third
+
+
+def test_an_encoder(config, added_modules, registrations, monkeypatch):
+
+    from gpca.encoders import registry
+    from gpca.encoders.training import EncoderSettings, embed, train_encoder
+
+    added_modules("gpca/encoders/pointwise.py")
+    monkeypatch.setattr(registry, "ENCODERS", dict(registry.ENCODERS))
+    exec(block("gpca/encoders/registry.py", "pointwise"), {"ENCODERS": registry.ENCODERS})
+    update_config(config, yaml.safe_load(block("config/config.yaml", "pointwise")))
+    check(config)
+    assert config["embedding"]["encoder"] in config["encoders"]
+    settings = EncoderSettings(**config["encoders"]["pointwise"] | {"epochs": 1, "points": 64})
+    model, curve = train_encoder(registrations, "tiny", 0, settings)
+    assert len(curve) == 1
+    h_S_d, _ = embed(model, registrations, "tiny", 0, settings)
+    assert h_S_d.shape == (len(registrations), 128)
+    assert np.isfinite(h_S_d).all()
+
+
+def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
+    from gpca.active_learning import ActiveLearningSettings, initial_gpc, learn, make_task
+    from gpca.gpc import GPCSettings
+    from gpca.learning_curves import POOL_COLUMNS, write_curves
+    from gpca.learning_metrics import collect_curves
+    from gpca.reporting.learning_tables import LEARNING_TABLES
+
+    monkeypatch.setitem(acquisition.STRATEGIES, "bald_dense", None)  # taken out again at the end
+    exec(block("gpca/acquisition.py"), dict(vars(acquisition)))
+    update_config(config, yaml.safe_load(block("config/config.yaml", "bald_dense")))
+    check(config)
+
+    random = np.random.default_rng(0)
+    concepts, concept_S = np.unique(registrations.concept, return_inverse=True)
+    h_S_8 = (4 * random.normal(size=(len(concepts), 8)))[concept_S] + random.normal(size=(len(registrations), 8))
+    gpc = GPCSettings(learning_rate=0.05, iterations=20, inducing=12, draws=100)
+    settings = ActiveLearningSettings(initial=12, labels=8, batch=4, gpc=gpc)
+    task = make_task(replace(registrations, attached={"embedding": h_S_8}), "overlap", settings, "tiny", 0)
+    start = initial_gpc(task, settings, "tiny", 0)
+    paths = []
+    for name in config["active_learning"]["strategies"]:
+        steps = learn(task.projected(start), start, name, settings, "tiny", 0)
+        assert [step["labels"] for step in steps] == [0, 4, 8]
+        paths.append(tmp_path / f"tiny/{name}/seed0.csv")
+        paths[-1].parent.mkdir(parents=True)
+        write_curves(paths[-1], {("pretrained", "overlap"): steps}, POOL_COLUMNS)
+    titles = {name: acquisition.STRATEGIES[name].title for name in config["active_learning"]["strategies"]}
+    sources = {"tiny": {"title": "Tiny", "stand_in": False}}
+    conditions = config["active_learning"] | config["registrations"]
+    table = LEARNING_TABLES["table3_extended"](collect_curves(paths, 0.9), sources, titles, conditions)
+    table.write(*(tmp_path / f"table.{suffix}" for suffix in ("csv", "md", "tex")))
+    assert (tmp_path / "table.md").read_text().count("| BALD, density-weighted |") == 1
+
+
+def test_a_recovery_action_passes_the_check(config, monkeypatch):
+    from gpca import actions
+
+    monkeypatch.setitem(actions.ACTIONS, "closer", None)
+    exec(block("gpca/actions.py"), dict(vars(actions)))
+    update_config(config, yaml.safe_load(block("config/config.yaml", "closer")))
+    check(config)
+    assert config["recovery"]["actions"].keys() == actions.ACTIONS.keys()

@@ -1,0 +1,112 @@
+"""What a target takes, summed over the jobs of Snakemake's own plan, on made-up benchmark files."""
+
+import json
+
+import pytest
+
+from benchmarks import targets
+from benchmarks.targets import Job, cost, read_plan, wall_time
+from gpca.errors import InputError
+
+HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
+TABLE2 = 3 + 6 + 6 + 6 + 6 + 1  # objects, registrations, encoders, embeddings, GP-CA twice for three sources; the table
+
+
+def job(name, *inputs, priority=0, threads=1):
+    return Job(inputs, (name,), f"benchmarks/{name}.tsv", priority, threads)
+
+
+@pytest.fixture(scope="module")
+def smoke_plan():
+    return targets.plan("smoke", None, [])
+
+
+@pytest.fixture
+def run_folder(smoke_plan, tmp_path):
+    """A run in which every job took 30 s and 100 MB, but one training 300 s and 900 MB."""
+    folder = tmp_path / "smoke"
+    for planned in read_plan(smoke_plan, "smoke"):
+        path = folder / planned.benchmark
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(HEADER + "30.0\t0:00:30\t100.0\t0\t0\t0\t0\t0\t100\t30\n")
+    long = folder / "benchmarks/encoders/ycb/dgcnn/seed1.tsv"
+    long.write_text(HEADER + "300.0\t0:05:00\t900.0\t0\t0\t0\t0\t0\t100\t30\n")
+    return folder
+
+
+def test_wall_time_keeps_order_cores_and_priority():
+    seconds = dict.fromkeys((f"benchmarks/{name}.tsv" for name in "abcd"), 10.0) | {"benchmarks/a.tsv": 25.0}
+    chain = [job("a"), job("b", "a"), job("c", "b")]
+    assert wall_time(chain, seconds, cores=2) == 45
+    side_by_side = [job("a"), job("b"), job("c"), job("d")]
+    assert wall_time(side_by_side, seconds, cores=1) == 55
+    assert wall_time(side_by_side, seconds, cores=2) == 30
+    late = [job("a"), job("b", priority=1), job("c", priority=1), job("d", "c")]
+    assert wall_time(late, seconds, cores=2) == 35  # a waits until b or c ends
+    assert wall_time([job("a", threads=2), job("b")], seconds, cores=2) == 35
+    assert wall_time([job("a", threads=8)], seconds, cores=2) == 25
+
+
+def test_a_target_counts_its_own_jobs_once_each(smoke_plan, run_folder):
+    by_target = targets.targets(read_plan(smoke_plan, "smoke"))
+    table2 = cost(by_target["tables/table2_per_concept.md"], run_folder, cores=2)
+    assert table2.jobs == TABLE2
+    assert table2.core_s == pytest.approx(30 * TABLE2 + 270)
+    assert table2.core_s / 2 <= table2.wall_s <= table2.core_s
+    assert table2.peak_mb == 900
+    objects = cost(by_target["figures/objects_ycb.png"], run_folder, cores=2)
+    assert (objects.jobs, objects.wall_s, objects.peak_mb) == (2, 60, 100)
+    assert {"tables/table6_backbones.md", "figures/fig3_concepts.png", "metrics.csv"} < set(by_target)
+    assert cost(by_target["all"], run_folder, cores=2).jobs == len(list(run_folder.rglob("*.tsv")))
+
+
+def test_a_target_with_a_job_that_was_not_recorded_is_not_measured(smoke_plan, run_folder):
+    (run_folder / "benchmarks/objects/ycb.tsv").unlink()
+    by_target = targets.targets(read_plan(smoke_plan, "smoke"))
+    assert cost(by_target["figures/objects_ycb.png"], run_folder, cores=2) is None
+    assert cost(by_target["figures/objects_linemod.png"], run_folder, cores=2).jobs == 2
+
+
+def test_memory_that_was_not_sampled_is_left_out(run_folder, smoke_plan):
+    (run_folder / "benchmarks/figures/objects_ycb.tsv").write_text(
+        HEADER + "0.1\t0:00:00\tNA\tNA\tNA\tNA\tNA\tNA\t0\t0\n"
+    )
+    by_target = targets.targets(read_plan(smoke_plan, "smoke"))
+    assert cost(by_target["figures/objects_ycb.png"], run_folder, cores=2).peak_mb == 100
+
+
+def test_the_command_prints_the_table_and_writes_it_into_its_page(
+    smoke_plan, run_folder, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(targets, "plan", lambda run, configfile, config: smoke_plan)
+    page = tmp_path / "page.md"
+    page.write_text("Before.\n\n<!-- times of results/smoke -->\nold\n<!-- end of results/smoke -->\n\nAfter.\n")
+    for _ in range(2):  # the second writing replaces the first
+        assert targets.main([str(run_folder), "--write", str(page)]) == 0
+    out = capsys.readouterr().out
+    assert json.loads(out.splitlines()[-1])["peak_mb"] == 900
+    text = page.read_text()
+    assert text.startswith("Before.\n\n<!-- times of results/smoke -->\n\n| target |")
+    assert text.endswith("<!-- end of results/smoke -->\n\nAfter.\n")
+    assert "old" not in text
+    assert text.count("| `figures/objects_ycb.png` | 2 | 1.0 | 1.0 | 100 |\n") == 1
+
+
+def test_faults_are_one_line_and_status_2(smoke_plan, run_folder, tmp_path, monkeypatch, capsys):
+    assert targets.main([str(tmp_path / "nowhere")]) == 2
+    assert "nowhere: holds no benchmark files; name the folder of a finished run" in capsys.readouterr().err
+    monkeypatch.setattr(targets, "plan", lambda run, configfile, config: smoke_plan)
+    (tmp_path / "page.md").write_text("No place.\n")
+    assert targets.main([str(run_folder), "--write", str(tmp_path / "page.md")]) == 2
+    err = capsys.readouterr().err
+    assert "page.md: has no place for results/smoke; add the lines '<!-- times of results/smoke -->' and" in err
+    assert (tmp_path / "page.md").read_text() == "No place.\n"
+    (run_folder / "benchmarks/objects/ycb.tsv").write_text("nothing\n")
+    assert targets.main([str(run_folder)]) == 2
+    assert "ycb.tsv: holds no number 's'; make the run anew" in capsys.readouterr().err
+
+
+def test_a_plan_that_cannot_be_made_says_why(tmp_path):
+    (tmp_path / "bad.yaml").write_text("sedes: [0]\n")
+    with pytest.raises(InputError, match="cannot be made: gpca: config key sedes: unknown"):
+        targets.plan("mine", tmp_path / "bad.yaml", [])
