@@ -4,7 +4,8 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: results report test smoke lint check-reference environment lock clean-environment help
+.PHONY: results report test test-library test-workflow smoke lint check-reference environment lock \
+        clean-environment help
 
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
@@ -13,6 +14,7 @@ PYTEST_ARGS ?=
 # Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
 RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
+PYTEST := $(RUN) OMP_NUM_THREADS=1 python -m pytest
 
 results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
 	$(RUN) snakemake -j$(CORES) all $(SNAKEMAKE_ARGS)
@@ -20,8 +22,19 @@ results: environment ## every table and figure of config/config.yaml, into resul
 report: environment ## Snakemake's report of the same run in one HTML file, results/{run}/report.html
 	$(RUN) snakemake -j$(CORES) report $(SNAKEMAKE_ARGS)
 
-test: environment ## the tests (PYTEST_ARGS passes through)
-	$(RUN) OMP_NUM_THREADS=1 python -m pytest $(PYTEST_ARGS)
+# Two halves side by side, as a test waits for one core most of the time; each prints its report when it is done.
+test: environment ## the tests, or those of PYTEST_ARGS alone
+ifeq ($(strip $(PYTEST_ARGS)),)
+	@$(MAKE) --no-print-directory -j$(CORES) --keep-going --output-sync=target test-workflow test-library
+else
+	$(PYTEST) $(PYTEST_ARGS)
+endif
+
+test-library: environment ## the tests of functions and steps
+	$(PYTEST) --ignore=tests/workflow
+
+test-workflow: environment ## the tests that run Snakemake, the whole smoke run among them
+	$(PYTEST) tests/workflow
 
 smoke: environment ## every rule of the workflow at tiny size
 	$(RUN) snakemake -j$(CORES) smoke $(SNAKEMAKE_ARGS)

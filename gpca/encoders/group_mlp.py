@@ -93,10 +93,11 @@ class _Edges:
 
     def __init__(self, groups: Groups, points_B_N_3: torch.Tensor) -> None:
         self.batch, n_points, _ = points_B_N_3.shape
-        neighbours, counts = groups.neighbours_B_M_k.numpy(), groups.counts_B_M.numpy()
+        # Contiguous all, or numba compiles the passes over them a second time.
+        neighbours, counts = (x.contiguous().numpy() for x in (groups.neighbours_B_M_k, groups.counts_B_M))
         self.slots = neighbours.size
         self.point, self.weight, self.ends = kernels.distinct_edges(neighbours, counts, n_points)
-        self.cloud_ends = self.ends[:: counts.shape[1]]
+        self.cloud_ends = self.ends[:: counts.shape[1]].copy()
 
 
 class _Gather(torch.autograd.Function):

@@ -17,7 +17,7 @@ class DirectLaplace(LastLayerLaplace):
 
 
 def test_laplace_draws_have_the_covariance_of_the_linearised_last_layer():
-    laplace = DirectLaplace("a", 0, draws=20000, hidden=6)
+    laplace = DirectLaplace("a", 0, draws=5000, hidden=6)
     drawn_M_N_C = laplace.drawn(H[:4])
     covariance = (laplace._vectors * laplace._deviations**2) @ laplace._vectors.T
     features = laplace._features(H[:4])

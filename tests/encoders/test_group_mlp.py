@@ -3,6 +3,7 @@ import copy
 import pytest
 import torch
 
+from gpca.encoders import group_mlp_kernels
 from gpca.encoders.group_mlp import GroupMLP
 from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
 
@@ -67,6 +68,17 @@ def test_inference_is_that_of_every_slot(grouped):
     groups = grouped(points)
     made(points, x, groups)
     torch.testing.assert_close(made.eval()(points, x, groups), made.plain(points, x, groups), **TOLERANCE)
+
+
+def test_numba_compiles_every_pass_once():
+    """For one layout of its arrays: compiling another one makes the first training seconds longer."""
+    for grouped in (balls, Groups.whole):
+        points, x = inputs()
+        made = layers()
+        in_training(made, made, points, x, grouped(points))
+        made.eval()(points, x, grouped(points))
+    for compiled in ("distinct_edges", "moments", "normalise", "normalise_backward", "normalise_max_backward"):
+        assert len(getattr(group_mlp_kernels, compiled).signatures) == 1, compiled
 
 
 def test_a_repeat_counts_in_the_statistics():

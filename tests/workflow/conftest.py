@@ -128,9 +128,14 @@ def _environment():
 
 
 def _sources_copied(origin, folder):
+    # Other tests may be running: what Python and numba are about to write beside the modules is gone before it is read.
+    unfinished = shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
     for name in NEEDED:
         # With their times, so that what numba has compiled beside the modules still counts.
-        (shutil.copytree if (origin / name).is_dir() else shutil.copy2)(origin / name, folder / name)
+        if (origin / name).is_dir():
+            shutil.copytree(origin / name, folder / name, ignore=unfinished)
+        else:
+            shutil.copy2(origin / name, folder / name)
     return Project(folder)
 
 
