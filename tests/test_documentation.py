@@ -64,7 +64,7 @@ def options_of(program):
     """The options that a step of `python -m gpca`, or a script, has."""
     if program in STEPS:
         parser = ArgumentParser()
-        import_module(f"gpca.steps.{program}").add_arguments(parser)
+        import_module(f"gpca.steps.{program.replace('-', '_')}").add_arguments(parser)
         return {"--threads", "--settings", *parser._option_string_actions}
     shown = subprocess.run([sys.executable, program, "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
     return set(re.findall(r"--[\w-]+", shown.stdout))
