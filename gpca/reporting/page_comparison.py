@@ -40,13 +40,14 @@ def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
     at_least = row.get("at_least", "").lower() == "true"
     return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict", "reason")} | {
         "tone": TONES.get(row["verdict"], ""),
-        "objects": row.get("objects", ""),
+        "objects": ", ".join(filter(None, (row.get("objects", ""), row.get("hardware", "")))),
         "published": printed["published"]
         + (f" to {upper}" if upper else "")
         + (f" ± {deviation}" if deviation else ""),
         "reproduced": "> " * at_least + printed["reproduced"],
         "interval": f"[{printed['ci_low']}, {printed['ci_high']}]" if printed["ci_low"] and printed["ci_high"] else "",
         "difference": printed["difference"],
+        "factor": f"× {float(row['factor']):.2g}" if row.get("factor") else "",
     }
 
 
@@ -55,7 +56,7 @@ def _rounded(path: str | Path, row: Mapping[str, str], name: str) -> str:
     if (text := row.get(name, "")) in ("", "nan"):
         return ""
     try:
-        value, decimals = float(text), int(row["decimals"])
+        value, decimals = float(text), max(0, int(row["decimals"]))  # below 0 for what is printed in round tens
     except ValueError as fault:
         raise InputError(path, f"'{name}' holds something that is not a number: '{text}'", "make it anew") from fault
     return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"

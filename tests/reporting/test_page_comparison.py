@@ -10,7 +10,7 @@ HEAD += "verdict,reason,objects\n"
 LINES = (
     "I,YCB,GP-CA,%,99.6,,,1,97.44,95.41,99.4,5,False,-2.16,,close,too few epochs,YCB\n",
     "I,YCB,SHAP,%,31.4,,,1,31.42,26.0,27.0,5,False,0.02,,reproduced,,YCB\n",
-    "III,YCB,random,labels,350.0,550.0,,0,812.0,,,5,True,262.0,,not reproduced,easier pool,YCB\n",
+    "III,YCB,random,labels,350.0,550.0,,-1,812.4,,,5,True,262.4,1.477,not reproduced,easier pool,YCB\n",
     "VI,DGCNN,none,%,85.2,,2.43,1,,,,,False,,,not run,asked for alone,\n",
 )
 
@@ -28,6 +28,7 @@ def test_numbers_have_the_papers_digits_and_verdicts_a_tone(tmp_path):
     assert (close["difference"], close["tone"], close["reason"]) == ("-2.2", "near", "too few epochs")
     assert same["difference"] == "0.02"  # not "0.0", which would claim more
     assert (bound["published"], bound["reproduced"], bound["interval"]) == ("350 to 550", "> 812", "")
+    assert (bound["difference"], bound["factor"]) == ("262", "× 1.5")
     assert (not_run["published"], not_run["reproduced"], not_run["tone"]) == ("85.2 ± 2.4", "", "")
     assert shown["tables"] == ["I", "III", "VI"]
 

@@ -27,11 +27,7 @@ rule fig2_overview:
         code=code_files("gpca.reporting.overview_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig2_overview.pdf",
-        png=report(
-            "results/{run}/figures/fig2_overview.png",
-            category="Figures",
-            labels={"figure": "2"},
-        ),
+        png=reported("results/{run}/figures/fig2_overview.png"),
     log:
         "results/{run}/logs/figures/fig2_overview.log",
     benchmark:
@@ -86,11 +82,7 @@ rule fig4_pipeline:
         code=code_files("gpca.reporting.pipeline_figure", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig4_pipeline.pdf",
-        png=report(
-            "results/{run}/figures/fig4_pipeline.png",
-            category="Figures",
-            labels={"figure": "4"},
-        ),
+        png=reported("results/{run}/figures/fig4_pipeline.png"),
     log:
         "results/{run}/logs/figures/fig4_pipeline.log",
     benchmark:
