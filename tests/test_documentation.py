@@ -84,13 +84,29 @@ def test_every_python_command_names_something_that_is_there(command):
         assert find_spec(words[1]) is not None
 
 
-@pytest.mark.parametrize("command", commands("snakemake "))
-def test_every_snakemake_command_can_be_planned(command, tmp_path):
-    if "slurm" in command:
+def snakemake_targets():
+    """The targets of every `snakemake` command by its other options, so that one plan covers all of them."""
+    parser = ArgumentParser(exit_on_error=False)
+    for option in ("--profile", "--configfile", "--config"):
+        parser.add_argument(option)
+    parser.add_argument("-j")
+    parser.add_argument("-n", action="store_true")
+    parser.add_argument("targets", nargs="+")
+    by_options = {}
+    for command in commands("snakemake "):
+        given = vars(parser.parse_args(shlex.split(command)[1:]))
+        options = [(f"--{name}", given[name]) for name in ("profile", "configfile", "config") if given[name]]
+        by_options.setdefault(tuple(word for option in options for word in option), set()).update(given["targets"])
+    return by_options
+
+
+@pytest.mark.parametrize(("options", "targets"), snakemake_targets().items(), ids=" ".join)
+def test_every_snakemake_command_can_be_planned(options, targets, tmp_path):
+    if "--profile" in options:
         pytest.importorskip("snakemake_executor_plugin_slurm")
-    words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in shlex.split(command)[1:]]
+    words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in (*options, "--", *sorted(targets))]
     plan = subprocess.run(
-        [sys.executable, "-m", "snakemake", *words, "--dry-run", "--quiet"], cwd=ROOT, capture_output=True, text=True
+        [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", *words], cwd=ROOT, capture_output=True, text=True
     )
     assert plan.returncode == 0, plan.stderr
 
