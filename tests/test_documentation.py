@@ -64,7 +64,7 @@ def options_of(program):
     """The options that a step of `python -m gpca`, or a script, has."""
     if program in STEPS:
         parser = ArgumentParser()
-        import_module(f"gpca.steps.{program}").add_arguments(parser)
+        import_module(f"gpca.steps.{program.replace('-', '_')}").add_arguments(parser)
         return {"--threads", "--settings", *parser._option_string_actions}
     shown = subprocess.run([sys.executable, program, "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
     return set(re.findall(r"--[\w-]+", shown.stdout))
@@ -86,17 +86,19 @@ def test_every_python_command_names_something_that_is_there(command):
 
 def snakemake_targets():
     """The targets of every `snakemake` command by its other options, so that one plan covers all of them."""
-    parser = ArgumentParser(exit_on_error=False)
+    parser = ArgumentParser()
     for option in ("--profile", "--configfile", "--config"):
         parser.add_argument(option)
     parser.add_argument("-j")
     parser.add_argument("-n", action="store_true")
-    parser.add_argument("targets", nargs="+")
+    parser.add_argument("targets", nargs="*")
     by_options = {}
     for command in commands("snakemake "):
-        given = vars(parser.parse_args(shlex.split(command)[1:]))
-        options = [(f"--{name}", given[name]) for name in ("profile", "configfile", "config") if given[name]]
-        by_options.setdefault(tuple(word for option in options for word in option), set()).update(given["targets"])
+        given, others = parser.parse_known_args(shlex.split(command)[1:])
+        named = [(f"--{name}", getattr(given, name)) for name in ("profile", "configfile", "config")]
+        options = (*(word for option in named if option[1] for word in option), *others)
+        if given.targets:  # without one, an option is spoken of
+            by_options.setdefault(options, set()).update(given.targets)
     return by_options
 
 
