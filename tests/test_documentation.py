@@ -84,13 +84,31 @@ def test_every_python_command_names_something_that_is_there(command):
         assert find_spec(words[1]) is not None
 
 
-@pytest.mark.parametrize("command", commands("snakemake "))
-def test_every_snakemake_command_can_be_planned(command, tmp_path):
-    if "slurm" in command:
+def snakemake_targets():
+    """The targets of every `snakemake` command by its other options, so that one plan covers all of them."""
+    parser = ArgumentParser()
+    for option in ("--profile", "--configfile", "--config"):
+        parser.add_argument(option)
+    parser.add_argument("-j")
+    parser.add_argument("-n", action="store_true")
+    parser.add_argument("targets", nargs="*")
+    by_options = {}
+    for command in commands("snakemake "):
+        given, others = parser.parse_known_args(shlex.split(command)[1:])
+        named = [(f"--{name}", getattr(given, name)) for name in ("profile", "configfile", "config")]
+        options = (*(word for option in named if option[1] for word in option), *others)
+        if given.targets:  # without one, an option is spoken of
+            by_options.setdefault(options, set()).update(given.targets)
+    return by_options
+
+
+@pytest.mark.parametrize(("options", "targets"), snakemake_targets().items(), ids=" ".join)
+def test_every_snakemake_command_can_be_planned(options, targets, tmp_path):
+    if "--profile" in options:
         pytest.importorskip("snakemake_executor_plugin_slurm")
-    words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in shlex.split(command)[1:]]
+    words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in (*options, "--", *sorted(targets))]
     plan = subprocess.run(
-        [sys.executable, "-m", "snakemake", *words, "--dry-run", "--quiet"], cwd=ROOT, capture_output=True, text=True
+        [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", *words], cwd=ROOT, capture_output=True, text=True
     )
     assert plan.returncode == 0, plan.stderr
 
