@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: results test test-library test-workflow smoke lint environment lock clean-environment help
+.PHONY: results test test-library test-workflow coverage smoke lint environment lock clean-environment help
 
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
@@ -34,11 +34,15 @@ test-workflow: environment ## the tests that run Snakemake, the whole smoke run 
 smoke: environment ## every rule of the workflow at tiny size
 	$(RUN) snakemake -j$(CORES) smoke $(SNAKEMAKE_ARGS)
 
-lint: environment ## ruff, snakefmt and snakemake's own linter
+coverage: environment ## the share of the lines that the tests of functions and steps run, 90 % at the least
+	$(PYTEST) --ignore=tests/workflow --cov --cov-report=term:skip-covered --cov-fail-under=90
+
+lint: environment ## ruff, snakefmt, mypy and snakemake's own linter
 	export $(RUN)
 	ruff check .
 	ruff format --check .
 	snakefmt --check Snakefile workflow
+	mypy
 	snakemake --lint
 
 environment: .venv/complete ## only the virtual environment

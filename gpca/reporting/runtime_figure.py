@@ -54,8 +54,10 @@ def _bars(runtime: pd.DataFrame) -> dict[str, dict[str, float]]:
     hardware = {row.device: row.hardware for row in runtime.itertuples()}
     bars = {f"Paper, {' and '.join(PUBLISHED_HARDWARE.values())}": {c: 1e3 * PUBLISHED[c][0] for c in COLOURS}}
     for device, name in hardware.items():
-        stages = {c: mean_ms.get((c, device), mean_ms.get((c, "CPU"))) for c in COLOURS}
-        if missing := [c for c, milliseconds in stages.items() if milliseconds is None]:
-            raise InputError("runtime", f"holds no row of '{missing[0]}'", "run the step 'runtime' anew")
-        bars[f"Here, {name}"] = stages
+        stages = bars.setdefault(f"Here, {name}", {})
+        for component in COLOURS:
+            milliseconds = mean_ms.get((component, device), mean_ms.get((component, "CPU")))
+            if milliseconds is None:
+                raise InputError("runtime", f"holds no row of '{component}'", "run the step 'runtime' anew")
+            stages[component] = milliseconds
     return bars

@@ -6,7 +6,7 @@ from math import inf, nan
 from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
-from gpca.reporting.table import Cell, Column, Table
+from gpca.reporting.table import Cell, Cells, Column, Rows, Table
 from gpca.runtime_file import COMPONENTS
 
 if TYPE_CHECKING:
@@ -37,7 +37,8 @@ def table7_runtime(runtime: pd.DataFrame, title: str) -> Table:
     """
     if runtime.empty:
         raise InputError("runtime", "holds no rows", "run the step 'runtime' first")
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     for row, of_row in enumerate(runtime.itertuples()):
         published_s, published_on = PUBLISHED.get(of_row.component, (nan, ""))
         repeats = int(of_row.repeats)
