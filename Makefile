@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: results report test test-library test-workflow smoke lint check-reference environment lock \
+.PHONY: results report test test-library test-workflow coverage smoke lint check-reference environment lock \
         clean-environment help
 
 CORES ?= 2
@@ -39,11 +39,15 @@ test-workflow: environment ## the tests that run Snakemake, the whole smoke run 
 smoke: environment ## every rule of the workflow at tiny size
 	$(RUN) snakemake -j$(CORES) smoke $(SNAKEMAKE_ARGS)
 
-lint: environment ## ruff, snakefmt and snakemake's own linter
+coverage: environment ## the share of the lines that the tests of functions and steps run, 90 % at the least
+	$(PYTEST) --ignore=tests/workflow --cov --cov-report=term:skip-covered --cov-fail-under=90
+
+lint: environment ## ruff, snakefmt, mypy and snakemake's own linter
 	export $(RUN)
 	ruff check .
 	ruff format --check .
 	snakefmt --check Snakefile workflow
+	mypy
 	snakemake --lint
 
 check-reference: environment ## whether the numbers of results/CHECKED agree with its reference; reruns nothing

@@ -50,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     except (KeyboardInterrupt, SystemError) as fault:
         # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead, or several in a row.
-        root = fault
+        root: BaseException = fault
         while root.__cause__ is not None:
             root = root.__cause__
         if not isinstance(root, KeyboardInterrupt):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -40,11 +41,14 @@ class ActiveLearningSettings:
     gpc: GPCSettings = field(default_factory=lambda: GPCSettings(learning_rate=0.1))
 
 
+Inputs = TypeVar("Inputs", np.ndarray, Projection)
+
+
 @dataclass(frozen=True)
-class Samples:
+class Samples(Generic[Inputs]):
     """N embeddings (N, d), later their :class:`Projection`, and their concepts (N,)."""
 
-    h: np.ndarray | Projection
+    h: Inputs
     concept_N: np.ndarray
 
     def __len__(self) -> int:
@@ -52,7 +56,7 @@ class Samples:
 
 
 @dataclass(frozen=True)
-class Task:
+class Task(Generic[Inputs]):
     """What one experiment starts from: the concept held out, labelled samples of the others, pool and test samples."""
 
     held_out: str
@@ -60,7 +64,7 @@ class Task:
     pool: Samples
     test: Samples
 
-    def projected(self, gpc: GPC) -> Task:
+    def projected(self, gpc: GPC) -> Task[Projection]:
         """Return the task with every embedding as the GPC's kernel sees it."""
         parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
         return Task(self.held_out, *parts)
@@ -72,7 +76,7 @@ def make_task(
     settings: ActiveLearningSettings,
     *axes: object,
     new_share: float | None = None,
-) -> Task:
+) -> Task[np.ndarray]:
     """Split the training samples into those labelled at the start and the pool, which holds all the rest.
 
     Args:
@@ -106,7 +110,7 @@ def make_task(
     return Task(held_out, *(Samples(registrations.embedding[part], concept_S[part]) for part in rows))
 
 
-def initial_gpc(task: Task, settings: ActiveLearningSettings, *axes: object) -> GPC:
+def initial_gpc(task: Task[np.ndarray], settings: ActiveLearningSettings, *axes: object) -> GPC:
     """Fit the GPC that knows two of its three concepts.
 
     Scaling, inducing inputs and lengthscale are initialised on the unlabelled pool too: it lies open, and inducing
@@ -120,7 +124,7 @@ def initial_gpc(task: Task, settings: ActiveLearningSettings, *axes: object) -> 
 
 
 def learn(
-    task: Task, gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
+    task: Task[Projection], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
 ) -> list[dict[str, float]]:
     """Spend the budget by one strategy.
 
@@ -149,7 +153,7 @@ def learn(
     return steps
 
 
-def pool_of(task: Task, gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
+def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
     """Return what a strategy chooses from: the rows `left` of the pool, and what the GPC makes of them."""
     h = task.pool.h[left]
     scores_N_C, _, bald_N = gpc.attribute(h) if needs_scores else (np.empty((len(left), 0)), None, np.empty(len(left)))
@@ -157,7 +161,7 @@ def pool_of(task: Task, gpc: GPC, left: np.ndarray, queried: list[int], needs_sc
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labelled, task.pool.concept_N[left])
 
 
-def _step(task: Task, gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
+def _step(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
         "labels": len(queried),
@@ -168,7 +172,7 @@ def _step(task: Task, gpc: GPC, queried: list[int], epochs: int) -> dict[str, fl
     }
 
 
-def accuracies(task: Task, gpc: GPC) -> tuple[float, float]:
+def accuracies(task: Task[Projection], gpc: GPC) -> tuple[float, float]:
     """Return the accuracy over all test samples and over those of the concept held out; NaN of none."""
     right_N = np.array(gpc.classes)[gpc.attribute(task.test.h)[0].argmax(axis=1)] == task.test.concept_N
     new_N = task.test.concept_N == task.held_out

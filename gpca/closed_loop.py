@@ -79,9 +79,10 @@ def find_failures(situations: Situations, settings: LoopSettings) -> list[Episod
     Raises:
         InputError: no failure at all.
     """
-    episodes, tried = [], {}
+    episodes: list[Episode] = []
+    tried: dict[str, int] = {}
     for cause in CONCEPTS:
-        found = []
+        found: list[tuple[Situation, Outcome]] = []
         for number in progress(range(settings.tries), f"failures by {cause}"):
             if len(found) == settings.failures:
                 break
@@ -130,7 +131,9 @@ class Loop:
         names = tuple(self._actions)
         entries = {name: policy_entry(name, names) for name in policies}
         decide = {name: entry.make(self._policy, names) for name, entry in entries.items()}
-        taken = {(episode.number, name): () for episode in self.episodes for name in policies}
+        taken: dict[tuple[int, str], tuple[str, ...]] = {
+            (episode.number, name): () for episode in self.episodes for name in policies
+        }
         rows, seconds = [], []
         for step in range(1, self._settings.budget + 1):
             self._explain_new({(entries[name].explainer, number, taken[number, name]) for number, name in taken})

@@ -24,22 +24,31 @@ def code_files(*modules: str) -> list[str]:
         if module not in found:
             found.add(module)
             open_modules += _imports(module)
-    return sorted(str(_file(module).relative_to(ROOT)) for module in found)
+    return sorted(str(_file_of(module).relative_to(ROOT)) for module in found)
 
 
 @cache
 def _imports(module: str) -> tuple[str, ...]:
     names: set[str] = set()
-    nodes: list[ast.AST] = [ast.parse(_file(module).read_text(encoding="utf-8"))]
+    nodes: list[ast.AST] = [ast.parse(_file_of(module).read_text(encoding="utf-8"))]
     while nodes:
         node = nodes.pop()
-        never_runs = isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
-        nodes += node.orelse if never_runs else ast.iter_child_nodes(node)
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            nodes += node.orelse
+        else:
+            nodes += ast.iter_child_nodes(node)
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     return tuple(sorted(name for name in names if name.split(".")[0] in PACKAGES and _file(name) is not None))
+
+
+def _file_of(module: str) -> Path:
+    file = _file(module)
+    if file is None:
+        raise ModuleNotFoundError(f"no module {module} in {ROOT}")
+    return file
 
 
 def _file(module: str) -> Path | None:

@@ -78,7 +78,9 @@ def compare(
     """
     import pandas as pd
 
-    deviations = {n.counterpart: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"}
+    deviations: dict[Counterpart | None, Number] = {
+        n.counterpart: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"
+    }
     records = []
     for number in numbers:
         if number.unit not in tolerances:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.actions import action_of
@@ -51,10 +52,9 @@ def check(config: dict) -> dict[str, dict]:
             known = ", ".join(config["uncertainty"])
             raise InputError(f"config key explainers.{name}", f"no uncertainty '{design}'", f"known are {known}")
     for strategy in config["active_learning"]["strategies"]:
-        if strategy not in (known := {**STRATEGIES, **STREAMS}):
-            raise InputError(
-                "config key active_learning.strategies", f"no strategy '{strategy}'", f"known are {', '.join(known)}"
-            )
+        if strategy not in (strategies := {**STRATEGIES, **STREAMS}):
+            known = ", ".join(strategies)
+            raise InputError("config key active_learning.strategies", f"no strategy '{strategy}'", f"known are {known}")
     for name, settings in config["learners"].items():
         own = (config["explainers"].get(name) or {}) | (settings or {})
         with_key(f"learners.{name}", require_settings, name, own)
@@ -76,9 +76,9 @@ def check(config: dict) -> dict[str, dict]:
     for name in config["kernels"]["sources"]:
         if name not in sources:
             raise InputError("config key kernels.sources", f"no source '{name}'", f"known are {', '.join(sources)}")
-    for key, known in {"source": (*sources, REAL_WORLD), "encoder": tuple(config["encoders"])}.items():
-        if (name := config["model"][key]) not in known:
-            raise InputError(f"config key model.{key}", f"no {key} '{name}'", f"known are {', '.join(known)}")
+    for key, names in {"source": (*sources, REAL_WORLD), "encoder": tuple(config["encoders"])}.items():
+        if (name := config["model"][key]) not in names:
+            raise InputError(f"config key model.{key}", f"no {key} '{name}'", f"known are {', '.join(names)}")
     return sources
 
 
@@ -121,7 +121,7 @@ def _check_recovery(config: dict) -> None:
     declared = {name: section["thresholds"][name] for name in ("uncertain", "dominant", "improvement")}
     declared = {name: value for name, value in declared.items() if value is not None}
     with_key("recovery.thresholds", lambda: Thresholds(**declared))
-    ranges = {name: tuple(section[name]) for name in ("noise_scale", "hidden")}
+    ranges: dict[str, Any] = {name: tuple(section[name]) for name in ("noise_scale", "hidden")}
     with_key("recovery", lambda: SituationSettings(**ranges))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -89,7 +90,7 @@ class Registrations:
     def without_labels(self) -> Registrations:
         """Return the same registrations as an explainer may see them: nothing that tells what was perturbed."""
         nan_S = np.full(len(self), np.nan)
-        unknown = dict.fromkeys((name for name in COLUMNS if name.startswith("severity_")), nan_S)
+        unknown: dict[str, Any] = dict.fromkeys((name for name in COLUMNS if name.startswith("severity_")), nan_S)
         unknown["T_target_source_true"] = np.full_like(self.T_target_source_true, np.nan)
         return replace(self, concept=np.full(len(self), ""), **unknown)
 
@@ -118,7 +119,8 @@ class Registrations:
         for name, known in (("split", SPLITS), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
                 raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
-        return cls(**{name: arrays[name] for name in shapes})
+        columns: dict[str, Any] = {name: arrays[name] for name in shapes}
+        return cls(**columns)
 
 
 def load_embeddings(

@@ -32,6 +32,10 @@ SEVERITIES = ("noise", "rotation_rad", "translation", "crop")
 KNOB_RANGE = np.subtract(UPPER, UNTOUCHED)
 
 
+# Source and target of a pair, its initial pose and its reference pose.
+Clouds = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
 @dataclass(frozen=True)
 class Design:
     """A list of conditions.
@@ -61,11 +65,11 @@ class Pair:
         self.target = registrations.target(row).astype(np.float64)
         self._severity = {name: getattr(registrations, f"severity_{name}")[row] for name in SEVERITIES}
 
-    def observed(self, points: int, random: np.random.Generator) -> tuple[np.ndarray, ...]:
+    def observed(self, points: int, random: np.random.Generator) -> Clouds:
         """Return source, target, initial pose and reference pose of the pair as it is, thinned to `points` points."""
         return self.source[random.permutation(len(self.source))[:points]], self.target[:points], self.T_init, self.T_icp
 
-    def clean(self, points: int, part: int = 1) -> tuple[np.ndarray, ...]:
+    def clean(self, points: int, part: int = 1) -> Clouds:
         """Return the same of a clean pair: other points of the target as source, at the true pose.
 
         `part` chooses which points, so that there are several sources: 1 or 2.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import gpytorch
 import numpy as np
@@ -27,6 +27,7 @@ class Prior:
 
     kernel: gpytorch.kernels.ScaleKernel
     inducing_M_d: torch.Tensor
+    _cholesky_C_M_M: np.ndarray = field(init=False, repr=False)
 
     @classmethod
     def of(cls, model: SparseGPs) -> Prior:
@@ -59,11 +60,11 @@ class Prior:
 
         Without a label, a class's kernel has learnt only how best to be wrong.
         """
-        known_C = torch.from_numpy(known_C)
+        is_known_C = torch.from_numpy(known_C)
 
         def level(values_C: torch.Tensor) -> torch.Tensor:
             values_C = values_C.clone()
-            values_C[~known_C] = _geometric_mean(values_C[known_C])
+            values_C[~is_known_C] = _geometric_mean(values_C[is_known_C])
             return values_C
 
         return self._with_parameters(level)

@@ -60,6 +60,7 @@ class GPC:
         self.classes = classes
         self.settings = settings
         self._axes = axes
+        self._sites: Sites | None = None  # what the labels say of the latents, once they were refined
 
     def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
         """Maximise the ELBO (variational parameters, inducing inputs, kernel parameters).
@@ -82,11 +83,11 @@ class GPC:
         """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many."""
         around_R_d = h_N_d if around_R_d is None else around_R_d
         self._scaler = StandardScaler().fit(around_R_d)
-        around_R_d = self._scaled(around_R_d)
+        starts_R_d = self._scaled(around_R_d)
         inputs_N_d, targets_N = self._scaled(h_N_d), self._targets(labels_N)
         random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
-        kernel = make_kernel(self.settings.kernel, len(self.classes), _median_distance(around_R_d, self._axes))
-        model = SparseGPs(kernel, _inducing_inputs(around_R_d, self.settings, self._axes), random)
+        kernel = make_kernel(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
+        model = SparseGPs(kernel, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
         optimiser = torch.optim.Adam(model.parameters(), lr=self.settings.learning_rate)
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
@@ -193,7 +194,6 @@ class GPC:
         gpc._prior = Prior(kernel, state["inducing"])
         gpc._latents = Latents(state["mean"].numpy(), state["covariance"].numpy())
         gpc._labelled, gpc._targets_N = gpc._prior.project(state["labelled"]), state["targets"].numpy()
-        gpc._sites = None
         return gpc
 
     def _targets(self, labels_N: np.ndarray) -> np.ndarray:

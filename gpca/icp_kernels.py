@@ -11,7 +11,7 @@ neighbour is always the true one.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,7 +22,12 @@ MOST_LISTS = 1 << 16  # beyond that, points in new voxels are searched by themse
 
 # Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
 # in these loops takes longer than the search. Functions compiled so cannot make arrays; they are given room to work.
-OPTIONS = {"cache": True, "_nrt": False, "error_model": "numpy", "fastmath": {"contract", "nsz", "nnan", "reassoc"}}
+OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "_nrt": False,
+    "error_model": "numpy",
+    "fastmath": {"contract", "nsz", "nnan", "reassoc"},
+}
 
 
 class Target(NamedTuple):

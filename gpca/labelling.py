@@ -40,7 +40,7 @@ class LabelFile:
         rows = read_csv(self.path, COLUMNS)
         for line, (sample, split, concept) in enumerate(rows[list(COLUMNS)].itertuples(index=False), start=2):
             where = f"{self.path}, line {line}"
-            key = (split, int(sample)) if sample.isdecimal() else None
+            key = (split, int(sample) if sample.isdecimal() else -1)
             if key not in known:
                 raise InputError(where, f"no sample '{sample}' of split '{split}'", "remove the line")
             concept = concept.strip()

@@ -26,7 +26,7 @@ class Projection:
     def __len__(self) -> int:
         return self.residual_C_N.shape[1]
 
-    def __getitem__(self, rows: np.ndarray | slice) -> Projection:
+    def __getitem__(self, rows: np.ndarray | slice | list[int]) -> Projection:
         return Projection(self.inputs_N_d[rows], self.weights_C_N_M[:, rows], self.residual_C_N[:, rows])
 
     def followed_by(self, other: Projection) -> Projection:

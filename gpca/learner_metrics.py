@@ -125,7 +125,7 @@ def bootstrap_bounds(rows: pd.DataFrame, *axes: object) -> dict[str, float]:
     The same draws for all learners, as they are compared.
     """
     p_S_C, target_S = probabilities(rows)
-    statistics = {
+    statistics: dict[str, tuple] = {
         "ece": (diagnostics.calibration_error, p_S_C, target_S),
         "nll": (diagnostics.negative_log_likelihood, p_S_C, target_S),
         "brier": (diagnostics.brier_score, p_S_C, target_S),
@@ -134,7 +134,7 @@ def bootstrap_bounds(rows: pd.DataFrame, *axes: object) -> dict[str, float]:
         statistics[f"aurc_{score}"] = (diagnostics.aurc, -rows[score].to_numpy(), wrong(rows))
         name = f"rho_{score}_{DISTANCES[0]}"
         statistics[name] = (diagnostics.rank_correlation, rows[score].to_numpy(), rows[DISTANCES[0]].to_numpy())
-    bounds = {}
+    bounds: dict[str, float] = {}
     for name, (statistic, *samples) in statistics.items():
         random = generator(*axes, "bootstrap")
         low, high = diagnostics.bootstrap_interval(statistic, *samples, random=random, resamples=RESAMPLES)

@@ -157,7 +157,7 @@ def _causal_metrics(path, test: pd.DataFrame, causal_path, causal: pd.Series) ->
         split, sample = keys[~known][0]
         raise InputError(causal_path, f"lacks {split} sample {sample} of {path}", "make both anew from one config")
     shown = test[causal[keys].to_numpy()]
-    metrics = {"causal_samples": {ALL: len(shown)}}
+    metrics: dict[str, dict[str, float]] = {"causal_samples": {ALL: len(shown)}}
     if len(shown):
         metrics["causal_accuracy"] = {ALL: accuracy(*_judged(shown))}
     return metrics

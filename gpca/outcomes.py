@@ -68,7 +68,7 @@ class Outcomes:
         Raises:
             InputError: the file is missing, damaged, holds wrong shapes, NaN, or no samples.
         """
-        shapes = dict.fromkeys((field.name for field in fields(cls)), ("S", "K"))
+        shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys((field.name for field in fields(cls)), ("S", "K"))
         shapes |= {"sample": ("S",), "split": ("S",), "covariance": ("S", "K", 6, 6)}
         arrays = load_arrays(path, shapes, made_by="python -m gpca uncertainty")
         if len(arrays["sample"]) == 0:

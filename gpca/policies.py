@@ -59,13 +59,15 @@ def explained(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
     concept_of = {action: concept for concept, action in policy.treatments.items()}
 
     def decide(case: Case) -> Decision:
-        bald_T = np.zeros(len(case.scores_T_C)) if np.isnan(case.bald_T).any() else case.bald_T
+        scores_T_C, bald_T = case.scores_T_C, case.bald_T
+        assert scores_T_C is not None and bald_T is not None  # given to whoever reads an explainer
+        bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
         before = []
         for step, action in enumerate(case.actions):
             column = CONCEPTS.index(concept_of[action])
-            fall = case.scores_T_C[step, column] - case.scores_T_C[step + 1, column]
+            fall = scores_T_C[step, column] - scores_T_C[step + 1, column]
             before.append(Treated(concept_of[action], float(fall)))
-        return policy.decide(case.scores_T_C[-1], float(bald_T[-1]), before)
+        return policy.decide(scores_T_C[-1], float(bald_T[-1]), before)
 
     return decide
 

@@ -83,8 +83,9 @@ def cpu_name() -> str:
 def _device() -> str:
     """The processor, and the GPU where torch was loaded and uses one."""
     torch = sys.modules.get("torch")
-    gpu = torch is not None and torch.cuda.is_available()
-    return cpu_name() + (f", {torch.cuda.get_device_name()}" if gpu else "")
+    if torch is None or not torch.cuda.is_available():
+        return cpu_name()
+    return f"{cpu_name()}, {torch.cuda.get_device_name()}"
 
 
 def _library_versions() -> dict[str, str]:

@@ -221,11 +221,11 @@ def _number(where: str, fields: dict[str, str]) -> Number:
     if any(round(bound, decimals) != bound for bound in (value, upper)):
         raise InputError(where, f"a value with more digits than {decimals} decimals", "correct one of them")
     return Number(
-        *(fields[name] for name in ("table", "row", "column")),
-        *(value, upper, decimals),
-        *(fields[name] for name in ("unit", "device", "place")),
-        _counterpart(where, fields),
-        fields["note"],
+        **{name: fields[name] for name in ("table", "row", "column", "unit", "device", "place", "note")},
+        value=value,
+        upper=upper,
+        decimals=decimals,
+        counterpart=_counterpart(where, fields),
     )
 
 

@@ -87,9 +87,9 @@ class RecoveryPolicy:
             attempts: see :class:`Thresholds`.
             bald_N: of the calibration samples (:func:`choose_uncertain`).
         """
-        declared = dict(thresholds)
+        declared = {name: value for name, value in thresholds.items() if value is not None}
         queued_share = declared.pop("queued_share")
-        if declared["uncertain"] is None:
+        if "uncertain" not in declared:
             declared["uncertain"] = choose_uncertain(bald_N, queued_share)
         return cls(Thresholds(**declared, attempts=attempts), dict(treatments))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -87,16 +87,16 @@ class Autoencoder:
         from torch import nn
 
         d, hidden, batch_size = z_train_N_d.shape[1], 256, 32
-        z_train_N_d = torch.from_numpy(z_train_N_d.astype(np.float32))
+        z_N_d = torch.from_numpy(z_train_N_d.astype(np.float32))
         with _one_thread(torch), torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed_of(*axes, "autoencoder"))
             encoder = nn.Sequential(nn.Linear(d, hidden), nn.GELU(), nn.Linear(hidden, self.components))
             decoder = nn.Sequential(nn.Linear(self.components, hidden), nn.GELU(), nn.Linear(hidden, d))
             optimiser = torch.optim.Adam([*encoder.parameters(), *decoder.parameters()], lr=1e-3)
             for epoch in range(self.epochs):
-                order = generator(*axes, "autoencoder", epoch).permutation(len(z_train_N_d))
+                order = generator(*axes, "autoencoder", epoch).permutation(len(z_N_d))
                 for rows in np.array_split(order, -(-len(order) // batch_size)):
-                    z_B_d = z_train_N_d[rows]
+                    z_B_d = z_N_d[rows]
                     loss = nn.functional.mse_loss(decoder(encoder(z_B_d)), z_B_d)
                     optimiser.zero_grad()
                     loss.backward()
@@ -154,10 +154,11 @@ def make_reduction(name: str, settings: dict):
     """
     if name not in REDUCTIONS:
         raise InputError(f"reduction '{name}'", "unknown", f"known are {', '.join(REDUCTIONS)}")
-    known = REDUCTIONS[name].__dataclass_fields__ if REDUCTIONS[name] else {}
+    reduction = REDUCTIONS[name]
+    known = [field.name for field in fields(reduction)] if reduction else []
     if unknown := [key for key in settings if key not in known]:
         raise InputError(f"reduction '{name}'", f"no setting '{unknown[0]}'", f"known are {', '.join(known) or 'none'}")
-    return REDUCTIONS[name](**settings) if REDUCTIONS[name] else None
+    return reduction(**settings) if reduction else None
 
 
 @contextmanager

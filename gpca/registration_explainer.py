@@ -74,7 +74,9 @@ class Explainer:
             InputError: too few points, NaN, a unit that cannot be right, source and target of unlike sizes, or an
                 initial pose that is no rigid transform.
         """
-        started, seconds, notes = perf_counter(), {}, []
+        started = perf_counter()
+        seconds: dict[str, float] = {}
+        notes: list[str] = []
         with _timed(seconds, "preparation"):
             source, target = (np.asarray(points, np.float64) for points in (source_points, target_points))
             T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)

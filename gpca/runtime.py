@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from copy import copy, deepcopy
+from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from gpca.attribution import summarise_draws
 from gpca.batched_icp import BatchedICP
 from gpca.canonical_frame import CanonicalFrame
 from gpca.dataset import Registrations
+from gpca.latents import Projection
 from gpca.model import Model
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.progress import progress
@@ -28,6 +30,8 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
+Result = TypeVar("Result")
+
 WARM_UP = 2  # rounds that do not count: the first calls load compiled functions
 STRATEGY = "bald_kmeans"  # the paper's
 
@@ -35,7 +39,7 @@ STRATEGY = "bald_kmeans"  # the paper's
 def measure(
     model: Model,
     registrations: Registrations,
-    task: Task,
+    task: Task[np.ndarray],
     settings: ActiveLearningSettings,
     repeats: int,
     threads: int,
@@ -55,7 +59,7 @@ def measure(
     import torch
 
     gpc = initial_gpc(task, settings, *axes, "runtime")
-    task = task.projected(gpc)
+    projected = task.projected(gpc)
     hardware = {"CPU": cpu_name()}
     devices = {"CPU": Explainer(model, device="cpu")}
     if torch.cuda.is_available():
@@ -67,7 +71,7 @@ def measure(
     for repeat in progress(range(WARM_UP + repeats), "runtime"):
         random = generator(*axes, "runtime", repeat)
         pair = _pair(registrations, int(rows[repeat % len(rows)]))
-        for key, elapsed in _one_round(devices, model, pair, task, gpc, settings, random):
+        for key, elapsed in _one_round(devices, model, pair, projected, gpc, settings, random):
             if repeat >= WARM_UP:
                 seconds.setdefault(key, []).append(elapsed)
     return pd.DataFrame(
@@ -86,7 +90,7 @@ def _pair(registrations: Registrations, row: int) -> tuple[np.ndarray, np.ndarra
 
 
 def _one_round(
-    devices: dict[str, Explainer], model: Model, pair, task: Task, gpc, settings, random
+    devices: dict[str, Explainer], model: Model, pair, task: Task[Projection], gpc, settings, random
 ) -> Iterator[tuple[tuple[str, str], float]]:
     source, target = pair
     small = [cloud[random.permutation(len(cloud))[:512]] for cloud in pair]
@@ -97,7 +101,7 @@ def _one_round(
     yield ("icp_open3d", "CPU"), _timed(lambda: ICP(target, None, model.icp).register(source, start))[1]
     aligned = transform(poses[0], source)
     for device, explainer in devices.items():
-        h_1_d, elapsed = _timed(lambda explainer=explainer: explainer.embed(aligned))
+        h_1_d, elapsed = _timed(partial(explainer.embed, aligned))
         yield ("features", device), elapsed
     logits, elapsed = _timed(lambda: _draws(model, h_1_d, random))
     yield ("sampling", "CPU"), elapsed
@@ -109,8 +113,8 @@ def _one_round(
     more, labels, known = task.pool.h[chosen], task.pool.concept_N[chosen], copy(gpc)
     yield ("retraining", "CPU"), _timed(lambda: known.update(more, labels, settings.iterations, settings.tolerance))[1]
     for device, explainer in devices.items():
-        for component, clouds in (("explanation", pair), ("explanation_512", small)):
-            yield (component, device), _timed(lambda e=explainer, c=clouds: e.explain(*c, frame=frame))[1]
+        for component, (source, target) in (("explanation", pair), ("explanation_512", small)):
+            yield (component, device), _timed(partial(explainer.explain, source, target, frame=frame))[1]
 
 
 def _draws(model: Model, h_1_d: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -120,7 +124,7 @@ def _draws(model: Model, h_1_d: np.ndarray, random: np.random.Generator) -> np.n
     return mean_1_C + deviation_1_C * random.normal(size=shape)
 
 
-def _timed(work: Callable) -> tuple[object, float]:
+def _timed(work: Callable[[], Result]) -> tuple[Result, float]:
     started = perf_counter()
     result = work()
     return result, perf_counter() - started

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from torch import nn
 
 from gpca.analytical_features import analytical_features
 from gpca.dataset import Registrations
 from gpca.distance import knn_distance, mahalanobis_distance, principal_components
-from gpca.encoders.training import EncoderSettings, embed, train_encoder
+from gpca.encoders.training import Classifier, EncoderSettings, embed, train_encoder
 from gpca.objects.canonical import ObjectClouds
 from gpca.seeds import generator
 from gpca.shifted_sets import SPACES, ShiftedSets
@@ -44,7 +44,7 @@ def make_sets(
     objects: ObjectClouds,
     registrations: Registrations,
     other: Registrations | None,
-    encoder: nn.Sequential,
+    encoder: Classifier,
     encoder_settings: EncoderSettings,
     source: str,
     seed: int,
@@ -97,7 +97,7 @@ def _of_unseen_objects(
     embedded = [replace(part, attached={"embedding": embed(model, part, name, seed, settings.encoder)[0]})
                 for part in (seen, unseen)]  # fmt: skip
     # Numbered anew: samples of two splits of the registrations are test samples here.
-    renamed = {"split": np.full(len(unseen), "test"), "sample": np.arange(len(unseen))}
+    renamed: dict[str, Any] = {"split": np.full(len(unseen), "test"), "sample": np.arange(len(unseen))}
     return {"seen_objects": embedded[0], "objects": replace(embedded[1], **renamed)}
 
 

@@ -72,7 +72,8 @@ class ShiftedSets:
         Raises:
             InputError: missing or damaged file, wrong shapes, NaN, unknown names, a set without training samples.
         """
-        shapes = {field.name: ("S",) for field in fields(cls)} | {"h": ("S", "d"), "distance": ("S", len(DISTANCES))}
+        shapes: dict[str, tuple[int | str, ...]] = {field.name: ("S",) for field in fields(cls)}
+        shapes |= {"h": ("S", "d"), "distance": ("S", len(DISTANCES))}
         arrays = load_arrays(path, shapes, made_by="python -m gpca shift")
         remedy = "make it anew with 'python -m gpca shift'"
         for name, known in (("set", TRAINED_ON), ("split", ("train", "test")), ("concept", CONCEPTS)):

@@ -14,6 +14,7 @@ import numpy as np
 from gpca.active_learning import ActiveLearningSettings, Task, accuracies
 from gpca.errors import InputError
 from gpca.gpc import GPC
+from gpca.latents import Projection
 from gpca.seeds import generator
 
 
@@ -59,7 +60,12 @@ def arrival_order(task: Task, stream: StreamSettings, *axes: object) -> np.ndarr
 
 
 def run_stream(
-    task: Task, gpc: GPC, strategy: str, settings: ActiveLearningSettings, stream: StreamSettings, *axes: object
+    task: Task[Projection],
+    gpc: GPC,
+    strategy: str,
+    settings: ActiveLearningSettings,
+    stream: StreamSettings,
+    *axes: object,
 ) -> list[dict[str, float]]:
     """Let the samples arrive, ask about some, learn at once.
 
@@ -110,7 +116,9 @@ def _asks(manager, bald_1: np.ndarray) -> bool:
     return len(queried) > 0
 
 
-def _row(task: Task, gpc: GPC, right: list[bool], asked: list[int], stream: StreamSettings) -> dict[str, float]:
+def _row(
+    task: Task[Projection], gpc: GPC, right: list[bool], asked: list[int], stream: StreamSettings
+) -> dict[str, float]:
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
         "arrived": len(right),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -114,6 +115,6 @@ def aligned(
 
 def as_registrations(records: list[dict]) -> tuple[Registrations, np.ndarray]:
     """Return rows that :func:`aligned` made as registrations, and the seconds (S,) that ICP took for each."""
-    columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
-    clouds = ragged([record["cloud"] for record in records], [record["target"] for record in records])
-    return Registrations(**columns, **clouds), np.array([record["icp_seconds"] for record in records])
+    columns: dict[str, Any] = {name: np.array([record[name] for record in records]) for name in COLUMNS}
+    columns |= ragged([record["cloud"] for record in records], [record["target"] for record in records])
+    return Registrations(**columns), np.array([record["icp_seconds"] for record in records])

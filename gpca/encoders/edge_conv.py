@@ -19,6 +19,7 @@ import torch
 from torch import nn
 
 from gpca.encoders import edge_kernels
+from gpca.encoders.batch_norm import BatchNorm
 from gpca.errors import InputError
 
 NEGATIVE_SLOPE = 0.2
@@ -55,7 +56,7 @@ class EdgeConv(nn.Module):
         self.k = k
         self.weight = nn.Parameter(torch.empty(out_features, 2 * in_features))
         nn.init.kaiming_uniform_(self.weight, a=5**0.5)
-        self.norm = nn.BatchNorm1d(out_features)
+        self.norm = BatchNorm(out_features)
 
     def forward(self, x_B_N_F: torch.Tensor) -> torch.Tensor:
         """Map features (B, N, F_in) to (B, N, F_out); the graph is rebuilt from the input features."""
@@ -69,21 +70,13 @@ class EdgeConv(nn.Module):
         out_B_N_F, mean_F, variance_F = _EdgeMax.apply(
             ac_B_N_2F, neighbours_B_N_k, self.norm.weight, self.norm.bias, self.norm.eps
         )
-        self._update_running_statistics(mean_F, variance_F, n_edges=neighbours_B_N_k.numel())
+        self.norm.track(mean_F, variance_F, neighbours_B_N_k.numel())
         return out_B_N_F
 
     def _inference(self, ac_B_N_2F: torch.Tensor, neighbours_B_N_k: torch.Tensor) -> torch.Tensor:
-        scale_F = self.norm.weight * torch.rsqrt(self.norm.running_var + self.norm.eps)
-        shift_F = self.norm.bias - scale_F * self.norm.running_mean
-        out = edge_kernels.gather_max_affine(*_numpy(ac_B_N_2F, neighbours_B_N_k, scale_F, shift_F), NEGATIVE_SLOPE)
+        arrays = _numpy(ac_B_N_2F, neighbours_B_N_k, *self.norm.scale_and_shift())
+        out = edge_kernels.gather_max_affine(*arrays, NEGATIVE_SLOPE)
         return torch.from_numpy(out)
-
-    @torch.no_grad()
-    def _update_running_statistics(self, mean_F: torch.Tensor, variance_F: torch.Tensor, n_edges: int) -> None:
-        norm = self.norm
-        norm.num_batches_tracked += 1
-        norm.running_mean.lerp_(mean_F, norm.momentum)
-        norm.running_var.lerp_(variance_F * (n_edges / (n_edges - 1)), norm.momentum)
 
 
 class _EdgeMax(torch.autograd.Function):

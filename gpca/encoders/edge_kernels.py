@@ -8,10 +8,17 @@ Inner loops run over channels, where they vectorise.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit, prange
 
-_options = {"cache": True, "parallel": True, "fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
+_options: dict[str, Any] = {
+    "cache": True,
+    "parallel": True,
+    "fastmath": {"contract", "nsz", "nnan"},
+    "error_model": "numpy",
+}
 
 
 @njit(**_options)

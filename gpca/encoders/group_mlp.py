@@ -15,10 +15,13 @@ tests; outputs, running statistics and all gradients agree with it.
 
 from __future__ import annotations
 
+from typing import cast
+
 import torch
 from torch import nn
 
 from gpca.encoders import group_mlp_kernels as kernels
+from gpca.encoders.batch_norm import BatchNorm
 from gpca.encoders.grouping import Groups, take
 
 
@@ -35,7 +38,7 @@ class GroupMLP(nn.Module):
         super().__init__()
         sizes = (3 + in_features, *widths)
         self.linears = nn.ModuleList(nn.Linear(*pair, bias=False) for pair in zip(sizes, widths, strict=False))
-        self.norms = nn.ModuleList(nn.BatchNorm1d(width) for width in widths)
+        self.norms = nn.ModuleList(BatchNorm(width) for width in widths)
         self.last_relu = last_relu
 
     def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
@@ -44,10 +47,12 @@ class GroupMLP(nn.Module):
             return self.plain(points_B_N_3, x_B_N_F, groups)
         batch, n_groups, _ = groups.centres_B_M_3.shape
         edges = _Edges(groups, points_B_N_3)
-        y_E_F = self._first_layer(points_B_N_3, x_B_N_F, groups, edges)
-        for norm, linear in zip(self.norms, self.linears[1:], strict=False):
+        (first, norm), *others = self._layers()
+        y_E_F = self._first_layer(first.weight, points_B_N_3, x_B_N_F, groups, edges)
+        for linear, next_norm in others:
             y_E_F = self._normalise(norm, y_E_F, edges) @ linear.weight.T
-        z_G_F = self._normalise(self.norms[-1], y_E_F, edges, pool=True)
+            norm = next_norm
+        z_G_F = self._normalise(norm, y_E_F, edges, pool=True)
         return (z_G_F.relu() if self.last_relu else z_G_F).view(batch, n_groups, -1)
 
     def plain(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
@@ -57,34 +62,33 @@ class GroupMLP(nn.Module):
         if x_B_N_F is not None:
             slots_B_M_k_F = torch.cat([slots_B_M_k_F, take(x_B_N_F, neighbours_B_M_k)], dim=-1)
         z_S_F = slots_B_M_k_F.flatten(0, 2)
-        for layer, (linear, norm) in enumerate(zip(self.linears, self.norms, strict=True), start=1):
+        for layer, (linear, norm) in enumerate(self._layers(), start=1):
             z_S_F = norm(linear(z_S_F))
             if layer < len(self.norms) or self.last_relu:
                 z_S_F = z_S_F.relu()
         return z_S_F.view(*neighbours_B_M_k.shape, -1).amax(dim=2)
 
-    def _first_layer(self, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:
+    def _layers(self) -> list[tuple[nn.Linear, BatchNorm]]:
+        linears, norms = cast("list[nn.Linear]", list(self.linears)), cast("list[BatchNorm]", list(self.norms))
+        return list(zip(linears, norms, strict=True))
+
+    def _first_layer(self, weight: torch.Tensor, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:
         inputs = points_B_N_3 / groups.radius
         inputs = inputs if x_B_N_F is None else torch.cat([inputs, x_B_N_F], dim=-1)
-        weight = self.linears[0].weight
         a_P_F = inputs.flatten(0, 1) @ weight.T
         if groups.is_whole:  # around the origin: C is zero
             return a_P_F
         c_G_F = groups.centres_B_M_3.flatten(0, 1) @ (weight[:, :3].T / -groups.radius)
         return _Gather.apply(a_P_F, c_G_F, edges)
 
-    def _normalise(self, norm: nn.BatchNorm1d, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:
+    def _normalise(self, norm: BatchNorm, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:
         if not self.training:
-            scale_F = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
-            affine = [x.detach().numpy() for x in (y_E_F, scale_F, norm.bias - scale_F * norm.running_mean)]
+            arrays = [x.detach().numpy() for x in (y_E_F, *norm.scale_and_shift())]
             if pool:
-                return torch.from_numpy(kernels.normalise_max(*affine, edges.ends, edges.batch)[0])
-            return torch.from_numpy(kernels.normalise(*affine, edges.cloud_ends))
+                return torch.from_numpy(kernels.normalise_max(*arrays, edges.ends, edges.batch)[0])
+            return torch.from_numpy(kernels.normalise(*arrays, edges.cloud_ends))
         out, mean_F, variance_F = _Normalise.apply(y_E_F, norm.weight, norm.bias, norm.eps, edges, pool)
-        with torch.no_grad():
-            norm.num_batches_tracked += 1
-            norm.running_mean.lerp_(mean_F, norm.momentum)
-            norm.running_var.lerp_(variance_F * (edges.slots / (edges.slots - 1)), norm.momentum)
+        norm.track(mean_F, variance_F, edges.slots)
         return out
 
 

@@ -63,7 +63,8 @@ def ball_query(
     k = min(k, points_B_N_3.shape[1])
     if points_B_N_3.device.type == "cpu":
         points, centres = (x.contiguous().numpy() for x in (points_B_N_3, centres_B_M_3))
-        return tuple(torch.from_numpy(found) for found in grouping_kernels.ball_query(points, centres, radius, k))
+        neighbours, counts = grouping_kernels.ball_query(points, centres, radius, k)
+        return torch.from_numpy(neighbours), torch.from_numpy(counts)
     return _ball_query_plain(points_B_N_3, centres_B_M_3, radius, k)
 
 

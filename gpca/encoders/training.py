@@ -63,7 +63,7 @@ def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *
 
 def train_encoder(
     registrations: Registrations, source: str, seed: int, settings: EncoderSettings, checkpoint: Path | None = None
-) -> tuple[nn.Sequential, list[dict[str, float]]]:
+) -> tuple[Classifier, list[dict[str, float]]]:
     """Train on the rows of split ``train``.
 
     Args:
@@ -126,7 +126,7 @@ def best_device() -> torch.device:
 
 @torch.inference_mode()
 def embed(
-    model: nn.Sequential, registrations: Registrations, source: str, seed: int, settings: EncoderSettings
+    model: Classifier, registrations: Registrations, source: str, seed: int, settings: EncoderSettings
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return embeddings h (S, d) of all rows, in their order, and the head's logits (S, C) at them; float32.
 
@@ -148,7 +148,7 @@ def embed(
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
 
 
-def load_model(weights: Path, settings: EncoderSettings) -> nn.Sequential:
+def load_model(weights: Path, settings: EncoderSettings) -> Classifier:
     """Load encoder and head as the step ``train`` wrote them, ready for inference.
 
     Raises:
@@ -165,10 +165,20 @@ def load_model(weights: Path, settings: EncoderSettings) -> nn.Sequential:
     return model.eval()
 
 
-def make_model(settings: EncoderSettings) -> nn.Sequential:
-    """Return a new encoder with a head over the concepts, ``model.encoder`` and ``model.head``."""
+class Classifier(nn.Sequential):
+    """An encoder and a linear head over the concepts."""
+
+    encoder: nn.Module
+    head: nn.Linear
+
+    def __init__(self, encoder: nn.Module, embedding_size: int) -> None:
+        super().__init__(OrderedDict(encoder=encoder, head=nn.Linear(embedding_size, len(CONCEPTS))))
+
+
+def make_model(settings: EncoderSettings) -> Classifier:
+    """Return a new encoder with a head over the concepts."""
     encoder = make_encoder(settings.backbone, settings.options)
-    return nn.Sequential(OrderedDict(encoder=encoder, head=nn.Linear(encoder.embedding_size, len(CONCEPTS))))
+    return Classifier(encoder, encoder.embedding_size)
 
 
 def _fingerprint(registrations: Registrations) -> str:

@@ -114,7 +114,8 @@ def read_instances(
     first_group = 0
     for dataset, frames, models in datasets.values():
         places = np.array([(frame.scene, frame.image) for frame in frames])
-        groups_F = first_group + groups_of_frames(*places.T, gap)
+        scene_F, image_F = places.T
+        groups_F = first_group + groups_of_frames(scene_F, image_F, gap)
         first_group = groups_F.max() + 1
         estimates = _estimates(dataset, places) if settings.form == "results" else {}
         found = _Objects(dataset.name, objects, models, settings)

@@ -104,9 +104,11 @@ def lay_table(
 
     random = generator(source, "scene", scene)
     count = min(int(random.integers(settings.objects[0], settings.objects[1] + 1)), len(surfaces))
-    standing, outlines = [], []
+    standing: list[Placed] = []
+    outlines: list = []
     for model in random.permutation(len(surfaces))[:count]:
-        T_world_object = rest(*(resting[model] if resting else stable_poses(surfaces[model])), random)
+        poses_n, probabilities_n = resting[model] if resting else stable_poses(surfaces[model])
+        T_world_object = rest(poses_n, probabilities_n, random)
         flat_m = transform(T_world_object, surfaces[model].vertices_m)[:, :2]
         outline = MultiPoint(flat_m - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2).convex_hull
         azimuth = random.uniform(0, 2 * np.pi)
@@ -172,7 +174,7 @@ def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
     info = {}
     for number, surface in enumerate(surfaces, start=1):
         mesh = trimesh.Trimesh(1e3 * surface.vertices_m, surface.faces, process=False)
-        (folder / f"obj_{number:06d}.ply").write_bytes(mesh.export(file_type="ply"))
+        mesh.export(folder / f"obj_{number:06d}.ply")
         low, high = mesh.bounds
         cloud_m, _, diameter_m = canonical_cloud(surface, source, 4096)
         info[number] = {
@@ -186,12 +188,16 @@ def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
 
 
 def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings: SceneSettings, axes: tuple) -> None:
-    meshes = [(transform(p.T_world_object, surfaces[p.model].vertices_m), surfaces[p.model].faces) for p in standing]
+    meshes = [
+        (transform(p.T_world_object, surfaces[p.model].vertices_m), surfaces[p.model].triangles) for p in standing
+    ]
     scene, alone = MeshScene([*meshes, table()]), [MeshScene([mesh]) for mesh in meshes]
     colours_M_3 = np.array([*(model_colour(p.model, len(surfaces)) for p in standing), TABLE_COLOUR])
     for name in ("depth", "rgb", "mask", "mask_visib"):
         (folder / name).mkdir(parents=True)
-    camera_json, truth_json, info_json = {}, {}, {}
+    camera_json: dict[int, dict] = {}
+    truth_json: dict[int, list[dict]] = {}
+    info_json: dict[int, list[dict]] = {}
     for image, T_world_camera in enumerate(views):
         view = scene.look(settings.camera, T_world_camera)
         depth_m = settings.noise.measure(view, generator(*axes, "depth", image))

@@ -130,7 +130,7 @@ class Situation:
         """The scene, ready to be looked at; mesh 0 is the object."""
         surfaces = self.shelf.surfaces
         placed = [(transform(p.T_world_object, surfaces[p.model].vertices_m), p.model) for p in self.standing]
-        return MeshScene([*((vertices_m, surfaces[model].faces) for vertices_m, model in placed), table()])
+        return MeshScene([*((vertices_m, surfaces[model].triangles) for vertices_m, model in placed), table()])
 
     def shoot(self, T_world_camera: np.ndarray, frames: int, *axes: object) -> Shot:
         """Measure from a viewpoint: the median depth of so many frames, whose noise is named by the axes."""
@@ -216,7 +216,7 @@ class Situations:
         """Return the pixels of a thinned image that an object by itself would fill."""
         if object_.model not in self._alone:
             surface = self._shelf.surfaces[object_.model]
-            self._alone[object_.model] = MeshScene([(surface.vertices_m, surface.faces)])
+            self._alone[object_.model] = MeshScene([(surface.vertices_m, surface.triangles)])
         T_object_camera = inverse(object_.T_world_object) @ situation.T_world_camera
         return self._alone[object_.model].silhouette(coarse(situation.camera), T_object_camera)
 

@@ -120,6 +120,12 @@ def _zip_members(archive: zipfile.ZipFile, path: Path, largest_bytes: int) -> li
     return members
 
 
+def _stream(archive: tarfile.TarFile, info: tarfile.TarInfo) -> IO[bytes]:
+    stream = archive.extractfile(info)
+    assert stream is not None  # as it is of links and folders alone
+    return stream
+
+
 def _tar_members(archive: tarfile.TarFile, path: Path, largest_bytes: int) -> list[Member]:
     members = []
     total = 0
@@ -130,7 +136,7 @@ def _tar_members(archive: tarfile.TarFile, path: Path, largest_bytes: int) -> li
         total += info.size
         _check_size(total, path, largest_bytes)  # before more of a bomb is decompressed to find the next header
         if info.isreg():
-            members.append(Member(path, info.name, info.size, partial(archive.extractfile, info)))
+            members.append(Member(path, info.name, info.size, partial(_stream, archive, info)))
     # tarfile takes a tar that is cut between two members, or a damaged header, for the end: a whole one ends in zeros.
     archive.fileobj.seek(archive.offset)
     if archive.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):

@@ -123,7 +123,7 @@ def _sampled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple
 
     mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
     points_m, face = trimesh.sample.sample_surface(mesh, n_points, seed=rng)
-    normals = _area_vectors(surface.vertices_m, surface.faces[face])
+    normals = _area_vectors(surface.vertices_m, surface.triangles[face])
     return np.asarray(points_m), normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 

@@ -65,7 +65,7 @@ def _download(url: str, path: Path, remedy: str) -> None:
     try:
         download(url, str(path), None)
     except requests.exceptions.HTTPError as fault:
-        answer = f"{fault.response.status_code} {fault.response.reason}"
+        answer = str(fault) if fault.response is None else f"{fault.response.status_code} {fault.response.reason}"
         raise InputError(url, f"cannot be fetched: the server answers {answer}", remedy) from fault
     except (requests.exceptions.ConnectionError, requests.exceptions.Timeout) as fault:
         raise InputError(url, "cannot be reached", remedy) from fault

@@ -20,7 +20,7 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     return surfaces(files_in(folder, entry.get("files"), SUFFIXES), entry.get("unit"))
 
 
-def surfaces(paths: Iterable[Path], unit: str) -> Iterator[Surface]:
+def surfaces(paths: Iterable[Path], unit: str | None) -> Iterator[Surface]:
     """Yield one surface per file, named by the file's stem."""
     scale = metres_per(unit)
     for path in paths:

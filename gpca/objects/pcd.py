@@ -22,10 +22,14 @@ SCALARS = {
 @dataclass(frozen=True)
 class _Header:
     dtype: np.dtype  # one field per column of FIELDS, named by its position, since PCD repeats the name "_"
-    xyz: tuple[int, int, int]  # positions of x, y, z
+    xyz: tuple[int, ...]  # positions of x, y, z
     points: int
     organised: bool
     encoding: str
+
+    @property
+    def columns(self) -> list[np.dtype]:
+        return [self.dtype[name] for name in self.dtype.names or ()]
 
 
 def parse(content: bytes, subject: object) -> np.ndarray:
@@ -89,7 +93,7 @@ def _parse_header(content: bytes) -> tuple[_Header, bytes]:
 
 
 def _ascii(body: bytes, header: _Header) -> np.ndarray:
-    columns = [header.dtype[i].shape[0] for i in range(len(header.dtype))]
+    columns = [field.shape[0] for field in header.columns]
     starts = np.cumsum([0, *columns])
     if header.points == 0:
         return np.zeros((0, 3))
@@ -115,7 +119,7 @@ def _binary_compressed(body: bytes, header: _Header) -> np.ndarray:
     columns = _lzf_decompress(body[8 : 8 + compressed])
     if not len(columns) == size == header.points * header.dtype.itemsize:
         raise ValueError("its compressed data is not of the size that the header says")
-    starts = header.points * np.cumsum([0, *(header.dtype[i].itemsize for i in range(len(header.dtype)))])
+    starts = header.points * np.cumsum([0, *(field.itemsize for field in header.columns)])
     arrays = [np.frombuffer(columns, header.dtype[i].base, header.points, int(starts[i])) for i in header.xyz]
     return np.column_stack(arrays).astype(np.float64)
 

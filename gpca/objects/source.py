@@ -115,18 +115,15 @@ def _found(entry: dict, data_dir: str | None) -> Path | None:
     folder = Path(data_dir or "", location or "").expanduser()
     if (data_dir is None and not folder.is_absolute()) or not (location or patterns) or not folder.exists():
         return None
-    return folder if location or all(any(folder.glob(pattern)) for pattern in patterns) else None
+    return folder if location or all(any(folder.glob(pattern)) for pattern in patterns or ()) else None
 
 
 def _module_of(kind: object) -> ModuleType:
     names = [module.name for module in pkgutil.iter_modules(objects.__path__)]
-    module = import_module(f"gpca.objects.{kind}") if kind in names else None
-    if not hasattr(module, "from_entry"):
-        known = ["procedural"] + [
-            name for name in names if hasattr(import_module(f"gpca.objects.{name}"), "from_entry")
-        ]
-        raise InputError(f"kind '{kind}'", "there is no such kind of source", f"known are {', '.join(known)}")
-    return module
+    if kind in names and hasattr(module := import_module(f"gpca.objects.{kind}"), "from_entry"):
+        return module
+    known = ["procedural"] + [name for name in names if hasattr(import_module(f"gpca.objects.{name}"), "from_entry")]
+    raise InputError(f"kind '{kind}'", "there is no such kind of source", f"known are {', '.join(known)}")
 
 
 def _as_list(value: str | list | None) -> list:

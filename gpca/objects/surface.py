@@ -22,3 +22,10 @@ class Surface:
     vertices_m: np.ndarray
     faces: np.ndarray | None
     normals: np.ndarray | None = None
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """The faces of a surface that is known to be a mesh."""
+        if self.faces is None:
+            raise ValueError(f"{self.name} is a point cloud")
+        return self.faces

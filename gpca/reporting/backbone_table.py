@@ -11,7 +11,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.metrics import ALL, mean_interval
 from gpca.perturbation import CONCEPTS
-from gpca.reporting.table import Cell, Column, Table
+from gpca.reporting.table import Cell, Cells, Column, Rows, Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,8 +47,9 @@ def table6_backbones(
     Raises:
         InputError: the metrics hold none of these.
     """
-    rows, cells = [], {}
-    methods = [
+    rows: Rows = []
+    cells: Cells = {}
+    methods: list[tuple[str, tuple[str, str], tuple[str, str], int | None]] = [
         (f"{b}-{r}", (b, BACKBONES.get(b, b)), (r, REDUCTIONS[r]), n) for b, n in backbones.items() for r in reductions
     ]
     methods += [(name, (name, title), ("none", REDUCTIONS["none"]), None) for name, title in CLASSIC.items()]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gpca.reporting.style import GREY, SMALL_PT, use_style
 
 
@@ -32,7 +34,8 @@ class Canvas:
 
     def text(self, x_in: float, y_in: float, words: str, **style) -> None:
         """Write at this place, centred unless the style says otherwise."""
-        self.axes.text(x_in, y_in, words, **{"ha": "center", "fontsize": SMALL_PT, "linespacing": 1.15} | style)
+        look: dict[str, Any] = {"ha": "center", "fontsize": SMALL_PT, "linespacing": 1.15} | style
+        self.axes.text(x_in, y_in, words, **look)
 
     def box(
         self,
@@ -47,7 +50,7 @@ class Canvas:
         """Draw a rounded box, tinted by its colour, with words in the middle; a dashed one is white."""
         from matplotlib.patches import FancyBboxPatch
 
-        look = {"facecolor": "white", "linestyle": "--"} if dashed else {"facecolor": colour + "22"}
+        look: dict[str, Any] = {"facecolor": "white", "linestyle": "--"} if dashed else {"facecolor": colour + "22"}
         style = f"round,pad=0,rounding_size={min(0.06, height_in / 3)}"
         corner = (left_in, bottom_in)
         self.axes.add_patch(
@@ -65,8 +68,13 @@ class Canvas:
             over: words above that stretch, else below.
         """
         if len(points_in) > 2:
-            x, y = zip(*points_in[:-1], strict=True)
-            self.axes.plot(x, y, color=colour, linewidth=0.9, solid_capstyle="butt", solid_joinstyle="miter")
+            self.axes.plot(
+                *zip(*points_in[:-1], strict=True),
+                color=colour,
+                linewidth=0.9,
+                solid_capstyle="butt",
+                solid_joinstyle="miter",
+            )
         look = {"arrowstyle": "-|>", "color": colour, "lw": 0.9, "mutation_scale": 7, "shrinkA": 0, "shrinkB": 0}
         self.axes.annotate("", points_in[-1], points_in[-2], arrowprops=look)
         if words:

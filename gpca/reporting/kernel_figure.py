@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gpca.errors import InputError
 from gpca.reporting.kernel_tables import PRINTED, TITLES
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLOURS = {"rbf": BLUE, "matern32": VERMILION, "polynomial": GREEN}
-LINES = ("-", (0, (4, 2)), ":", "-.")  # of the learning rates, from the largest on
+LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # of the learning rates, from the largest on
 MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
 
 
@@ -70,7 +70,7 @@ def draw_kernel_curves(
         Line2D([], [], color="#555555", linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
         for i, rate in enumerate(rates)
     ]
-    circle = {"color": "#555555", "marker": "o", "markerfacecolor": "white", "linestyle": ""}
+    circle: dict[str, Any] = {"color": "#555555", "marker": "o", "markerfacecolor": "white", "linestyle": ""}
     handles.append(Line2D([], [], label="printed row", **circle))
     figure.legend(handles=handles, ncol=3, loc="lower center", columnspacing=1.2, handlelength=1.8)
     figure.tight_layout(rect=(0, 0.34 / height_in, 1, 1), pad=0.4, h_pad=0.8)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.metrics import mean_interval
-from gpca.reporting.table import Cell, Column, Table
+from gpca.reporting.table import Cell, Cells, Column, Rows, Table
 from gpca.reporting.tables import STAND_IN, title_of
 
 if TYPE_CHECKING:
@@ -43,7 +43,8 @@ _MEASURES = {  # of the grid -> column, and the factor to its unit
 def table4_kernels(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
     """Accuracy of the paper's five kernels and schedules: settings by sources; those that were fitted."""
     shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     for setting in PRINTED:
         of_row = {name: cell for name in shown if (cell := _cell(grid, name, setting, "accuracy", test))}
         cells |= {(len(rows), name): cell for name, cell in of_row.items()}
@@ -66,7 +67,8 @@ def table4_kernels(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int
 def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
     """Every kernel, learning rate and number of iterations on every source, with confidence and calibration."""
     shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     settings = list(grid[_KEYS].drop_duplicates().itertuples(index=False, name=None))
     for name, entry in shown.items():
         for setting in settings:

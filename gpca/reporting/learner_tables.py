@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gpca.errors import InputError
 from gpca.learner_metrics import TABLE, with_training_like
 from gpca.metrics import mean_interval
-from gpca.reporting.table import EMPTY, Cell, Column, Table
+from gpca.reporting.table import EMPTY, Cell, Cells, Column, Rows, Table
 from gpca.reporting.tables import GPCA, STAND_IN, title_of
 from gpca.shifted_sets import DISTANCES, TRAINED_ON
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 SHIFTED = {"severity": "severities beyond", "source": "unseen source", "objects": "unseen objects"}
 RIVALS = ("learner_forest", "learner_linear_svm")  # the paper's
 RHO = f"rho_max_score_{DISTANCES[0]}"
-_AREA = {"decimals": 4, "limits": (0, 1), "least_is_best": True}
-_ERROR = {"decimals": 3, "limits": (0, 1), "least_is_best": True}
-_RHO = {"decimals": 3, "limits": (-1, 1)}
+_AREA: dict[str, Any] = {"decimals": 4, "limits": (0, 1), "least_is_best": True}
+_ERROR: dict[str, Any] = {"decimals": 3, "limits": (0, 1), "least_is_best": True}
+_RHO: dict[str, Any] = {"decimals": 3, "limits": (-1, 1)}
 
 
 def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
@@ -64,7 +64,8 @@ def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learn
 
 def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
     """Accuracy, calibration and ρ of every learner where the samples are unlike those of the training."""
-    columns, picks = {}, {}
+    columns: dict[str, Column] = {}
+    picks: dict[str, tuple[str, str]] = {}
     for name, title in SHIFTED.items():
         columns |= {
             f"accuracy_{name}": Column(f"Acc., {title} (%)"),
@@ -94,7 +95,8 @@ def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners
 def table5_claims(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
     """The paper's two claims about the GPC, answered with the differences paired by seed."""
     metrics = _only(metrics, "accuracy", RHO)
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     for source, entry in sources.items():
         for own in (name for name in GPCA if name in learners):
             for rival in (name for name in RIVALS if name in learners):
@@ -145,7 +147,9 @@ def _of_distance() -> str:
 
 def _of_learners(metrics, sources, learners, picks: Mapping[str, tuple[str, str]], **fields) -> Table:
     metrics = _only(metrics, *(metric for _, metric in picks.values()))
-    rows, cells, compared = [], {}, []
+    rows: Rows = []
+    cells: Cells = {}
+    compared: list[list[tuple[int, str]]] = []
     for source, entry in sources.items():
         first = len(rows)
         for learner, title in learners.items():

@@ -14,13 +14,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gpca.acquisition import STRATEGIES, STREAMS
 from gpca.errors import InputError
 from gpca.learning_metrics import CENSORED_BY, TABLE
 from gpca.metrics import mean_interval
-from gpca.reporting.table import Cell, Column, Table
+from gpca.reporting.table import Cell, Cells, Column, Rows, Table
 from gpca.reporting.tables import STAND_IN, title_of
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ SETTINGS = {  # name -> title
     "unseen": "the known concepts only",
     "rare": "all concepts; the new one rare",
 }
-_COUNT = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
+_COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,8 @@ def _select(metrics: pd.DataFrame, source: str, setting: str, strategy: str | No
 
 def _filled(labelled: Iterable[tuple[tuple, pd.DataFrame]], quantities: Mapping[str, Quantity]) -> tuple[tuple, dict]:
     """Return the labels of the rows that have any cell, and the cells."""
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     for labels, metrics in labelled:
         found = {key: cell for key, quantity in quantities.items() if (cell := _cell(metrics, quantity))}
         cells |= {(len(rows), key): cell for key, cell in found.items()}

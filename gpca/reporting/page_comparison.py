@@ -10,8 +10,10 @@ from gpca.errors import InputError
 from gpca.predictions import read_csv
 
 TONES = {"reproduced": "good", "close": "near", "not reproduced": "bad"}  # other verdicts judge nothing
-_COLUMNS = ("table", "row", "column", "unit", "published", "decimals", "reproduced", "ci_low", "ci_high", "n")
-_COLUMNS += ("difference", "verdict", "reason")
+_COLUMNS = (
+    *("table", "row", "column", "unit", "published", "decimals", "reproduced", "ci_low", "ci_high", "n"),
+    *("difference", "verdict", "reason"),
+)
 _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
 
 

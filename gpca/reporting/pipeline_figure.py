@@ -228,4 +228,5 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: 
 
 
 def _draw_thumbnail(axes, stages: Stages, row: int) -> None:
-    draw_clouds(axes, *(cloud[::3] for cloud in stages.seen(row)["icp"]), size=0.4)
+    target_Q_3, source_P_3 = stages.seen(row)["icp"]
+    draw_clouds(axes, target_Q_3[::3], source_P_3[::3], size=0.4)

@@ -69,8 +69,8 @@ def draw_real_world_example(
         panel.imshow(image, alpha=0.55)
         T_camera_target = camera.T_camera_target(pose)
         for points_m, colour, size in ((model_m, "#C8102E", 0.5), (source_m, BLUE, 0.8)):
-            pixels = camera.project(transform(T_camera_target, points_m))
-            panel.scatter(*pixels.T, s=size, color=colour, linewidths=0)
+            x, y = camera.project(transform(T_camera_target, points_m)).T
+            panel.scatter(x, y, s=size, color=colour, linewidths=0)
         _zoom(panel, u, v, image.shape)
     ends_m = np.vstack([np.zeros(3), 0.5 * registrations.diameter_m[row] * np.eye(3)])
     origin, *tips = camera.project(transform(camera.T_camera_target("icp"), ends_m))

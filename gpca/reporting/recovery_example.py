@@ -14,7 +14,7 @@ from gpca.reporting.style import TEXT_WIDTH_IN, save_figure, use_style
 from gpca.rigid import transform
 
 MODEL_RED = "#C8102E"
-SHAPES = {
+SHAPES: dict[str, tuple[int | str, ...]] = {
     "camera_3_3": (3, 3),
     "model_m": ("Q", 3),
     "object": (),
@@ -47,7 +47,8 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
         if posed:
             seen = transform(found[f"T_camera_object_{view}"], found["model_m"]) @ found["camera_3_3"].T
             ahead = seen[:, 2] > 0.05  # metres before the camera
-            panel.scatter(*(seen[ahead, :2] / seen[ahead, 2:]).T, s=0.6, color=MODEL_RED, linewidths=0)
+            u, v = (seen[ahead, :2] / seen[ahead, 2:]).T
+            panel.scatter(u, v, s=0.6, color=MODEL_RED, linewidths=0)
         else:
             panel.contour(found[f"mask_{view}"], [0.5], colors="#FFD400", linewidths=0.9)
         height, width = found[f"mask_{view}"].shape

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,7 +58,7 @@ def draw_recovery_rates(
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.2, columnspacing=1.0, borderpad=0
         )
     title = "Failures on tables of the virtual depth camera (procedural stand-in)"
-    episodes = pooled(metrics, shown[0], "recovered_within_1")[1]
+    _, episodes = pooled(metrics, shown[0], "recovered_within_1") or (nan, 0)
     figure.text(0.005, 0.99, f"{title}: {episodes} failures; right: within {budget} actions, by cause", va="top")
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.16 / height_in), pad=0.4)
     save_figure(figure, pdf_path, png_path)

@@ -10,7 +10,7 @@ from gpca.errors import InputError
 from gpca.metrics import ALL
 from gpca.perturbation import CONCEPTS
 from gpca.recovery_metrics import pooled, wilson_interval
-from gpca.reporting.table import Cell, Column, Table
+from gpca.reporting.table import Cell, Cells, Column, Rows, Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +29,8 @@ def table8_recovery(
     Raises:
         InputError: the metrics hold none of these.
     """
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     seeds = metrics["seed"].nunique()
     within = [f"recovered_within_{k}" for k in range(1, budget + 1)]
     shares = {key: (key, ALL) for key in (*within, "wrong_first", "queued")}
@@ -41,9 +42,9 @@ def table8_recovery(
         for key, (metric, cause) in shares.items():
             if (found := pooled(metrics, name, metric, cause)) is not None:
                 cells[row, key] = share_cell(*found, seeds)
-        for key, value in (("actions", pooled(metrics, name, "actions")), ("seconds", seconds.get(name))):
-            if value is not None:
-                mean = value[0] if key == "actions" else value
+        actions = pooled(metrics, name, "actions")
+        for key, mean in (("actions", actions and actions[0]), ("seconds", seconds.get(name))):
+            if mean is not None:
                 cells[row, key] = Cell(mean, nan, seeds, cells[row, within[0]].test_samples)
         rows.append(((name, title),))
     if not rows:

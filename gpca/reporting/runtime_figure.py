@@ -59,8 +59,10 @@ def _bars(runtime: pd.DataFrame, numbers: Iterable[Number]) -> dict[str, dict[st
     printed = printed_seconds(numbers)
     bars = {f"Paper, {' and '.join(HARDWARE.values())}": {c: 1e3 * printed[c].value for c in COLOURS}}
     for device, name in hardware.items():
-        stages = {c: mean_ms.get((c, device), mean_ms.get((c, "CPU"))) for c in COLOURS}
-        if missing := [c for c, milliseconds in stages.items() if milliseconds is None]:
-            raise InputError("runtime", f"holds no row of '{missing[0]}'", "run the step 'runtime' anew")
-        bars[f"Here, {name}"] = stages
+        stages = bars.setdefault(f"Here, {name}", {})
+        for component in COLOURS:
+            milliseconds = mean_ms.get((component, device), mean_ms.get((component, "CPU")))
+            if milliseconds is None:
+                raise InputError("runtime", f"holds no row of '{component}'", "run the step 'runtime' anew")
+            stages[component] = milliseconds
     return bars

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.published import HARDWARE, Number, printed_seconds
-from gpca.reporting.table import Cell, Column, Table
+from gpca.reporting.table import Cell, Cells, Column, Rows, Table
 from gpca.runtime_file import COMPONENTS
 
 if TYPE_CHECKING:
@@ -29,7 +29,8 @@ def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number])
     if runtime.empty:
         raise InputError("runtime", "holds no rows", "run the step 'runtime' first")
     published = printed_seconds(numbers)
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     for row, of_row in enumerate(runtime.itertuples()):
         printed = published.get(of_row.component)
         published_on = printed.device if printed else ""

@@ -52,6 +52,10 @@ class Column:
         return f"{cell.mean:.{self.decimals}f} ± {half_width}"
 
 
+Rows = list[tuple[tuple[str, str], ...]]  # for each row of a table its labels, key -> title each
+Cells = dict[tuple[int, str], Cell]
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows by columns of cells; every name has a key for the CSV and a title for the reader.

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.metrics import ALL, mean_interval
-from gpca.reporting.table import EMPTY, Cell, Column, Table
+from gpca.reporting.table import EMPTY, Cell, Cells, Column, Rows, Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,7 +42,8 @@ def table1_single_baselines(
 ) -> Table:
     """Accuracy of single-concept attribution (paper, Table I): sources by those of `TABLE1` with predictions."""
     shown = [name for name in TABLE1 if name in explainers and (metrics["method"] == name).any()]
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     for source, entry in sources.items():
         of_row = {name: cell for name in shown if (cell := _cell(metrics, source, name))}
         cells |= {(len(rows), name): cell for name, cell in of_row.items()}
@@ -68,7 +69,9 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
 
     The best accuracy of a source is bold, oracles apart: they are told what the others have to find out.
     """
-    rows, cells, compared = [], {}, []
+    rows: Rows = []
+    cells: Cells = {}
+    compared: list[list[tuple[int, str]]] = []
     for source, source_entry in sources.items():
         rivals = []
         for explainer, entry in explainers.items():
@@ -121,7 +124,8 @@ def table2_per_concept(
     """
     concepts = [concept for concept in metrics["concept"].unique() if concept != ALL]
     shown = {name: entry for name, entry in explainers.items() if name in GPCA}
-    rows, cells = [], {}
+    rows: Rows = []
+    cells: Cells = {}
     for source, source_entry in sources.items():
         for explainer, entry in shown.items():
             of_row = {c: cell for c in (*concepts, ALL) if (cell := _cell(metrics, source, explainer, c))}

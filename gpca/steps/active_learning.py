@@ -14,6 +14,7 @@ from gpca.active_learning import ActiveLearningSettings, Task, initial_gpc, lear
 from gpca.dataset import Registrations, load_embeddings
 from gpca.errors import InputError
 from gpca.gpc import GPC, GPCSettings
+from gpca.latents import Projection
 from gpca.learning_curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.perturbation import CONCEPTS
 from gpca.progress import progress
@@ -73,7 +74,7 @@ def settings_from(given: dict) -> ActiveLearningSettings:
     return ActiveLearningSettings(**own | ({"gpc": GPCSettings(**own["gpc"])} if "gpc" in own else {}))
 
 
-def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, Task, GPC]]:
+def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, Task[Projection], GPC]]:
     """Yield setting, task and the GPC that knows two concepts: for each concept held out, and for a rare one."""
     registrations = Registrations.load(options.registrations)
     held_out = options.settings.get("held_out", CONCEPTS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from gpca.objects.shapes.solids import difference, moved, revolve, tube, union
 
 # Handles as curves from the upper to the lower joint: (share of the reach, share of the way up from the lower joint).
-HANDLES = {
+HANDLES: dict[str, Sequence[tuple[float, float]]] = {
     "C": ((0, 1), (0.55, 1.0), (0.92, 0.78), (1, 0.5), (0.92, 0.22), (0.55, 0.0), (0, 0)),
     "D": ((0, 1), (0.45, 1), (0.8, 0.98), (0.97, 0.85), (1, 0.5), (0.97, 0.15), (0.8, 0.02), (0.45, 0), (0, 0)),
     "ear": ((0, 1), (0.4, 1.1), (0.85, 1.02), (1, 0.75), (0.8, 0.4), (0.4, 0.12), (0, 0)),
@@ -90,8 +90,9 @@ def build(cup: Cup) -> trimesh.Trimesh:
         angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
         middle = radii[-1] - lip + cup.rim / 2
         parts.append(revolve(np.stack([middle + cup.rim * np.cos(angles), top - lip + cup.rim * np.sin(angles)], -1)))
-    for turn in range(cup.handles if cup.handle else 0):
-        parts.append(moved(_handle(cup, outline), rotation_xyz_deg=(0, 0, 360 * turn / cup.handles)))
+    if cup.handle:
+        handle = _handle(cup, HANDLES[cup.handle], outline)
+        parts += [moved(handle, rotation_xyz_deg=(0, 0, 360 * turn / cup.handles)) for turn in range(cup.handles)]
     # Handles reach into the wall, so that the cavity is cut last and trims what would stand out inside.
     recess = revolve([(0, -1), (0.8 * outer[0], -1), (0.76 * outer[0], 0.3 * cup.floor), (0, 0.3 * cup.floor)])
     return moved(difference(union(*parts), cavity, recess), scale=0.001)
@@ -110,8 +111,8 @@ def _inset(distance: np.ndarray, radius: float) -> np.ndarray:
     return radius - np.sqrt(radius**2 - beyond**2)
 
 
-def _handle(cup: Cup, outline: PchipInterpolator) -> trimesh.Trimesh:
-    out, up = np.array(HANDLES[cup.handle]).T
+def _handle(cup: Cup, shape: Sequence[tuple[float, float]], outline: PchipInterpolator) -> trimesh.Trimesh:
+    out, up = np.array(shape).T
     low, high = cup.joints
     wall_x = outline(low) + up * (outline(high) - outline(low))
     path = np.stack([wall_x + out * cup.reach, np.zeros_like(up), low + up * (high - low)], axis=-1)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import trimesh
 from manifold3d import CrossSection, Manifold, Mesh64, OpType
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.distance import pdist
 from trimesh.smoothing import filter_laplacian
@@ -21,7 +22,8 @@ SEGMENTS = 64
 BALL_SEGMENTS = 24  # of roundings, which are small beside the body they belong to
 AXES = {"x": (0, 90, 0), "y": (-90, 0, 0), "z": (0, 0, 0)}  # rotation that takes z to the axis, degrees
 
-Point = Sequence[float]
+Point = ArrayLike  # three numbers, in a section two
+Points = ArrayLike  # (K, 3), in a section (K, 2)
 
 
 def box(extents: Point, at: Point = (0, 0, 0), rounding: float = 0) -> trimesh.Trimesh:
@@ -45,12 +47,12 @@ def ellipsoid(radii: float | Point, at: Point = (0, 0, 0)) -> trimesh.Trimesh:
     return _trimesh(Manifold.sphere(1, SEGMENTS).scale(np.broadcast_to(radii, 3)).translate(at))
 
 
-def revolve(profile_rz: Sequence[Point]) -> trimesh.Trimesh:
+def revolve(profile_rz: Points) -> trimesh.Trimesh:
     """Solid of revolution about z of the closed profile (r ≥ 0, z): one that touches the axis, or a ring."""
     return _trimesh(Manifold.revolve(_section(profile_rz), SEGMENTS))
 
 
-def extrude(polygon_xy: Sequence[Point], height: float, rounding: float = 0, rounding_z: float = 0) -> trimesh.Trimesh:
+def extrude(polygon_xy: Points, height: float, rounding: float = 0, rounding_z: float = 0) -> trimesh.Trimesh:
     """Prism over a polygon, z from 0 to `height`.
 
     `rounding` rounds the polygon's corners (the upright edges); `rounding_z` rounds the rims of top and bottom, and all
@@ -68,8 +70,8 @@ def extrude(polygon_xy: Sequence[Point], height: float, rounding: float = 0, rou
 
 
 def tube(
-    path: Sequence[Point],
-    radii: float | Sequence[float],
+    path: Points,
+    radii: ArrayLike,
     side: Point = (0, 1, 0),
     aspect: float = 1,
     smooth: bool = True,
@@ -87,19 +89,19 @@ def tube(
         steps: rings along a smooth path.
         segments: corners of the circle.
     """
-    path = np.asarray(path, float)
-    radii = np.broadcast_to(np.asarray(radii, float), len(path))
-    if smooth and len(path) > 2:
-        arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    path_K_3 = np.asarray(path, float)
+    radii_K = np.broadcast_to(np.asarray(radii, float), len(path_K_3))
+    if smooth and len(path_K_3) > 2:
+        arc = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path_K_3, axis=0), axis=1))])
         along = np.linspace(0, arc[-1], steps)
-        radii = PchipInterpolator(arc, radii)(along)
-        path = CubicSpline(arc, path)(along)
-    steps_unit = np.diff(path, axis=0)
+        radii_K = PchipInterpolator(arc, radii_K)(along)
+        path_K_3 = CubicSpline(arc, path_K_3)(along)
+    steps_unit = np.diff(path_K_3, axis=0)
     steps_unit /= np.linalg.norm(steps_unit, axis=1, keepdims=True)
     tangents = np.concatenate([steps_unit[:1], steps_unit[:-1] + steps_unit[1:], steps_unit[-1:]])
     angles = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     across, rings = np.asarray(side, float), []
-    for centre, radius, tangent in zip(path, radii, tangents, strict=True):
+    for centre, radius, tangent in zip(path_K_3, radii_K, tangents, strict=True):
         tangent = tangent / np.linalg.norm(tangent)
         across = across - (across @ tangent) * tangent  # carried along the path, so that the circle never twists
         across /= np.linalg.norm(across)
@@ -108,7 +110,7 @@ def tube(
     return _skin(rings)
 
 
-def loft(rings: Sequence[Sequence[Point]]) -> trimesh.Trimesh:
+def loft(rings: Sequence[Points]) -> trimesh.Trimesh:
     """Skin over rings of equally many points, counter-clockwise seen from the last ring; both ends closed flat."""
     return _skin([np.asarray(ring, float) for ring in rings])
 
@@ -145,7 +147,8 @@ def blend(*meshes: trimesh.Trimesh, edge: float, rounds: int = 10) -> trimesh.Tr
 
 def moved(mesh: trimesh.Trimesh, translation: Point = (0, 0, 0), rotation_xyz_deg: Point = (0, 0, 0), scale: float = 1):
     """Copy of the mesh, scaled, then turned about the fixed axes x, y, z through the origin, then shifted."""
-    transform = euler_matrix(*np.radians(rotation_xyz_deg), axes="sxyz")
+    x, y, z = np.radians(rotation_xyz_deg)
+    transform = euler_matrix(x, y, z, axes="sxyz")
     transform[:3, :3] *= scale
     transform[:3, 3] = translation
     return mesh.copy().apply_transform(transform)
@@ -161,11 +164,11 @@ def scaled_to(mesh: trimesh.Trimesh, extents: Point | None = None, diameter: flo
     return scaled
 
 
-def _section(polygon: Sequence[Point]) -> CrossSection:
-    polygon = np.asarray(polygon, float)
-    x, y = polygon.T
+def _section(polygon: Points) -> CrossSection:
+    corners_K_2 = np.asarray(polygon, float)
+    x, y = corners_K_2.T
     clockwise = x @ np.roll(y, -1) < y @ np.roll(x, -1)
-    return CrossSection([polygon[::-1] if clockwise else polygon])
+    return CrossSection([corners_K_2[::-1] if clockwise else corners_K_2])
 
 
 def _skin(rings: list[np.ndarray]) -> trimesh.Trimesh:
