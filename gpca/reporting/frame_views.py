@@ -40,7 +40,8 @@ def draw_over_model(axes, model: np.ndarray, source: np.ndarray, points: int = 1
     The view looks along the direction from which most of the source faces the viewer: its normal by least variance.
     """
     view = _view_of(source - model.mean(axis=0))
-    draw_clouds(axes, *(cloud[:: max(1, len(cloud) // points)] @ view.T for cloud in (model, source)), size=1.2)
+    model, source = (cloud[:: max(1, len(cloud) // points)] @ view.T for cloud in (model, source))
+    draw_clouds(axes, model, source, size=1.2)
 
 
 def _view_of(offset_P_3: np.ndarray) -> np.ndarray:

@@ -42,8 +42,10 @@ def draw_real_world_confusions(
         for (row, column), share in np.ndenumerate(shares_C_C):
             if np.isfinite(share):
                 words = f"{100 * share:.1f} %\nn = {counts_C_C[row, column]:.0f}"
-                look = {"fontsize": SMALL_PT, "color": "white" if share > 0.65 else "black"}
-                axes.text(column, row, words, ha="center", va="center", linespacing=1.2, **look)
+                colour = "white" if share > 0.65 else "black"
+                axes.text(
+                    column, row, words, ha="center", va="center", linespacing=1.2, fontsize=SMALL_PT, color=colour
+                )
         backbone, _, reduction = method.partition("-")
         axes.set_title(encoder_title(backbone, reduction), pad=3)
         axes.set_xticks(range(len(concepts)), concepts)

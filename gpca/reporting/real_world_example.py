@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,9 +90,12 @@ def draw_real_world_example(
         panels[2].annotate(
             "", tip, origin, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.4, "mutation_scale": 7}
         )
-        place = np.clip(tip + 0.15 * (tip - origin), *_inside(panels[2]))
-        outlined = {"path_effects": [withStroke(linewidth=1.5, foreground="white")], "fontweight": "bold"}
-        panels[2].text(*place, name, color=colour, ha="center", va="center", **outlined)
+        x, y = np.clip(tip + 0.15 * (tip - origin), *_inside(panels[2]))
+        outlined: dict[str, Any] = {
+            "path_effects": [withStroke(linewidth=1.5, foreground="white")],
+            "fontweight": "bold",
+        }
+        panels[2].text(x, y, name, color=colour, ha="center", va="center", **outlined)
     draw_scores(panels[3], sample)
     panels[3].set_xlabel("score ± deviation", labelpad=1)
     captions = (

@@ -34,9 +34,7 @@ def draw_runtime(
     use_style()
     import matplotlib.pyplot as plt
 
-    figure, panels = plt.subplots(
-        len(bars), 1, figsize=(TEXT_WIDTH_IN, 0.8 + 0.75 * len(bars)), layout="constrained", squeeze=False
-    )
+    figure, panels = plt.subplots(len(bars), 1, figsize=(TEXT_WIDTH_IN, 0.8 + 0.75 * len(bars)), squeeze=False)
     for panel, (name, milliseconds) in zip(panels[:, 0], bars.items(), strict=True):
         left = 0.0
         for component, width in milliseconds.items():
@@ -49,7 +47,7 @@ def draw_runtime(
     handles, labels = panels[0, 0].get_legend_handles_labels()
     write_title(figure, f"One explanation on {title}")
     below_title = 1 - 0.2 / figure.get_size_inches()[1]
-    figure.get_layout_engine().set(rect=(0, 0, 1, below_title))
+    figure.set_layout_engine("constrained", rect=(0, 0, 1, below_title))
     figure.legend(handles, labels, loc="outside lower center", ncol=len(labels))
     save_figure(figure, pdf_path, png_path)
 
