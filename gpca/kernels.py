@@ -42,7 +42,7 @@ def make_kernel(name: str, n_classes: int, lengthscale: float) -> gpytorch.kerne
 
 
 def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
-    """Return k_c(a, b), (C, A, B), of kernels of batch shape (C,)."""
+    """Return k_c(a, b), (C, A, B), of kernels of batch shape (C,); of those without a form here by gpytorch itself."""
     base, scale_C_1_1 = kernel.base_kernel, kernel.outputscale[:, None, None]
     if isinstance(base, ScaledPolynomialKernel):
         inner_A_B = a_A_d @ b_B_d.T / a_A_d.shape[1]
@@ -52,7 +52,9 @@ def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tenso
         # Not zero under the root, where its derivative would be infinite.
         scaled_C_A_B = squared_A_B.clamp_min(1e-15).sqrt() * (math.sqrt(3) / base.lengthscale)
         return scale_C_1_1 * (1 + scaled_C_A_B) * torch.exp(-scaled_C_A_B)
-    return scale_C_1_1 * torch.exp(squared_A_B * (-0.5 / base.lengthscale.square()))
+    if isinstance(base, gpytorch.kernels.RBFKernel):
+        return scale_C_1_1 * torch.exp(squared_A_B * (-0.5 / base.lengthscale.square()))
+    return kernel(a_A_d, b_B_d).to_dense()
 
 
 def variance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
@@ -60,7 +62,7 @@ def variance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
     base, scale_C_1 = kernel.base_kernel, kernel.outputscale[:, None]
     if isinstance(base, ScaledPolynomialKernel):
         return scale_C_1 * (a_A_d.square().mean(dim=1) + base.offset).square()
-    return scale_C_1.expand(-1, len(a_A_d))
+    return scale_C_1.expand(-1, len(a_A_d)) if base.is_stationary else kernel(a_A_d, diag=True)
 
 
 def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:

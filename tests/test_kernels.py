@@ -1,5 +1,6 @@
 import math
 
+import gpytorch
 import pytest
 import torch
 
@@ -39,6 +40,16 @@ def test_the_variance_is_the_covariances_diagonal(name, n):
     diagonal = covariance(kernel, A[:n], A[:n]).diagonal(dim1=1, dim2=2)
     assert variance(kernel, A[:n]).shape == (3, n)
     assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
+
+
+@pytest.mark.parametrize("form", [gpytorch.kernels.RQKernel, gpytorch.kernels.LinearKernel])
+def test_a_kernel_without_a_form_here_is_that_of_gpytorch(form, monkeypatch):
+    monkeypatch.setitem(KERNELS, "new", form)
+    kernel = make_kernel("new", 3, lengthscale=3.0)
+    kernel.outputscale = torch.tensor([0.5, 1.0, 2.0])
+    assert torch.allclose(covariance(kernel, A, B), kernel(A, B).to_dense())
+    diagonal = covariance(kernel, A, A).diagonal(dim1=1, dim2=2)
+    assert torch.allclose(variance(kernel, A), diagonal, atol=1e-5)
 
 
 @pytest.mark.parametrize("name", KERNELS)
