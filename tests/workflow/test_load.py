@@ -7,10 +7,6 @@ from .conftest import ROOT
 RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
 
 
-def test_snakemakes_own_linter_has_nothing_to_say(project):
-    project.snakemake("--lint")
-
-
 @pytest.mark.parametrize(
     ("config", "run", "seeds", "backbones", "reductions"),
     [("config", "embedded", 3, 4, 4), ("smoke", "smoke", 2, 2, 2), ("real", "real", 5, 4, 4)],
