@@ -8,14 +8,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("gpca", "baselines")
+BESIDE = {"gpca.reporting.style": "matplotlibrc"}  # a file that a module reads from its own folder
 
 
 def code_files(*modules: str) -> list[str]:
     """Return the files of the given modules and of all project modules they import, anywhere in their text.
 
-    What is imported only for type checking never runs, so it does not count. Paths are relative to the project's
-    folder, sorted. Modules chosen by name at run time (kinds of source, encoders, explainers) are not seen and have to
-    be given.
+    What is imported only for type checking never runs, so it does not count; a file in `BESIDE` counts with its module.
+    Paths are relative to the project's folder, sorted. Modules chosen by name at run time (kinds of source, encoders,
+    explainers) are not seen and have to be given.
     """
     found: set[str] = set()
     open_modules = list(modules)
@@ -24,7 +25,9 @@ def code_files(*modules: str) -> list[str]:
         if module not in found:
             found.add(module)
             open_modules += _imports(module)
-    return sorted(str(_file(module).relative_to(ROOT)) for module in found)
+    files = [_file(module) for module in found]
+    files += [_file(module).with_name(BESIDE[module]) for module in found.intersection(BESIDE)]
+    return sorted(str(file.relative_to(ROOT)) for file in files)
 
 
 @cache

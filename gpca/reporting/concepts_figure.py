@@ -9,7 +9,8 @@ import numpy as np
 from gpca.dataset import Registrations
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
-from gpca.reporting.style import BLUE, TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.cloud_views import draw_clouds, views_around
+from gpca.reporting.style import SOURCE_COLOUR, TARGET_COLOUR, TEXT_WIDTH_IN, save_figure, use_style, write_title
 from gpca.rigid import inverse, scale_translation, transform
 
 TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
@@ -18,8 +19,6 @@ SEVERITIES = {
     "pose": ("severity_rotation_rad", "severity_translation"),
     "overlap": ("severity_crop",),
 }
-RED = "#C8102E"  # the paper's target is red; of the palette, only vermilion is near, and it reads as orange
-_ELEVATION_RAD = np.radians(22.0)
 
 
 def draw_concepts_figure(
@@ -30,7 +29,7 @@ def draw_concepts_figure(
     png_path: str | Path,
     object_name: str | None = None,
 ) -> None:
-    """Draw target (red) and perturbed source in its initial pose (blue) in one panel per concept.
+    """Draw target (vermilion) and perturbed source in its initial pose (blue) in one panel per concept.
 
     Shown are test samples of one object: `object_name`, or that object whose samples come nearest to the medium
     severity. One view serves all panels; it is chosen so that the pose error and the cut are seen from the side.
@@ -61,15 +60,15 @@ def draw_concepts_figure(
     figure, panels = plt.subplots(1, len(clouds), figsize=(TEXT_WIDTH_IN, height_in))
     figure.subplots_adjust(left=0, right=1, bottom=foot_in / height_in, top=1 - head_in / height_in, wspace=0)
     for letter, panel, (concept, (target_view, source_view)) in zip("abc", panels, clouds.items(), strict=True):
-        _draw_clouds(panel, target_view, source_view, low, high)
+        draw_clouds(panel, target_view, source_view, corners=(low, high))
         severity = severity_text(registrations, samples[concept], concept)
         panel.set_title(f"({letter}) {TITLES[concept]}: {severity}", y=0, pad=-4, va="top")
     handles = [
         plt.Line2D([], [], linestyle="", marker="o", markersize=3, color=colour, label=label)
-        for colour, label in ((RED, "target"), (BLUE, "perturbed source, before ICP"))
+        for colour, label in ((TARGET_COLOUR, "target"), (SOURCE_COLOUR, "perturbed source, before ICP"))
     ]
     figure.legend(handles=handles, loc="upper right", ncols=2, borderaxespad=0.2, handletextpad=0.1, columnspacing=1)
-    figure.text(0.005, 0.99, f"{title}: {name}", ha="left", va="top")
+    write_title(figure, f"{title}: {name.replace('_', ' ')}")
     save_figure(figure, pdf_path, png_path)
 
 
@@ -112,8 +111,7 @@ def choose_view(target: np.ndarray, sources: dict[str, np.ndarray]) -> np.ndarra
     of these the one that shows best how pose error and cut shift the centroid: the visible shares' product is largest.
     """
     shifts = [sources[concept].mean(axis=0) - target.mean(axis=0) for concept in ("pose", "overlap")]
-    views = [_view(azimuth) for azimuth in np.linspace(0, 2 * np.pi, 24, endpoint=False)]
-    widest = sorted(views, key=lambda view: -np.std(target @ view[0]))[:8]
+    widest = sorted(views_around(), key=lambda view: -np.std(target @ view[0]))[:8]
     return max(widest, key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))
 
 
@@ -125,25 +123,3 @@ def severity_text(registrations: Registrations, sample: int, concept: str) -> st
         angle_deg = np.degrees(registrations.severity_rotation_rad[sample])
         return f"{angle_deg:.0f}° and {100 * registrations.severity_translation[sample]:.0f} % $d$"
     return f"{100 * registrations.severity_crop[sample]:.0f} % cut off"
-
-
-def _view(azimuth_rad: float) -> np.ndarray:
-    sine, cosine = np.sin(azimuth_rad), np.cos(azimuth_rad)
-    towards = np.array([cosine * np.cos(_ELEVATION_RAD), sine * np.cos(_ELEVATION_RAD), np.sin(_ELEVATION_RAD)])
-    right = np.array([-sine, cosine, 0.0])
-    return np.array([right, np.cross(towards, right), towards])
-
-
-def _draw_clouds(panel, target: np.ndarray, source: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """Scatter both clouds together from back to front; the farther a point, the paler."""
-    from matplotlib.colors import to_rgb
-
-    points = np.concatenate([target, source])
-    colours = np.repeat([to_rgb(RED), to_rgb(BLUE)], [len(target), len(source)], axis=0)
-    farness = ((high[2] - points[:, 2]) / (high[2] - low[2]))[:, None]
-    colours += (1 - colours) * 0.8 * farness
-    order = np.argsort(points[:, 2], kind="stable")
-    panel.scatter(points[order, 0], points[order, 1], s=1.6, c=colours[order], linewidths=0)
-    margin = 0.02
-    panel.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), aspect="equal")
-    panel.set_axis_off()

@@ -11,17 +11,24 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.metrics import ABSTAINED, PREDICTED_AS, read_metrics
-from gpca.reporting.style import BLUE, PALETTE, TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.style import (
+    CONCEPT_COLOURS,
+    GREY,
+    LIGHT_GREY,
+    SMALL_PT,
+    TEXT_WIDTH_IN,
+    blues,
+    save_figure,
+    use_style,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
-GREY = "#999999"  # abstained
 LABEL_IN = 1.45  # of the explainers' titles
 HEAD_IN, ROW_IN, PANEL_IN, FOOT_IN = 0.62, 0.53, 0.43, 0.04
 LEAST_SOURCE_IN, LARGEST_SOURCE_IN = 1.4, 1.9
-LETTERS_IN, GAP_IN = 0.12, 0.17  # left of a matrix; between matrix and bars, and after the bars
-SMALL_PT, NUMBER_PT = 6, 6.5
+LETTERS_IN, GAP_IN = 0.14, 0.2  # left of a matrix; between matrix and bars, and after the bars
 
 
 def draw_confusions_figure(
@@ -68,7 +75,7 @@ def draw_confusions_figure(
     for number, explainer in enumerate(rows):
         top_in = HEAD_IN + number * ROW_IN
         title = _wrapped(explainers[explainer], LABEL_IN, 7)
-        text(LABEL_IN - 0.04, top_in + PANEL_IN / 2, title, ha="right", va="center", fontsize=7, linespacing=1.1)
+        text(LABEL_IN - 0.04, top_in + PANEL_IN / 2, title, ha="right", va="center", fontsize=SMALL_PT, linespacing=1.1)
         for place, source in enumerate(columns):
             if (source, explainer) in confusions:
                 left_in = LABEL_IN + place * source_in + LETTERS_IN
@@ -104,7 +111,7 @@ def _wrapped(title: str, width_in: float, size_pt: float) -> str:
 def _key(confusion: pd.DataFrame) -> str:
     concepts = list(confusion.columns[:-1])
     named = [f"{letter} {concept}" for letter, concept in zip(letters(concepts), concepts, strict=True)]
-    return f"{', '.join(named)}\n– abstained\nmatrix: true (rows), predicted\nbars: predicted; dash: true share"
+    return f"{', '.join(named)}\n– abstained\nmatrix: true (rows), predicted\nbars: predicted (dash: true)"
 
 
 def letters(concepts: list[str]) -> list[str]:
@@ -115,16 +122,13 @@ def letters(concepts: list[str]) -> list[str]:
 
 def draw_matrix(axes, confusion: pd.DataFrame, head: bool) -> None:
     """Draw the rows' shares; a concept without samples has none. Predicted concepts are named only at the `head`."""
-    from matplotlib.colors import LinearSegmentedColormap
-
     concepts = list(confusion.columns[:-1])
     counts_C_C1 = confusion.reindex(concepts).to_numpy(float)
     shares_C_C = counts_C_C1[:, :-1] / counts_C_C1.sum(axis=1, keepdims=True)
-    blues = LinearSegmentedColormap.from_list("blues", ["white", BLUE])
-    axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues, vmin=0, vmax=1, aspect="auto")
+    axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues(), vmin=0, vmax=1, aspect="auto")
     for (row, column), share in np.ndenumerate(shares_C_C):
         if np.isfinite(share):
-            style = {"fontsize": NUMBER_PT, "color": "white" if share > 0.65 else "black"}
+            style = {"fontsize": SMALL_PT, "color": "white" if share > 0.65 else "black"}
             axes.text(column, row, f"{100 * share:.0f}", ha="center", va="center_baseline", **style)
     names = letters(concepts)
     axes.set_yticks(range(len(names)), names)
@@ -138,7 +142,7 @@ def draw_bars(axes, confusion: pd.DataFrame, head: bool) -> None:
     concepts = list(confusion.columns[:-1])
     total = confusion.to_numpy().sum()
     shares, truth = confusion.sum() / total, confusion.sum(axis=1) / total
-    colours = [*(PALETTE[i % len(PALETTE)] for i in range(len(concepts))), GREY]
+    colours = [*(CONCEPT_COLOURS.get(concept, GREY) for concept in concepts), LIGHT_GREY]  # the last abstained
     axes.bar(range(len(shares)), shares, color=colours, width=0.7)
     places = np.array([concepts.index(concept) for concept in truth.index])
     axes.hlines(truth, places - 0.45, places + 0.45, color="black", linewidth=0.6)
@@ -146,4 +150,4 @@ def draw_bars(axes, confusion: pd.DataFrame, head: bool) -> None:
     axes.set_yticks([0, 0.5, 1], ["0", "50", "100"] if head else [])
     axes.set_xticks(range(len(shares)), [*letters(concepts), "–"] if head else [])
     axes.tick_params(length=0, pad=1.5, labelsize=SMALL_PT, labeltop=True, labelbottom=False)
-    axes.tick_params(axis="y", length=1.5, labelsize=SMALL_PT - 1)
+    axes.tick_params(axis="y", length=1.5, labelsize=SMALL_PT)

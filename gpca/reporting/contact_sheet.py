@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.files import load_arrays
-from gpca.reporting.style import TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 
 VIEW = (math.radians(-55), math.radians(32))  # azimuth and elevation of the eye, z up: front, right and top are seen
 BASE_COLOUR = np.array([0.62, 0.70, 0.80])
@@ -172,7 +172,7 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, pdf: str | Path, png
     title_height = 0.28
     height = title_height + rows * (tile + caption_height)
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, height))
-    figure.text(0.5, 1 - 0.04 / height, title, ha="center", va="top", fontsize=9)
+    write_title(figure, title)
     for index, (name_lines, diameter_m) in enumerate(zip(captions, objects["diameters_m"], strict=True)):
         row, column = divmod(index, columns)
         in_row = min(columns, count - row * columns)

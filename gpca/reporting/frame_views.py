@@ -10,13 +10,12 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
 from gpca.predictions import numbers, read_csv, read_predictions
-from gpca.reporting.concepts_figure import RED
-from gpca.reporting.style import BLUE, GREEN, ORANGE, PURPLE
+from gpca.reporting.cloud_views import draw_clouds
+from gpca.reporting.style import CONCEPT_COLOURS, SMALL_PT
 
 if TYPE_CHECKING:
     import pandas as pd
 
-COLOURS = dict(zip(CONCEPTS, (ORANGE, PURPLE, GREEN), strict=True))
 POSE_COLUMNS = ("sample", "split", "instance", "init_error", "icp_error", "lost_to")
 
 
@@ -36,22 +35,12 @@ def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataF
 
 
 def draw_over_model(axes, model: np.ndarray, source: np.ndarray, points: int = 1500) -> None:
-    """Scatter a source (blue) over its model (red), both (P, 3) in the target's frame, seen from the camera's side.
+    """Scatter a source over its model, both (P, 3) in the target's frame, seen from the camera's side.
 
     The view looks along the direction from which most of the source faces the viewer: its normal by least variance.
     """
-    from matplotlib.colors import to_rgb
-
     view = _view_of(source - model.mean(axis=0))
-    clouds = [cloud[:: max(1, len(cloud) // points)] @ view.T for cloud in (model, source)]
-    drawn = np.concatenate(clouds)
-    colours = np.repeat([to_rgb(RED), to_rgb(BLUE)], [len(cloud) for cloud in clouds], axis=0)
-    depth = drawn[:, 2]
-    colours = colours + (1 - colours) * 0.75 * ((depth.max() - depth) / max(np.ptp(depth), 1e-9))[:, None]
-    order = np.argsort(depth, kind="stable")
-    axes.scatter(drawn[order, 0], drawn[order, 1], s=1.2, c=colours[order], linewidths=0)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
+    draw_clouds(axes, *(cloud[:: max(1, len(cloud) // points)] @ view.T for cloud in (model, source)), size=1.2)
 
 
 def _view_of(offset_P_3: np.ndarray) -> np.ndarray:
@@ -64,15 +53,14 @@ def _view_of(offset_P_3: np.ndarray) -> np.ndarray:
     return np.array([right, np.cross(towards, right), towards])
 
 
-def draw_scores(axes, row: pd.Series, label_pt: float = 7) -> None:
+def draw_scores(axes, row: pd.Series) -> None:
     """Draw a sample's concept scores as bars with ± one standard deviation, the true concept's name in bold."""
     for place, concept in enumerate(CONCEPTS):
         deviation = np.sqrt(row[f"variance_{concept}"])
-        axes.barh(
-            place, row[f"score_{concept}"], xerr=deviation, color=COLOURS[concept], height=0.7, error_kw={"lw": 0.8}
-        )
+        look = {"color": CONCEPT_COLOURS[concept], "height": 0.7, "error_kw": {"lw": 0.8}}
+        axes.barh(place, row[f"score_{concept}"], xerr=deviation, **look)
         weight = "bold" if concept == row["concept_true"] else "normal"
-        axes.text(-0.03, place, concept, ha="right", va="center", fontsize=label_pt, fontweight=weight)
+        axes.text(-0.03, place, concept, ha="right", va="center", fontsize=SMALL_PT, fontweight=weight)
     axes.set(xlim=(0, 1), ylim=(len(CONCEPTS) - 0.4, -0.6), yticks=[])
     axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     axes.spines["left"].set_visible(False)

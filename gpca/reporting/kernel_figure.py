@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.reporting.kernel_tables import PRINTED, TITLES
-from gpca.reporting.style import BLUE, COLUMN_WIDTH_IN, GREEN, VERMILION, save_figure, use_style
+from gpca.reporting.style import BLACK, BLUE, COLUMN_WIDTH_IN, GREY, ORANGE, save_figure, use_style
 
 if TYPE_CHECKING:
     import pandas as pd
 
-COLOURS = {"rbf": BLUE, "matern32": VERMILION, "polynomial": GREEN}
+COLOURS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
 LINES = ("-", (0, (4, 2)), ":", "-.")  # of the learning rates, from the largest on
 MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
 
@@ -65,12 +65,16 @@ def draw_kernel_curves(
         axes[-1, column].set_xlabel("iterations")
     for row, label in enumerate(MEASURES.values()):
         axes[row, 0].set_ylabel(label)
-    handles = [Line2D([], [], color=COLOURS[kernel], label=TITLES[kernel]) for kernel in COLOURS]
+    handles = [
+        Line2D([], [], color=COLOURS[kernel], label=TITLES[kernel])
+        for kernel in COLOURS
+        if (grid["kernel"] == kernel).any()
+    ]
     handles += [
-        Line2D([], [], color="#555555", linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
+        Line2D([], [], color=GREY, linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
         for i, rate in enumerate(rates)
     ]
-    circle = {"color": "#555555", "marker": "o", "markerfacecolor": "white", "linestyle": ""}
+    circle = {"color": GREY, "marker": "o", "markerfacecolor": "white", "linestyle": ""}
     handles.append(Line2D([], [], label="printed row", **circle))
     figure.legend(handles=handles, ncol=3, loc="lower center", columnspacing=1.2, handlelength=1.8)
     figure.tight_layout(rect=(0, 0.34 / height_in, 1, 1), pad=0.4, h_pad=0.8)

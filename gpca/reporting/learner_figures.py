@@ -22,13 +22,17 @@ from gpca.reporting.style import (
     BLACK,
     BLUE,
     GREEN,
+    GREY,
+    LIGHT_GREY,
     ORANGE,
     PURPLE,
     SKY_BLUE,
+    SMALL_PT,
     TEXT_WIDTH_IN,
     VERMILION,
     save_figure,
     use_style,
+    write_title,
 )
 from gpca.shifted_sets import DISTANCES
 
@@ -46,10 +50,10 @@ STYLES = {  # of the learners that are known: colour, line, width; GPC thick, th
     "learner_laplace_gpc": (SKY_BLUE, "-", 0.9),
     "learner_dirichlet_gp": (PURPLE, "-", 0.9),
 }
-_OTHER = ("#777777", "-", 0.9)
+_OTHER = (GREY, "-", 0.9)
 SET_STYLES = {  # set -> title, colour
-    "in_distribution": ("like the training", "#777777"),
-    "severity": ("severities beyond", VERMILION),
+    "in_distribution": ("like the training", GREY),
+    "severity": ("severities beyond", ORANGE),
     "source": ("unseen source", BLUE),
     "objects": ("unseen objects", GREEN),
 }
@@ -113,11 +117,11 @@ def draw_reliability(
         accuracy_B = np.bincount(bin_S, weights=hit_S, minlength=BINS)[drawn] / counts_B[drawn]
         mean_B = np.bincount(bin_S, weights=confidence_S, minlength=BINS)[drawn] / counts_B[drawn]
         centres_B = (np.arange(BINS) + 0.5) / BINS
-        panel.bar(centres_B, counts_B / counts_B.sum(), width=1 / BINS, color="#CCCCCC", label="share of samples")
-        panel.plot([0, 1], [0, 1], color="#777777", linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
+        panel.bar(centres_B, counts_B / counts_B.sum(), width=1 / BINS, color=LIGHT_GREY, label="share of samples")
+        panel.plot([0, 1], [0, 1], color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
         panel.plot(mean_B, accuracy_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, label="accuracy")
         gap = np.abs(np.bincount(bin_S, weights=confidence_S - hit_S, minlength=BINS)).sum() / len(hit_S)
-        panel.set_title(f"{learners[learner]}\nECE {gap:.3f}", fontsize=7)
+        panel.set_title(f"{learners[learner]}\nECE {gap:.3f}", fontsize=SMALL_PT)
         panel.set_xlim(1 / 3 - 0.03, 1.02)
         panel.set_ylim(0, 1.02)
         panel.set_xticks([0.4, 0.6, 0.8, 1.0])
@@ -152,8 +156,10 @@ def draw_uncertainty_vs_distance(
                     if key in parts:
                         points = {"color": colour, "alpha": 0.45, "s": 2.2, "linewidths": 0, "rasterized": True}
                         panel.scatter(parts[key][distance], parts[key]["max_score"], **points)
-        panel.text(0.97, 0.92, f"ρ = {np.mean(correlations):.2f}", transform=panel.transAxes, ha="right", fontsize=7)
-        panel.set_title(learners[learner], fontsize=7)
+        panel.text(
+            0.97, 0.92, f"ρ = {np.mean(correlations):.2f}", transform=panel.transAxes, ha="right", fontsize=SMALL_PT
+        )
+        panel.set_title(learners[learner], fontsize=SMALL_PT)
         panel.set_xscale("log")
         panel.xaxis.set_major_locator(LogLocator(base=2))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -192,7 +198,7 @@ def _panels(count: int, panel_height_in: float):
     import matplotlib.pyplot as plt
 
     lines = -(-count // COLUMNS)
-    size = (TEXT_WIDTH_IN, 0.65 + panel_height_in * lines)
+    size = (TEXT_WIDTH_IN, 0.75 + panel_height_in * lines)
     figure, axes = plt.subplots(lines, COLUMNS, figsize=size, sharex=True, sharey=True, squeeze=False)
     for spare in axes.flat[count:]:
         spare.set_visible(False)
@@ -210,6 +216,6 @@ def _finish(figure, title: str, handles: list, labels: list[str], across: str, u
             panel.set_xlabel(across)
             panel.tick_params(labelbottom=True)
     figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
-    figure.suptitle(title, fontsize=8, y=1 - 0.05 / height_in, va="top")
-    figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.06 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
+    write_title(figure, title)
+    figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
     save_figure(figure, pdf_path, png_path)

@@ -15,6 +15,7 @@ from gpca.reporting.style import (
     BLACK,
     BLUE,
     GREEN,
+    GREY,
     ORANGE,
     PURPLE,
     SKY_BLUE,
@@ -40,7 +41,7 @@ STYLES = {  # of the strategies that are known; the paper's two are thick, with 
     "coreset": (PURPLE, "-", 0.9),
     "typiclust": (PURPLE, "--", 0.9),
 }
-_OTHER = ("#777777", "-", 0.9)
+_OTHER = (GREY, "-", 0.9)
 
 
 def draw_learning_curves(
@@ -77,7 +78,7 @@ def draw_learning_curves(
     for row, setting in enumerate(rows):
         for column, source in enumerate(columns):
             panel = axes[row, column]
-            panel.axhline(100 * target, color="#999999", linewidth=0.6, linestyle=(0, (4, 3)))
+            panel.axhline(100 * target, color=GREY, linewidth=0.6, linestyle=(0, (4, 3)))
             for strategy in reversed(shown):
                 if (source, strategy, setting) in curves:
                     _draw(panel, strategy, strategies[strategy], curves[source, strategy, setting])

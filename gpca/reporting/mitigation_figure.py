@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.reporting.frame_views import COLOURS
-from gpca.reporting.style import TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.diagram import Canvas
+from gpca.reporting.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, save_figure, write_title
 
-GREY = "#666666"
 WORDS = {
     "reinitialise": "Reinitialise ICP\nbroader search over orientations",
     "new_view": "Change the viewpoint\nmore of the surface in sight",
@@ -42,38 +41,31 @@ def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str
     """Draw the mapping of one policy: what it reads, the four branches in the order of asking, and the way back."""
     policy = read_policy(policy_json)
     limits, treatments = policy["thresholds"], policy["treatments"]
-    use_style()
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(TEXT_WIDTH_IN, 2.3))
-    axes.set(xlim=(0, 100), ylim=(0, 40))
-    axes.set_axis_off()
-    figure.subplots_adjust(0.005, 0.01, 0.995, 0.99)
-    _box(axes, 0.5, 14, 17, 12, "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD", GREY)
-    axes.text(0.5, 39, "Thresholds of this run, on virtual\ntables (procedural stand-in)", va="top", fontsize=7)
+    canvas = Canvas(TEXT_WIDTH_IN, 2.45)
+    write_title(canvas.figure, "Thresholds of this run, on virtual tables (procedural stand-in)")
+    words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"
+    canvas.box(0.04, 0.86, 1.3, 0.66, words)
     branches = [(_queue_condition(limits), "Abstain\nqueue for labelling, retrain", GREY)]
     branches += [
-        (rf"{ASKED.get(concept, concept)}", WORDS.get(action, action.replace("_", " ")), COLOURS[concept])
+        (ASKED.get(concept, concept), WORDS.get(action, action.replace("_", " ")), CONCEPT_COLOURS[concept])
         for concept, action in sorted(treatments.items(), key=lambda item: ("pose", "overlap", "noise").index(item[0]))
     ]
-    for place, (condition, branch, colour) in enumerate(branches):
-        y = 32.5 - 9.2 * place
-        _box(axes, 29, y, 25, 7, condition, colour, dashed=True)
-        _box(axes, 61, y, 26, 7, branch, colour)
-        _arrow(axes, (17.5, 20), (29, y + 3.5), GREY)
-        _arrow(axes, (54, y + 3.5), (61, y + 3.5), colour)
-        if place:
-            axes.plot([87, 91], [y + 3.5] * 2, color=GREY, linewidth=0.8)
-    axes.plot([91, 91, 9, 9], [26.8, 1.2, 1.2, 10], color=GREY, linewidth=0.8, clip_on=False)
-    _arrow(axes, (9, 9), (9, 14), GREY)
-    axes.plot([91, 91], [8.4, 26.8], color=GREY, linewidth=0.8)
+    middles_in = [1.99 - 0.53 * place for place in range(len(branches))]
+    for middle_in, (condition, branch, colour) in zip(middles_in, branches, strict=True):
+        canvas.box(1.95, middle_in - 0.2, 1.6, 0.4, condition, colour, dashed=True)
+        canvas.box(3.95, middle_in - 0.2, 1.85, 0.4, branch, colour)
+        canvas.arrow((1.34, 1.19), (1.62, 1.19), (1.62, middle_in), (1.95, middle_in))
+        canvas.arrow((3.55, middle_in), (3.95, middle_in), colour=colour)
+        if colour != GREY:
+            canvas.arrow((5.8, middle_in), (6.05, middle_in))
     back = (
-        "register and score anew\n"
-        rf"fall of $\hat{{s}}_c$ below {limits['improvement']:.2f}:" + "\nnext concept; after "
-        f"{limits['attempts']:.0f} such\nattempts: queue"
+        "Register and\nscore anew\n\n"
+        r"$\hat{s}_c$ falls by less" + f"\nthan {limits['improvement']:.2f}: next\nconcept; after\n"
+        f"{limits['attempts']:.0f} such attempts:\nqueue"
     )
-    axes.text(92, 17.6, back, va="center", ha="left", rotation=90, fontsize=6, linespacing=1.1)
-    save_figure(figure, pdf_path, png_path)
+    canvas.box(6.05, middles_in[-1] - 0.2, 1.06, middles_in[1] - middles_in[-1] + 0.4, back)
+    canvas.arrow((6.58, middles_in[-1] - 0.2), (6.58, 0.06), (0.69, 0.06), (0.69, 0.86))
+    save_figure(canvas.figure, pdf_path, png_path)
 
 
 def short_action(action: str) -> str:
@@ -82,26 +74,6 @@ def short_action(action: str) -> str:
 
 
 def _queue_condition(limits: Mapping[str, float]) -> str:
-    return f"BALD > {limits['uncertain']:.3f} nats\nor " + rf"$\max_c\,\hat{{s}}_c$ < {limits['dominant']:.2f}"
-
-
-def _box(axes, x: float, y: float, width: float, height: float, text: str, colour: str, dashed: bool = False) -> None:
-    from matplotlib.patches import FancyBboxPatch
-
-    axes.add_patch(
-        FancyBboxPatch(
-            (x, y),
-            width,
-            height,
-            boxstyle="round,pad=0,rounding_size=1",
-            facecolor="white" if dashed else colour + "22",
-            edgecolor=colour,
-            linewidth=0.9,
-            linestyle="--" if dashed else "-",
-        )
+    return (
+        f"BALD > {limits['uncertain']:.3f} nats\nor " + rf"$\mathrm{{max}}_c\,\hat{{s}}_c$ < {limits['dominant']:.2f}"
     )
-    axes.text(x + width / 2, y + height / 2, text, ha="center", va="center", fontsize=7, linespacing=1.15)
-
-
-def _arrow(axes, start: tuple[float, float], end: tuple[float, float], colour: str) -> None:
-    axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 0.8, "mutation_scale": 7})

@@ -21,6 +21,7 @@ from gpca.reporting.style import (
     SOURCE_COLOUR,
     TARGET_COLOUR,
     save_figure,
+    write_title,
 )
 
 CONCEPT = "pose"  # of the sample shown: before and after ICP differ to the eye
@@ -86,7 +87,7 @@ def draw_overview(
     canvas.box(0.02, 1.08, 1.9, 0.37, "Ask a person for the concept\nof a few such cases", GREY, dashed=True)
     canvas.arrow((1.92, 1.265), (2.22, 1.265), words="retrain")
 
-    canvas.text(0.02, 2.93, f"{title}: {sample['object'].replace('_', ' ')}", ha="left", va="top", fontsize=8)
+    write_title(canvas.figure, f"{title}: {sample['object'].replace('_', ' ')}")
     for x_in, colour, words in ((0.06, TARGET_COLOUR, "target"), (0.5, SOURCE_COLOUR, "source")):
         canvas.axes.plot(x_in, 2.745, "o", color=colour, markersize=3)
         canvas.text(x_in + 0.06, 2.74, words, ha="left", va="center")

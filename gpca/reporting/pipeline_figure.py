@@ -28,6 +28,7 @@ from gpca.reporting.style import (
     TEXT_WIDTH_IN,
     blues,
     save_figure,
+    write_title,
 )
 from gpca.seeds import generator
 
@@ -93,9 +94,7 @@ def draw_pipeline(
     canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
     canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
-    canvas.text(
-        0.03, 3.48, f"{title}: {stages.predictions['object'][row].replace('_', ' ')}", ha="left", va="top", fontsize=8
-    )
+    write_title(canvas.figure, f"{title}: {stages.predictions['object'][row].replace('_', ' ')}")
     for x_in, colour, words in (
         (6.2, TARGET_COLOUR, r"target $\mathcal{Q}$"),
         (6.68, SOURCE_COLOUR, r"source $\mathcal{P}$"),
@@ -200,7 +199,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: 
     panel.scatter(*points_N_2[asked.chosen].T, s=26, facecolors=BLUE, edgecolors=BLACK, linewidths=0.7)
     panel.margins(0.12)
     panel.set_axis_off()
-    canvas.text(3.66, captions_in, f"$B$ = {len(asked.chosen)} kept,\nfar apart", va="bottom")
+    canvas.text(3.66, captions_in, f"$B$ = {len(asked.chosen)} kept,\none of each cluster", va="bottom")
     canvas.arrow((3.08, middle_in), (2.88, middle_in))
 
     canvas.text(2.4, heads_in, "Annotate", va="top")
@@ -221,6 +220,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: 
             )
     low, high = panel.get_ylim()
     panel.set_ylim(bottom=low - 0.5 * (high - low))  # room for the legend
+    panel.locator_params(axis="x", nbins=4, integer=True)
     panel.set_ylabel("accuracy (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_xlabel("labels", fontsize=SMALL_PT, labelpad=0)
     panel.tick_params(pad=1.5, length=2)

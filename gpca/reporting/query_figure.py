@@ -6,18 +6,20 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.reporting.style import BLUE, TEXT_WIDTH_IN, save_png, use_style
+from gpca.reporting.style import SOURCE_COLOUR, TARGET_COLOUR, TEXT_WIDTH_IN, save_png, use_style, write_title
 
-RED = "#C8102E"  # of the target, as in Figure 3
 _POINTS = 1500  # of each cloud; more hide one another
 
 
 def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:
-    """Draw source (blue) over target (red) along each axis, at one scale, into a PNG."""
+    """Draw source over target along each axis, at one scale, into a PNG."""
     use_style()
     import matplotlib.pyplot as plt
 
-    clouds = [(_thinned(target_Q_3), RED, "reference"), (_thinned(cloud_P_3), BLUE, "aligned source")]
+    clouds = [
+        (_thinned(target_Q_3), TARGET_COLOUR, "reference"),
+        (_thinned(cloud_P_3), SOURCE_COLOUR, "aligned source"),
+    ]
     everything = np.concatenate([cloud for cloud, *_ in clouds])
     centre = (everything.min(axis=0) + everything.max(axis=0)) / 2
     reach = 0.52 * float(np.ptp(everything, axis=0).max())
@@ -32,7 +34,7 @@ def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_pa
         )
         panel.set_axis_off()
         panel.set_title(name)
-    figure.suptitle(title, fontsize=8)
+    write_title(figure, title)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncol=2, markerscale=5)
     save_png(figure, png_path)

@@ -11,7 +11,7 @@ from gpca.errors import InputError
 from gpca.metrics import read_metrics
 from gpca.reporting.backbone_table import encoder_title
 from gpca.reporting.confusions_figure import pooled_confusions
-from gpca.reporting.style import BLUE, TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.style import SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
 
 
 def draw_real_world_confusions(
@@ -28,25 +28,22 @@ def draw_real_world_confusions(
         raise InputError(metrics_csv, "holds no confusion of these backbones", "make it anew")
     use_style()
     import matplotlib.pyplot as plt
-    from matplotlib.colors import LinearSegmentedColormap
 
     panel_in = min(1.5, (TEXT_WIDTH_IN - 0.6) / len(shown) - 0.12)
     width_in, height_in = max(3.2, 0.6 + len(shown) * (panel_in + 0.12)), panel_in + 0.72
     figure = plt.figure(figsize=(width_in, height_in))
-    blues = LinearSegmentedColormap.from_list("blues", ["white", BLUE])
     for number, (method, counts) in enumerate(shown.items()):
         left_in = 0.6 + number * (panel_in + 0.12)
         axes = figure.add_axes((left_in / width_in, 0.32 / height_in, panel_in / width_in, panel_in / height_in))
         concepts = list(counts.columns[:-1])
         counts_C_C = counts.reindex(concepts).to_numpy(float)[:, :-1]
         shares_C_C = counts_C_C / counts.reindex(concepts).to_numpy(float).sum(axis=1, keepdims=True)
-        axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues, vmin=0, vmax=1)
+        axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues(), vmin=0, vmax=1)
         for (row, column), share in np.ndenumerate(shares_C_C):
             if np.isfinite(share):
-                colour = "white" if share > 0.65 else "black"
-                axes.text(column, row - 0.1, f"{100 * share:.1f} %", ha="center", va="center", fontsize=7, color=colour)
-                count = f"n = {counts_C_C[row, column]:.0f}"
-                axes.text(column, row + 0.22, count, ha="center", va="center", fontsize=5.5, color=colour)
+                words = f"{100 * share:.1f} %\nn = {counts_C_C[row, column]:.0f}"
+                look = {"fontsize": SMALL_PT, "color": "white" if share > 0.65 else "black"}
+                axes.text(column, row, words, ha="center", va="center", linespacing=1.2, **look)
         backbone, _, reduction = method.partition("-")
         axes.set_title(encoder_title(backbone, reduction), pad=3)
         axes.set_xticks(range(len(concepts)), concepts)
@@ -56,5 +53,5 @@ def draw_real_world_confusions(
         if number == 0:
             axes.set_ylabel("true", labelpad=1)
     figure.text(0.5, 0.02, "attributed to", ha="center", va="bottom")
-    figure.text(0.5, 0.985, title, ha="center", va="top")
+    write_title(figure, title)
     save_figure(figure, pdf_path, png_path)

@@ -15,14 +15,25 @@ from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
 from gpca.objects.canonical import ObjectClouds
 from gpca.reporting.concepts_figure import source_before_icp
 from gpca.reporting.frame_views import draw_scores, read_samples
-from gpca.reporting.style import BLUE, TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.style import (
+    GREEN,
+    SKY_BLUE,
+    SOURCE_COLOUR,
+    TARGET_COLOUR,
+    TEXT_WIDTH_IN,
+    VERMILION,
+    YELLOW,
+    save_figure,
+    use_style,
+    write_title,
+)
 from gpca.rigid import inverse, transform
 
 if TYPE_CHECKING:
     import pandas as pd
 
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
-AXIS_COLOURS = ("#D62728", "#2CA02C", "#1F77B4")  # x, y, z, as robotics draws them
+AXIS_COLOURS = (VERMILION, GREEN, SKY_BLUE)  # x, y, z, as robotics draws them: red, green, blue
 
 
 def draw_real_world_example(
@@ -60,7 +71,7 @@ def draw_real_world_example(
     panels.append(figure.add_axes((0.815, 0.33, 0.165, 0.5)))
     u, v = instances.pixels_of(i).T
     panels[0].imshow(image)
-    box = plt.Rectangle((u.min(), v.min()), np.ptp(u), np.ptp(v), fill=False, edgecolor="#FFD400", linewidth=1.2)
+    box = plt.Rectangle((u.min(), v.min()), np.ptp(u), np.ptp(v), fill=False, edgecolor=YELLOW, linewidth=1.2)
     panels[0].add_patch(box)
     model_m = objects.points(int(instances.object_index[i]))[:3000]
     observed_m = registrations.diameter_m[row] * registrations.cloud(row)
@@ -68,16 +79,18 @@ def draw_real_world_example(
     for panel, source_m, pose in ((panels[1], initial_m, "init"), (panels[2], observed_m, "icp")):
         panel.imshow(image, alpha=0.55)
         T_camera_target = camera.T_camera_target(pose)
-        for points_m, colour, size in ((model_m, "#C8102E", 0.5), (source_m, BLUE, 0.8)):
+        for points_m, colour, size in ((model_m, TARGET_COLOUR, 0.5), (source_m, SOURCE_COLOUR, 0.8)):
             pixels = camera.project(transform(T_camera_target, points_m))
             panel.scatter(*pixels.T, s=size, color=colour, linewidths=0)
         _zoom(panel, u, v, image.shape)
     ends_m = np.vstack([np.zeros(3), 0.5 * registrations.diameter_m[row] * np.eye(3)])
     origin, *tips = camera.project(transform(camera.T_camera_target("icp"), ends_m))
-    for tip, colour in zip(tips, AXIS_COLOURS, strict=True):
+    for tip, colour, name in zip(tips, AXIS_COLOURS, "xyz", strict=True):
         panels[2].annotate(
             "", tip, origin, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.4, "mutation_scale": 7}
         )
+        outwards = tip + 0.15 * (tip - origin)
+        panels[2].text(*outwards, name, color=colour, ha="center", va="center", fontweight="bold", clip_on=True)
     draw_scores(panels[3], sample)
     panels[3].set_xlabel("score ± deviation", labelpad=1)
     captions = (
@@ -91,10 +104,10 @@ def draw_real_world_example(
         if panel is not panels[3]:
             panel.set_axis_off()
     lost = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
-    figure.text(0.005, 0.99, f"{title}: {registrations.object_name[row]}, {lost}", ha="left", va="top")
+    write_title(figure, f"{title}: {str(registrations.object_name[row]).replace('_', ' ')}, {lost}")
     handles = [
         plt.Line2D([], [], linestyle="", marker="o", markersize=3, color=colour, label=label)
-        for colour, label in (("#C8102E", "model"), (BLUE, "measured"))
+        for colour, label in ((TARGET_COLOUR, "model"), (SOURCE_COLOUR, "measured"))
     ]
     figure.legend(handles=handles, loc="upper right", ncols=2, borderaxespad=0.1, handletextpad=0.1, columnspacing=1)
     save_figure(figure, pdf_path, png_path)

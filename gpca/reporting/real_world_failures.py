@@ -12,7 +12,7 @@ from gpca.errors import InputError
 from gpca.metrics import source_method_seed
 from gpca.objects.canonical import ObjectClouds
 from gpca.reporting.frame_views import draw_over_model, draw_scores, read_samples
-from gpca.reporting.style import TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.style import SMALL_PT, TEXT_WIDTH_IN, save_figure, use_style, write_title
 
 SHOWN, COLUMNS = 10, 5
 
@@ -40,7 +40,7 @@ def draw_real_world_failures(
 
     rows = max(1, -(-min(SHOWN, len(mistakes)) // COLUMNS))
     cell_in, head_in = TEXT_WIDTH_IN / COLUMNS, 0.22
-    cell_height_in = 1.95
+    cell_height_in = 2.1
     height_in = head_in + rows * cell_height_in
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
     shown = list(mistakes.head(SHOWN).iterrows())
@@ -56,15 +56,15 @@ def draw_real_world_failures(
 
         index = int(registrations.object_index[row])
         model = objects.points(index)[:2048] / objects.diameters_m[index]
-        draw_over_model(panel(0.06, 0.30, cell_in - 0.12, 0.95), model, registrations.cloud(row))
-        draw_scores(panel(0.42, 1.33, cell_in - 0.58, 0.34), mistake, label_pt=6)
-        error = f"pose {100 * mistake['icp_error']:.0f} % $d$ off"
+        draw_over_model(panel(0.06, 0.42, cell_in - 0.12, 0.95), model, registrations.cloud(row))
+        draw_scores(panel(0.42, 1.45, cell_in - 0.58, 0.38), mistake)
+        name = str(registrations.object_name[row]).replace("_", " ")
         taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
-        words = f"{registrations.object_name[row]}, {error}\n{taken}"
+        words = f"{name}\n{taken}\npose {100 * mistake['icp_error']:.0f} % $d$ off"
         x, y = (left_in + cell_in / 2) / TEXT_WIDTH_IN, 1 - (top_in + 0.02) / height_in
-        figure.text(x, y, words, ha="center", va="top", fontsize=6.5, linespacing=1.15)
+        figure.text(x, y, words, ha="center", va="top", fontsize=SMALL_PT, linespacing=1.15)
     none = "" if shown else ": no mistake in any seed"
-    figure.text(0.005, 1 - 0.01 / height_in, f"{title}{none}", ha="left", va="top")
+    write_title(figure, f"{title}{none}")
     save_figure(figure, pdf_path, png_path)
 
 

@@ -9,11 +9,18 @@ import numpy as np
 from gpca.files import load_arrays
 from gpca.perturbation import CONCEPTS
 from gpca.pose_error import CORRECT
-from gpca.reporting.frame_views import COLOURS
-from gpca.reporting.style import TEXT_WIDTH_IN, save_figure, use_style
+from gpca.reporting.style import (
+    CONCEPT_COLOURS,
+    SMALL_PT,
+    TARGET_COLOUR,
+    TEXT_WIDTH_IN,
+    YELLOW,
+    save_figure,
+    use_style,
+    write_title,
+)
 from gpca.rigid import transform
 
-MODEL_RED = "#C8102E"
 SHAPES = {
     "camera_3_3": (3, 3),
     "model_m": ("Q", 3),
@@ -47,17 +54,17 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
         if posed:
             seen = transform(found[f"T_camera_object_{view}"], found["model_m"]) @ found["camera_3_3"].T
             ahead = seen[:, 2] > 0.05  # metres before the camera
-            panel.scatter(*(seen[ahead, :2] / seen[ahead, 2:]).T, s=0.6, color=MODEL_RED, linewidths=0)
+            panel.scatter(*(seen[ahead, :2] / seen[ahead, 2:]).T, s=0.6, color=TARGET_COLOUR, linewidths=0)
         else:
-            panel.contour(found[f"mask_{view}"], [0.5], colors="#FFD400", linewidths=0.9)
+            panel.contour(found[f"mask_{view}"], [0.5], colors=YELLOW, linewidths=0.9)
         height, width = found[f"mask_{view}"].shape
         panel.set(xlim=(0, width - 1), ylim=(height - 1, 0))
         panel.set_axis_off()
     shown = found["scores"]
     for place, concept in enumerate(CONCEPTS):
-        scores.barh(place, shown[place], color=COLOURS[concept], height=0.7)
+        scores.barh(place, shown[place], color=CONCEPT_COLOURS[concept], height=0.7)
         weight = "bold" if concept == str(found["cause"]) else "normal"
-        scores.text(-0.03, place, concept, ha="right", va="center", fontsize=7, fontweight=weight)
+        scores.text(-0.03, place, concept, ha="right", va="center", fontsize=SMALL_PT, fontweight=weight)
     scores.set(xlim=(min(0, shown.min()), max(1, shown.max())), ylim=(len(CONCEPTS) - 0.4, -0.6), yticks=[])
     scores.set_xlabel("score", labelpad=1)
     scores.spines["left"].set_visible(False)
@@ -71,10 +78,10 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
     )
     for centre, caption in zip((0.1255, 0.395, 0.6195, 0.8735), captions, strict=True):
         figure.text(centre, 0.02, caption, ha="center", va="bottom")
-    title = (
-        f"Tables of the virtual depth camera (procedural stand-in): {found['object']}; model in red where ICP put it"
+    name = str(found["object"]).replace("_", " ")
+    write_title(
+        figure, f"Tables of the virtual depth camera (procedural stand-in): {name}; dots: model where ICP put it"
     )
-    figure.text(0.003, 0.99, title, ha="left", va="top")
     save_figure(figure, pdf_path, png_path)
 
 

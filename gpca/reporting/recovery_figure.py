@@ -9,13 +9,22 @@ from typing import TYPE_CHECKING
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
 from gpca.recovery_metrics import pooled, wilson_interval
-from gpca.reporting.frame_views import COLOURS
-from gpca.reporting.style import BLUE, SKY_BLUE, TEXT_WIDTH_IN, VERMILION, save_figure, use_style
+from gpca.reporting.style import (
+    BLACK,
+    BLUE,
+    CONCEPT_COLOURS,
+    CONCEPT_MARKERS,
+    SKY_BLUE,
+    TEXT_WIDTH_IN,
+    save_figure,
+    use_style,
+    write_title,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SHADES = (SKY_BLUE, BLUE, VERMILION)
+SHADES = (SKY_BLUE, BLUE, BLACK)  # darker with every action
 
 
 def draw_recovery_rates(
@@ -39,18 +48,19 @@ def draw_recovery_rates(
     height_in = 0.75 + 0.24 * len(shown)
     figure, axes = plt.subplots(1, 2, figsize=(TEXT_WIDTH_IN, height_in), sharey=True, width_ratios=(1.5, 1))
     for k in range(1, budget + 1):
-        label = f"within {k} action{'s' * (k > 1)}"
         offset = 0.22 * (k - (budget + 1) / 2)
-        _draw(axes[0], metrics, shown, f"recovered_within_{k}", "all", offset, SHADES[(k - 1) % len(SHADES)], label)
+        label = f"within {k} action{'s' * (k > 1)}"
+        look = {"color": SHADES[(k - 1) % len(SHADES)], "marker": "o", "label": label}
+        _draw(axes[0], metrics, shown, f"recovered_within_{k}", "all", offset, look)
     for n, cause in enumerate(CONCEPTS):
-        metric = f"recovered_within_{budget}"
-        _draw(axes[1], metrics, shown, metric, cause, 0.22 * (n - 1), COLOURS[cause], cause)
+        look = {"color": CONCEPT_COLOURS[cause], "marker": CONCEPT_MARKERS[cause], "label": cause}
+        _draw(axes[1], metrics, shown, f"recovered_within_{budget}", cause, 0.22 * (n - 1), look)
     axes[0].set_yticks(range(len(shown)), [policies[name] for name in shown])
     axes[0].set_ylim(len(shown) - 0.4, -0.6)
     for panel in axes:
         panel.set_xlim(-2, 102)
         panel.set_xlabel("recovered (%)")
-        panel.grid(axis="x", color="#DDDDDD", linewidth=0.5)
+        panel.grid(axis="x")
         panel.set_axisbelow(True)
         panel.tick_params(axis="y", length=0)
         panel.legend(
@@ -58,18 +68,17 @@ def draw_recovery_rates(
         )
     title = "Failures on tables of the virtual depth camera (procedural stand-in)"
     episodes = pooled(metrics, shown[0], "recovered_within_1")[1]
-    figure.text(0.005, 0.99, f"{title}: {episodes} failures; right: within {budget} actions, by cause", va="top")
+    write_title(figure, f"{title}: {episodes} failures; right: within {budget} actions, by cause")
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.16 / height_in), pad=0.4)
     save_figure(figure, pdf_path, png_path)
 
 
-def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, colour: str, label: str) -> None:
-    for row, name in enumerate(shown):
-        found = pooled(metrics, name, metric, concept)
-        if found is None:
-            continue
-        share, trials = found
+def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: Mapping[str, str]) -> None:
+    """Draw the rates of one kind, a little above or below the middle of each policy's row, with their intervals."""
+    rates = {row: pooled(metrics, name, metric, concept) for row, name in enumerate(shown)}
+    rates = {row: rate for row, rate in rates.items() if rate is not None}
+    for row, (share, trials) in rates.items():
         low, high = wilson_interval(share * trials, trials)
-        axes.plot([100 * low, 100 * high], [row + offset] * 2, color=colour, linewidth=0.8)
-        axes.plot(100 * share, row + offset, "o", color=colour, label=label, markersize=3.5)
-        label = "_"  # one entry of the legend is enough
+        axes.plot([100 * low, 100 * high], [row + offset] * 2, color=look["color"], linewidth=0.8)
+    shares = [100 * share for share, _ in rates.values()]
+    axes.plot(shares, [row + offset for row in rates], linestyle="", markersize=3.5, **look)

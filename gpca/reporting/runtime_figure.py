@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.published import HARDWARE, Number, printed_seconds
-from gpca.reporting.style import BLUE, GREEN, ORANGE, TEXT_WIDTH_IN, VERMILION, save_figure, use_style
+from gpca.reporting.style import BLUE, GREEN, ORANGE, TEXT_WIDTH_IN, YELLOW, save_figure, use_style, write_title
 from gpca.runtime_file import COMPONENTS, OF_ONE_EXPLANATION
 
 if TYPE_CHECKING:
     import pandas as pd
 
-COLOURS = dict(zip(OF_ONE_EXPLANATION, (BLUE, ORANGE, GREEN, VERMILION), strict=True))
+COLOURS = dict(zip(OF_ONE_EXPLANATION, (BLUE, ORANGE, GREEN, YELLOW), strict=True))
 
 
 def draw_runtime(
@@ -35,7 +35,7 @@ def draw_runtime(
     import matplotlib.pyplot as plt
 
     figure, panels = plt.subplots(
-        len(bars), 1, figsize=(TEXT_WIDTH_IN, 0.6 + 0.75 * len(bars)), layout="constrained", squeeze=False
+        len(bars), 1, figsize=(TEXT_WIDTH_IN, 0.8 + 0.75 * len(bars)), layout="constrained", squeeze=False
     )
     for panel, (name, milliseconds) in zip(panels[:, 0], bars.items(), strict=True):
         left = 0.0
@@ -47,7 +47,9 @@ def draw_runtime(
         panel.spines["left"].set_visible(False)
     panels[-1, 0].set_xlabel("milliseconds; each bar has its own scale")
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.suptitle(f"One explanation on {title}")
+    write_title(figure, f"One explanation on {title}")
+    below_title = 1 - 0.2 / figure.get_size_inches()[1]
+    figure.get_layout_engine().set(rect=(0, 0, 1, below_title))
     figure.legend(handles, labels, loc="outside lower center", ncol=len(labels))
     save_figure(figure, pdf_path, png_path)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from gpca.files import whole_file
 
+MATPLOTLIBRC = str(Path(__file__).with_name("matplotlibrc"))
 COLUMN_WIDTH_IN = 3.5  # IEEE two-column paper, one column
 TEXT_WIDTH_IN = 7.16  # both columns
 
@@ -23,43 +24,21 @@ SMALL_PT = 7  # the least size of letters
 
 
 def use_style() -> None:
-    """Set matplotlib to the suite's style: Agg, 8 pt Times-like type, embedded TrueType fonts, no randomness.
+    """Set matplotlib to the suite's style, the file `MATPLOTLIBRC`, drawn by Agg.
 
-    Starts from matplotlib's own defaults, so that a user's matplotlibrc cannot change a figure. STIXGeneral
-    comes with matplotlib and matches the Times of the paper, so every machine draws the same letters.
+    Starts from matplotlib's own defaults, so that a user's matplotlibrc cannot change a figure.
     """
     import matplotlib
-    from cycler import cycler
 
     matplotlib.use("Agg")
     matplotlib.rcdefaults()
-    matplotlib.rcParams.update(
-        {
-            "font.family": "STIXGeneral",
-            "mathtext.fontset": "stix",
-            "font.size": 8,
-            "axes.titlesize": 8,
-            "axes.labelsize": 8,
-            "xtick.labelsize": 7,
-            "ytick.labelsize": 7,
-            "legend.fontsize": 7,
-            "legend.frameon": False,
-            "axes.prop_cycle": cycler(color=PALETTE),
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-            "axes.linewidth": 0.6,
-            "xtick.major.width": 0.6,
-            "ytick.major.width": 0.6,
-            "lines.linewidth": 1.2,
-            "lines.markersize": 4,
-            "figure.figsize": (COLUMN_WIDTH_IN, 2.4),
-            "figure.dpi": 100,
-            "savefig.dpi": 300,
-            "pdf.fonttype": 42,
-            "ps.fonttype": 42,
-            "svg.hashsalt": "gpca",
-        }
-    )
+    matplotlib.rc_file(MATPLOTLIBRC, use_default_template=False)
+
+
+def write_title(figure, words: str) -> None:
+    """Write a figure's title where all have it: at the top left, in one line or more."""
+    height_in = figure.get_size_inches()[1]
+    figure.text(0.005, 1 - 0.02 / height_in, words, ha="left", va="top", linespacing=1.15)
 
 
 def blues():
