@@ -63,6 +63,7 @@ def draw_real_world_example(
     camera = _Camera(instances, i, registrations, row)
     use_style()
     import matplotlib.pyplot as plt
+    from matplotlib.patheffects import withStroke
 
     image = read_image(str(instances.colour[i]), "fetch the frames anew")
     height_in = 1.72
@@ -89,8 +90,9 @@ def draw_real_world_example(
         panels[2].annotate(
             "", tip, origin, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.4, "mutation_scale": 7}
         )
-        outwards = tip + 0.15 * (tip - origin)
-        panels[2].text(*outwards, name, color=colour, ha="center", va="center", fontweight="bold", clip_on=True)
+        place = np.clip(tip + 0.15 * (tip - origin), *_inside(panels[2]))
+        outlined = {"path_effects": [withStroke(linewidth=1.5, foreground="white")], "fontweight": "bold"}
+        panels[2].text(*place, name, color=colour, ha="center", va="center", **outlined)
     draw_scores(panels[3], sample)
     panels[3].set_xlabel("score ± deviation", labelpad=1)
     captions = (
@@ -153,3 +155,10 @@ def _zoom(panel, u: np.ndarray, v: np.ndarray, shape: tuple[int, ...]) -> None:
     centre_u = np.clip((u.min() + u.max()) / 2, half_u, width - half_u)
     centre_v = np.clip((v.min() + v.max()) / 2, half_v, height - half_v)
     panel.set(xlim=(centre_u - half_u, centre_u + half_u), ylim=(centre_v + half_v, centre_v - half_v))
+
+
+def _inside(panel) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest pixel at which a letter stands whole within the panel."""
+    ends = np.sort([panel.get_xlim(), panel.get_ylim()], axis=1)
+    margin = 0.06 * np.ptp(ends, axis=1)
+    return ends[:, 0] + margin, ends[:, 1] - margin

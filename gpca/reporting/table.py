@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -181,10 +182,15 @@ _TEX = {
     "±": r"$\pm$",
     "×": r"$\times$",
     "–": "--",
+    "ρ": r"$\rho$",
+    "σ": r"$\sigma$",
+    "°": r"$^\circ$",
+    "é": r"\'e",
     "<": r"\textless{}",
     ">": r"\textgreater{}",
 } | {sign: "\\" + sign for sign in "&%$#_{}"}
 
 
 def _tex(text: str) -> str:
-    return "".join(_TEX.get(sign, sign) for sign in text)
+    """Escape what LaTeX reads otherwise; a hyphen before a number is a minus."""
+    return re.sub(r"(?<![\w-])-(?=\d)", "$-$", "".join(_TEX.get(sign, sign) for sign in text))

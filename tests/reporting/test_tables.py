@@ -114,6 +114,16 @@ def test_ties_at_the_printed_precision_are_all_bold():
     assert replace(table, compared=([(0, "c")], [(1, "a")], [(0, "a"), (1, "a")])).best() == set()
 
 
+def test_latex_needs_no_letters_that_it_lacks_and_has_minus_signs():
+    from gpca.reporting.table import _tex
+
+    words = _tex("ρ ± σ: -12.5 ± 3 (95 %), Matérn 3/2, k-means_2, point-to-plane, 5°, -- none")
+    assert words.isascii()
+    assert words == (
+        r"$\rho$ $\pm$ $\sigma$: $-$12.5 $\pm$ 3 (95 \%), Mat\'ern 3/2, k-means\_2, point-to-plane, 5$^\circ$, -- none"
+    )
+
+
 def test_latex_is_balanced_and_escaped(metrics):
     sources = {"linemod": {"title": r"A_1 & 50 % ~ \x {b}", "stand_in": False}}
     latex = table1_single_baselines(metrics, sources, EXPLAINERS).latex()
