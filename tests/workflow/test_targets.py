@@ -93,7 +93,7 @@ EDITS = {
     "gpca/icp_kernels.py": {"uncertainty": 18} | ON_UNCERTAINTY | COLLECTORS | {"table": 2} | RUNTIME | RECOVERY,
     "baselines/softmax_head.py": {"explain": 3} | COLLECTORS | {"table": 1} | RECOVERY,
     "gpca/reporting/contact_sheet.py": {"objects_figure": 3},
-    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1} | METHOD | PICTURES | RECOVERY_FIGURES,
+    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1, "fig5_real_world_example": 1} | METHOD,
     # Not the pictures: they show an encoder without reduction.
     "gpca/reduction.py": {
         "reduced_embeddings": 1, "explain_with_backbone": 1, "real_world_metrics": 1, "table6_backbones": 1,
