@@ -9,7 +9,7 @@ RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
 
 @pytest.mark.parametrize(
     ("config", "run", "seeds", "backbones", "reductions"),
-    [("config", "embedded", 3, 4, 4), ("smoke", "smoke", 2, 2, 2), ("real", "real", 5, 4, 4)],
+    [("config", "embedded", 3, 4, 4), ("smoke", "smoke", 2, 1, 2), ("real", "real", 5, 4, 4)],
 )
 def test_every_config_loads_offline_and_asks_for_all_results(project, config, run, seeds, backbones, reductions):
     planned = project.dry_run("all", "--configfile", f"config/{config}.yaml")

@@ -298,11 +298,11 @@ RECOVERY_FIGURES = {  # and what each is drawn from
 # One registration of the source that figures show, and what the stages of GP-CA make of it.
 GPCA_SHOWN = next((name for name in reversed(GPCA) if name in config["explainers"]), "")
 SHOWN_STAGES = {
-    name: f"results/{{run}}/{name}/{config['figures']['source']}{folder}/seed{SEEDS[0]}.{suffix}"
+    name: f"results/{{run}}/{name}/{config['figures']['source']}/{folder}seed{SEEDS[0]}.{suffix}"
     for name, folder, suffix in (
         ("registrations", "", "npz"),
-        ("embeddings", f"/{EMBEDDING}", "npz"),
-        ("predictions", f"/{GPCA_SHOWN}", "csv"),
+        ("embeddings", f"{EMBEDDING}/", "npz"),
+        ("predictions", f"{GPCA_SHOWN}/", "csv"),
     )
 }
 SHOWN_STRATEGIES = [name for name in PIPELINE_STRATEGIES if name in STRATEGIES]
