@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -152,12 +153,30 @@ def planned(tmp_path_factory):
     return project.dry_run("all", "--configfile", "config/smoke.yaml")
 
 
+def pytest_collection_modifyitems(items):
+    """Last are the tests that wait for the run which was killed: it goes on beside the others."""
+    items.sort(key=_waits)
+
+
+def _waits(item):
+    return "killed_and_continued" in getattr(item, "fixturenames", ())
+
+
 @pytest.fixture(scope="session")
-def smoke(tmp_path_factory):
-    """A copy in which the smoke run is complete; shared, so it is only read."""
+def smoke_and_again(request, tmp_path_factory):
+    """The smoke run, and a part of it once more that goes on beside the tests, where one of them asks for it."""
     project = _sources_copied(ROOT, tmp_path_factory.mktemp("smoke"))
     project.snakemake("-j2", "smoke")
-    return project
+    with ThreadPoolExecutor(1) as beside:
+        asked = any(_waits(item) for item in request.session.items)
+        folder = tmp_path_factory.mktemp("killed")
+        yield project, beside.submit(_killed_and_continued, project, folder) if asked else None
+
+
+@pytest.fixture(scope="session")
+def smoke(smoke_and_again):
+    """A copy in which the smoke run is complete; shared, so it is only read."""
+    return smoke_and_again[0]
 
 
 @pytest.fixture
@@ -167,9 +186,13 @@ def finished(smoke, tmp_path):
 
 
 @pytest.fixture(scope="session")
-def killed_and_continued(smoke, tmp_path_factory):
+def killed_and_continued(smoke_and_again):
     """One source of the smoke run once more, one job at a time, killed in the first training and then continued."""
-    project = _sources_copied(smoke.folder, tmp_path_factory.mktemp("killed"))
+    return smoke_and_again[1].result()
+
+
+def _killed_and_continued(smoke, folder):
+    project = _sources_copied(smoke.folder, folder)
     targets = [f"results/smoke/{name}" for name in smoke.results(".npz", ".pt", ".csv", ".png") if "ycb" in name]
     run = ("-j1", *targets, "--configfile", "config/smoke.yaml")
     process = project.start(*run)
