@@ -1,10 +1,12 @@
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays, whole_file
+from gpca.files import load_arrays, save_arrays, whole_file, whole_folder
 
 SHAPES = {"points": ("P", 3), "labels": ("P",)}
 GOOD = {"points": np.arange(12.0).reshape(4, 3), "labels": np.array(["a", "b", "a", "b"])}
@@ -107,3 +109,21 @@ def test_faulty_files_are_refused_in_one_line(tmp_path, write, expected):
     assert line.startswith(f"{path}: ")
     assert line.endswith("with 'python -m gpca objects'")
     assert "\n" not in line
+
+
+@pytest.mark.parametrize("whole", [whole_file, whole_folder])
+def test_the_half_that_a_killed_process_left_is_removed_and_that_of_a_running_one_is_not(whole, tmp_path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    path = tmp_path / ("seed0.checkpoint" if whole is whole_file else "scenes")
+    left, running, other = (
+        path.with_name(f".{stem}.{process}.partial{path.suffix}" if path.suffix else f".{stem}.{process}.partial")
+        for stem, process in ((path.stem, ended.pid), (path.stem, os.getppid()), ("seed01", ended.pid))
+    )
+    for half in (left, running, other):
+        half.touch() if whole is whole_file else half.mkdir()
+    with whole(path) as partial:
+        (partial if whole is whole_file else partial / "one").write_text("whole")
+    assert not left.exists()
+    assert running.exists()
+    assert other.exists()
