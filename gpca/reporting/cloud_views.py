@@ -44,3 +44,8 @@ def view_from(azimuth_rad: float) -> np.ndarray:
 def views_around(count: int = 24) -> list[np.ndarray]:
     """Return the views from so many directions around the object."""
     return [view_from(azimuth) for azimuth in np.linspace(0, 2 * np.pi, count, endpoint=False)]
+
+
+def widest_views(cloud_P_3: np.ndarray, count: int = 8) -> list[np.ndarray]:
+    """Return those of the views around a cloud that show it widest: a mug with its handle at the side."""
+    return sorted(views_around(), key=lambda view: -np.std(cloud_P_3 @ view[0]))[:count]

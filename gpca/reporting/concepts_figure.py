@@ -9,7 +9,7 @@ import numpy as np
 from gpca.dataset import Registrations
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
-from gpca.reporting.cloud_views import draw_clouds, views_around
+from gpca.reporting.cloud_views import draw_clouds, widest_views
 from gpca.reporting.style import SOURCE_COLOUR, TARGET_COLOUR, TEXT_WIDTH_IN, save_figure, use_style, write_title
 from gpca.rigid import inverse, scale_translation, transform
 
@@ -111,8 +111,7 @@ def choose_view(target: np.ndarray, sources: dict[str, np.ndarray]) -> np.ndarra
     of these the one that shows best how pose error and cut shift the centroid: the visible shares' product is largest.
     """
     shifts = [sources[concept].mean(axis=0) - target.mean(axis=0) for concept in ("pose", "overlap")]
-    widest = sorted(views_around(), key=lambda view: -np.std(target @ view[0]))[:8]
-    return max(widest, key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))
+    return max(widest_views(target), key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))
 
 
 def severity_text(registrations: Registrations, sample: int, concept: str) -> str:

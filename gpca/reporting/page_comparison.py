@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
+from gpca.comparison import CLOSE, NOT_REPRODUCED, REPRODUCED
 from gpca.errors import InputError
 from gpca.predictions import read_csv
 
-TONES = {"reproduced": "good", "close": "near", "not reproduced": "bad"}  # other verdicts judge nothing
+TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # other verdicts judge nothing
 _COLUMNS = (
     *("table", "row", "column", "unit", "published", "decimals", "reproduced", "ci_low", "ci_high", "n"),
     *("difference", "verdict", "reason"),

@@ -12,7 +12,7 @@ from gpca.dataset import Registrations, load_embeddings
 from gpca.errors import InputError
 from gpca.perturbation import CONCEPTS
 from gpca.predictions import concepts_of, numbers, read_predictions
-from gpca.reporting.cloud_views import views_around
+from gpca.reporting.cloud_views import widest_views
 from gpca.reporting.concepts_figure import severity_text
 from gpca.reporting.frame_views import draw_scores
 from gpca.reporting.style import GREY, SMALL_PT, blues
@@ -20,8 +20,6 @@ from gpca.rigid import inverse, transform
 
 if TYPE_CHECKING:
     import pandas as pd
-
-_SIDES = 8  # of the views around an object, those that show it widest
 
 
 @dataclass(frozen=True)
@@ -82,9 +80,8 @@ class Stages:
         """
         pairs = {which: self.clouds(row, which) for which in ("init", "icp")}
         target, source = pairs["icp"]
-        views = sorted(views_around(), key=lambda view: -np.std(target @ view[0]))[:_SIDES]
         moved = pairs["init"][1] - source
-        view = max(views, key=lambda view: float(np.linalg.norm(moved @ view[:2].T)))
+        view = max(widest_views(target), key=lambda view: float(np.linalg.norm(moved @ view[:2].T)))
         return {which: (target @ view.T, source @ view.T) for which, (target, source) in pairs.items()}
 
     def words(self, row: int, which: str) -> str:

@@ -187,12 +187,11 @@ SHOWN_BACKBONES = [
     for name in BACKBONES
     if name.endswith(f"-{config['real_world']['reductions'][0]}")
 ]
-REAL_WORLD_TITLE = title_of(
-    {
-        "title": config["real_world"]["title"],
-        "stand_in": not config["real_world"]["datasets"],
-    }
-)
+REAL_WORLD_SHOWN = {
+    "title": config["real_world"]["title"],
+    "stand_in": not config["real_world"]["datasets"],
+}
+REAL_WORLD_TITLE = title_of(REAL_WORLD_SHOWN)
 CLASSIC = [name for name in CLASSIC_TITLES if name in config["explainers"]]
 
 

@@ -52,7 +52,7 @@ rule comparison:
         mem_mb=1000,
         runtime=10,
     params:
-        objects={**SHOWN_SOURCES, REAL_WORLD: MODEL_FRAMES, "model": MODEL_SHOWN},
+        objects={**SHOWN_SOURCES, REAL_WORLD: REAL_WORLD_SHOWN, "model": MODEL_SHOWN},
         tolerances=config["comparison"]["tolerances"],
     script:
         "../scripts/comparison.py"

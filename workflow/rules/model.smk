@@ -1,9 +1,5 @@
 MODEL_SOURCE, MODEL_ENCODER = config["model"]["source"], config["model"]["encoder"]
-MODEL_FRAMES = {
-    "title": config["real_world"]["title"],
-    "stand_in": not config["real_world"]["datasets"],
-}
-MODEL_SHOWN = {**SHOWN_SOURCES, REAL_WORLD: MODEL_FRAMES}[MODEL_SOURCE]
+MODEL_SHOWN = {**SHOWN_SOURCES, REAL_WORLD: REAL_WORLD_SHOWN}[MODEL_SOURCE]
 MODEL_INPUTS = {
     "registrations": f"results/{{run}}/registrations/{MODEL_SOURCE}/seed{SEEDS[0]}.npz",
     "embeddings": f"results/{{run}}/embeddings/{MODEL_SOURCE}/{MODEL_ENCODER}/none/seed{SEEDS[0]}.npz",

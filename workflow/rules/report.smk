@@ -45,13 +45,7 @@ rule page:
             source: [file.format(run=wildcards.run) for file in files]
             for source, files in SAMPLES.items()
         },
-        sources=SHOWN_SOURCES
-        | {
-            REAL_WORLD: {
-                "title": config["real_world"]["title"],
-                "stand_in": not config["real_world"]["datasets"],
-            }
-        },
+        sources={**SHOWN_SOURCES, REAL_WORLD: REAL_WORLD_SHOWN},
         # Not where data lie: that changes no number, and is nobody's business.
         config={
             key: value
