@@ -29,7 +29,7 @@ _OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
 
 
 def check(config: dict) -> dict[str, dict]:
-    """Check a configuration against the schema and against what exists.
+    """Check a configuration against the schema and against what exists; a source that is false is taken out of it.
 
     Returns:
         the resolved entry of every source, by name, with ``stand_in`` set.
@@ -38,6 +38,8 @@ def check(config: dict) -> dict[str, dict]:
         InputError: unknown key, wrong type, value out of range; unknown source, family, kind, explainer or backbone;
             data that is neither in its folder nor downloadable. The line names the key.
     """
+    if isinstance(config.get("sources"), dict):  # whatever else it is, the schema says so
+        config["sources"] = {name: entry for name, entry in config["sources"].items() if entry is not False}
     require_valid(config, load_schema(), "config key")
     with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     for name, encoder in config["encoders"].items():

@@ -44,10 +44,18 @@ def changed(key, value):
 @pytest.mark.parametrize("name", ["config", "smoke", "real"])
 def test_the_shipped_configs_are_sound(name):
     sources = run_config.check(load(name))
-    assert list(sources) == ["coffee_cup", "linemod", "ycb"]
+    assert list(sources) == (["coffee_cup", "ycb"] if name == "smoke" else ["coffee_cup", "linemod", "ycb"])
     for entry in sources.values():
         assert entry["stand_in"] == (name != "real")
         assert entry["origin"] == ("download" if name == "real" else "procedural")
+
+
+def test_a_source_that_is_false_is_left_out_as_if_it_were_not_there():
+    config, never_there = changed("sources.linemod", False), changed("sources.linemod", MISSING)
+    for given in (config, never_there):
+        given["kernels"]["sources"] = ["ycb"]
+        assert list(run_config.check(given)) == ["coffee_cup", "ycb"]
+    assert config == never_there
 
 
 def test_local_data_comes_before_the_download(tmp_path):

@@ -110,11 +110,11 @@ def test_an_explainer_dropped_into_baselines_becomes_a_row(finished):
     assert not finished.dry_run("all", *SMOKE).jobs
     finished.append("config/smoke.yaml", "  fitness_only: {sharpness: 50.0}\n")
     planned = finished.dry_run("all", *SMOKE)
-    assert without_ends(planned.jobs) == COLLECTORS | {"explain": 3, "table": 1}
+    assert without_ends(planned.jobs) == COLLECTORS | {"explain": 2, "table": 1}
 
     finished.snakemake("-j2", "results/smoke/tables/table1_extended.md", *SMOKE)
     table = (finished.folder / "results/smoke/tables/table1_extended.md").read_text()
-    assert table.count("| Fitness only |") == 3
+    assert table.count("| Fitness only |") == 2
     with (finished.folder / "results/smoke/predictions/ycb/fitness_only/seed0.csv").open() as file:
         predictions = list(csv.DictReader(file))
     assert {row["concept_predicted"] for row in predictions} <= {"noise", "pose", "overlap"}

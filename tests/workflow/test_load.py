@@ -8,22 +8,24 @@ RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
 
 
 @pytest.mark.parametrize(
-    ("config", "run", "seeds", "backbones", "reductions"),
-    [("config", "embedded", 3, 4, 4), ("smoke", "smoke", 2, 1, 2), ("real", "real", 5, 4, 4)],
+    ("config", "run", "sources", "seeds", "backbones", "reductions"),
+    [("config", "embedded", 3, 3, 4, 4), ("smoke", "smoke", 2, 2, 1, 2), ("real", "real", 3, 5, 4, 4)],
 )
-def test_every_config_loads_offline_and_asks_for_all_results(project, config, run, seeds, backbones, reductions):
+def test_every_config_loads_offline_and_asks_for_all_results(
+    project, config, run, sources, seeds, backbones, reductions
+):
     planned = project.dry_run("all", "--configfile", f"config/{config}.yaml")
     assert "profiles/default" in planned.messages
-    assert planned.jobs["objects"] == 3
-    assert planned.jobs["registrations"] == 3 * seeds
-    assert planned.jobs["encoder"] == (3 + backbones) * seeds
-    assert planned.jobs["explain"] == 3 * 19 + 2
+    assert planned.jobs["objects"] == sources
+    assert planned.jobs["registrations"] == sources * seeds
+    assert planned.jobs["encoder"] == (sources + backbones) * seeds
+    assert planned.jobs["explain"] == sources * 19 + 2
     assert planned.jobs["explain_with_backbone"] == backbones * reductions
     assert planned.jobs["scenes"] == (config != "real")
-    assert planned.jobs["uncertainty"] == 3 * 6
-    assert planned.jobs["shift"] == planned.jobs["learn"] == 3
+    assert planned.jobs["uncertainty"] == sources * 6
+    assert planned.jobs["shift"] == planned.jobs["learn"] == sources
     assert planned.jobs["kernels"] == (1 if config == "smoke" else 2)
-    assert planned.jobs["embeddings_without"] == planned.jobs["active_learning"] == 3 * seeds
+    assert planned.jobs["embeddings_without"] == planned.jobs["active_learning"] == sources * seeds
     for name in (
         "metrics.csv",
         "timings.csv",
