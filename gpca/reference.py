@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections import defaultdict
@@ -14,6 +13,7 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.metrics import COLUMNS as TIDY
 from gpca.metrics import mean_interval
+from gpca.predictions import read_csv
 
 # What differs from run to run, and what is made of it: never compared.
 NOT_COMPARED = ("timings.csv", "runtime.csv", "tables/table7_runtime.csv", "comparison.csv")
@@ -91,12 +91,8 @@ def read_means(path: Path) -> dict[tuple[str, ...], Mean]:
     Raises:
         InputError: empty, unreadable, neither tidy nor a table, something that is not a number.
     """
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file, strict=True))
-    except (UnicodeDecodeError, csv.Error) as fault:
-        raise InputError(path, f"is no readable CSV file: {fault}", "make it anew") from fault
-    heads = list(rows[0]) if rows else []
+    table = read_csv(path, ())
+    heads, rows = list(table), table.to_dict("records")
     if tuple(heads) == TIDY:
         means = _of_tidy(path, rows)
     elif "mean" in heads[1:]:
@@ -151,9 +147,9 @@ def _of_table(path: Path, rows: list[dict], heads: list[str]) -> Iterator[tuple[
         yield tuple(row[name] for name in labels), Mean(mean, half_width, row[labels[-1]])
 
 
-def _finite(path: Path, text: str | None) -> float:
+def _finite(path: Path, text: str) -> float:
     try:
-        value = float(text or "")
+        value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -164,10 +164,11 @@ def test_a_reference_of_another_config_is_refused(folders, capsys):
 @pytest.mark.parametrize(
     ("broken", "content", "message"),
     [
-        ("metrics.csv", "attribution\n", "is neither tidy metrics nor a table; make it anew"),
-        ("metrics.csv", "", "is neither tidy metrics nor a table; make it anew"),
+        ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; make it anew"),
+        ("metrics.csv", "attribution\n", "holds no rows; make it anew"),
+        ("metrics.csv", "", "is empty; make it anew"),
         ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n", "holds 'nan' in place of a number"),
-        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "holds 'None' in place of a number"),
+        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "holds '' in place of a number"),
         (
             "tables/table1.csv",
             ",".join(HEADS) + "\nycb,gpca,many,1,2,5,100,False\n",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -50,16 +51,24 @@ def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
         "reproduced": "> " * at_least + printed["reproduced"],
         "interval": f"[{printed['ci_low']}, {printed['ci_high']}]" if printed["ci_low"] and printed["ci_high"] else "",
         "difference": printed["difference"],
-        "factor": f"× {float(row['factor']):.2g}" if row.get("factor") else "",
+        "factor": f"× {_number(path, row, 'factor'):.2g}" if row.get("factor") else "",
     }
 
 
 def _rounded(path: str | Path, row: Mapping[str, str], name: str) -> str:
     """Return a number with as many digits as the printed one, or one of its own where that would be 0; or nothing."""
-    if (text := row.get(name, "")) in ("", "nan"):
+    if row.get(name, "") in ("", "nan"):
         return ""
-    try:
-        value, decimals = float(text), max(0, int(row["decimals"]))  # below 0 for what is printed in round tens
-    except ValueError as fault:
-        raise InputError(path, f"'{name}' holds something that is not a number: '{text}'", "make it anew") from fault
+    value = _number(path, row, name)
+    decimals = max(0, int(_number(path, row, "decimals")))  # below 0 for what is printed in round tens
     return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"
+
+
+def _number(path: str | Path, row: Mapping[str, str], name: str) -> float:
+    try:
+        value = float(row[name])
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(path, f"'{name}' holds something that is not a number: '{row[name]}'", "make it anew")
+    return value

@@ -50,5 +50,9 @@ def test_there_need_not_be_a_comparison(tmp_path):
 def test_a_file_of_another_form_is_refused(tmp_path):
     with pytest.raises(InputError, match="column 'decimals' is missing"):
         page_comparison(written(tmp_path, HEAD.replace("decimals", "digits") + LINES[0]))
-    with pytest.raises(InputError, match="'published' holds something that is not a number: 'many'"):
-        page_comparison(written(tmp_path, HEAD + LINES[0].replace("99.6", "many")))
+    for name, line in (
+        ("published", LINES[0].replace("99.6", "many")),
+        ("factor", LINES[0].replace(",close,", "many,close,")),
+    ):
+        with pytest.raises(InputError, match=f"'{name}' holds something that is not a number: 'many'"):
+            page_comparison(written(tmp_path, HEAD + line))
