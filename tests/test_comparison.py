@@ -283,6 +283,9 @@ def test_the_page_counts_first_and_gives_each_reason_once():
         "| ICP alignment | Time | s | 1 to 2 | 0.004 (0.0039 to 0.0041) | 100 | × 0.004 | not reproduced [1] |" in page
     )
     assert page.count("1. Other | data.") == 2
+    assert "|  | reproduced | close | not reproduced | not comparable | not run |\n" in page
+    assert "| Table I: Single-concept attribution | 1 |  | 2 |  |  |\n" in page
+    assert "| All | 1 | 0 | 3 | 0 | 0 |\n" in page
     assert "## Table VII: Runtime" in page
     assert "Objects here: MODEL. Hardware here: A processor." in page
     assert "Intel i7-12700K and NVIDIA RTX 3090" in page

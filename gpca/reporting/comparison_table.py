@@ -25,10 +25,9 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Mappi
         comparison: as :func:`gpca.comparison.compare` returns it.
         tolerances: of each unit, as in the config.
     """
-    parts = ["# Published and reproduced", summary(comparison), *_rule(tolerances)]
+    parts = ["# Published and reproduced", summary(comparison), counts_table(comparison), *_rule(tolerances)]
     for table, rows in comparison.groupby("table", sort=False):
-        name = TABLES[table].title if table == TEXT else f"Table {table}: {TABLES[table].title}"
-        parts += [f"## {name}", _table(rows), *_reasons(rows), *_objects(rows)]
+        parts += [f"## {_name(table)}", _table(rows), *_reasons(rows), *_objects(rows)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -38,6 +37,19 @@ def summary(comparison: pd.DataFrame) -> str:
     stand_ins = (comparison["reason"] == STAND_IN).any()
     why = f" (objects of this run are {STAND_IN}s, and only real ones are compared)" if stand_ins else ""
     return f"Of {len(comparison)} printed numbers: {told}{why}."
+
+
+def counts_table(comparison: pd.DataFrame) -> str:
+    """Return the counts of each verdict, a row for each of the paper's tables."""
+    lines: list[list] = [["", *VERDICTS], [":--"] + ["--:"] * len(VERDICTS)]
+    for table, rows in comparison.groupby("table", sort=False):
+        lines.append([_name(table), *(count or "" for count in counts(rows).values())])
+    lines.append(["All", *counts(comparison).values()])
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
+def _name(table: str) -> str:
+    return TABLES[table].title if table == TEXT else f"Table {table}: {TABLES[table].title}"
 
 
 def _rule(tolerances: Mapping[str, Mapping]) -> list[str]:
