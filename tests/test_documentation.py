@@ -194,6 +194,7 @@ def test_every_listed_table_and_figure_is_made(page):
     by_name = {*LEARNING_TABLES, *KERNEL_TABLES, *LEARNER_TABLES, *LEARNER_FIGURES}
     assert {kind for kind, _ in listed} == {"tables", "figures"}
     for kind, name in listed:
+        name = re.sub(r"^objects_\w+", "objects_", name)  # one for each source
         assert f'"{name}"' in rules or f"/{kind}/{name}" in rules or name in by_name, name
 
 
