@@ -88,7 +88,7 @@ def draw_confusions_figure(
         text(left_in + panel_in + GAP_IN / 2, 0.03, title, ha="center", va="top", linespacing=1.1)
         text(left_in + panel_in / 2, 0.42, "of each true (%)", ha="center", va="center", fontsize=SMALL_PT)
         text(left_in + 1.5 * panel_in + GAP_IN, 0.42, "of all (%)", ha="center", va="center", fontsize=SMALL_PT)
-    text(LABEL_IN - 0.04, 0.03, _key(next(iter(confusions.values()))), ha="right", va="top", fontsize=SMALL_PT)
+    text(0.04, 0.03, _key(next(iter(confusions.values()))), ha="left", va="top", fontsize=SMALL_PT)
     save_figure(figure, pdf_path, png_path)
 
 
