@@ -198,6 +198,22 @@ def test_every_listed_table_and_figure_is_made(page):
         assert f'"{name}"' in rules or f"/{kind}/{name}" in rules or name in by_name, name
 
 
+PAPERS_TABLES = (  # and the eighth, which is ours
+    *("table1_single_baselines", "table2_per_concept", "table3_active_learning", "table4_kernels"),
+    *("table5_learners", "table6_backbones", "table7_runtime", "table8_recovery"),
+)
+
+
+@pytest.mark.parametrize(("run", "name"), [("embedded", "embedded default"), ("real", "real objects")])
+def test_the_readme_has_the_times_of_the_page_of_all_targets(run, name):
+    page = (ROOT / "docs/reproducing.md").read_text()
+    block = page.split(f"<!-- times of results/{run} -->")[1].split(f"<!-- end of results/{run} -->")[0]
+    rows = re.findall(r"^\| `tables/(\w+)\.md` \| \d+ \| [\d.]+ \| ([\d.]+) \|", block, re.MULTILINE)
+    minutes = {table: f"{float(wall):.0f}" for table, wall in rows}
+    [shown] = re.findall(rf"^\| {name} \| ([\d |]+) \|$", (ROOT / "README.md").read_text(), re.MULTILINE)
+    assert shown.split(" | ") == [minutes[table] for table in PAPERS_TABLES]
+
+
 # --- nothing of one machine ---
 
 
