@@ -29,7 +29,7 @@ _OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
 
 
 def check(config: dict) -> dict[str, dict]:
-    """Check a configuration against the schema and against what exists; a source that is false is taken out of it.
+    """Check a configuration against the schema and against what exists; a source that is false is left out.
 
     Returns:
         the resolved entry of every source, by name, with ``stand_in`` set.
@@ -39,7 +39,8 @@ def check(config: dict) -> dict[str, dict]:
             data that is neither in its folder nor downloadable. The line names the key.
     """
     if isinstance(config.get("sources"), dict):  # whatever else it is, the schema says so
-        config["sources"] = {name: entry for name, entry in config["sources"].items() if entry is not False}
+        # A copy: a Snakemake that is given this config, as for the report, has to leave the source out once more.
+        config = config | {"sources": {name: entry for name, entry in config["sources"].items() if entry is not False}}
     require_valid(config, load_schema(), "config key")
     with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     for name, encoder in config["encoders"].items():

@@ -54,8 +54,8 @@ def test_a_source_that_is_false_is_left_out_as_if_it_were_not_there():
     config, never_there = changed("sources.linemod", False), changed("sources.linemod", MISSING)
     for given in (config, never_there):
         given["kernels"]["sources"] = ["ycb"]
-        assert list(run_config.check(given)) == ["coffee_cup", "ycb"]
-    assert config == never_there
+    assert run_config.check(config) == run_config.check(never_there)
+    assert config["sources"]["linemod"] is False  # for a Snakemake that is given this config once more
 
 
 def test_local_data_comes_before_the_download(tmp_path):
