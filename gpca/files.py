@@ -65,10 +65,10 @@ def _left_by_the_killed(folder: Path, before: str, after: str) -> list[Path]:
 def _runs(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
+    except (ProcessLookupError, OverflowError):
         return False
-    except OSError:  # it runs, and belongs to somebody else
-        return True
+    except PermissionError:
+        pass  # it runs, and belongs to somebody else
     return True
 
 

@@ -120,7 +120,7 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
     """Read a CSV file with at least these columns and one row, every entry as the text that stands there.
 
     Raises:
-        InputError: missing, empty or unreadable file, missing column, no rows.
+        InputError: missing, empty or unreadable file, missing column, no rows, rows longer than the head.
     """
     import pandas as pd
 
@@ -135,6 +135,8 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
     missing = [column for column in columns if column not in rows.columns]
     if missing:
         raise InputError(path, f"column '{missing[0]}' is missing", "make it anew")
+    if not isinstance(rows.index, pd.RangeIndex):  # pandas takes what is too much for an index, and shifts the rest
+        raise InputError(path, "has rows with more entries than columns", "make it anew")
     if rows.empty:
         raise InputError(path, "holds no rows", "make it anew")
     return rows

@@ -1,4 +1,4 @@
-"""Verdicts: the rule at its edges, what is taken from a run, and the reference run on real objects."""
+"""Verdicts: the rule at its edges, what is taken from a run, and the page."""
 
 import json
 import math
@@ -24,9 +24,9 @@ from gpca.comparison import (
 )
 from gpca.errors import InputError
 from gpca.metrics import COLUMNS as TIDY
-from gpca.published import Counterpart, Number, read_published
-from gpca.reasons import NONE_YET, Reason, read_reasons
-from gpca.reporting.comparison_table import comparison_markdown, counts_table, summary
+from gpca.published import Counterpart, Number
+from gpca.reasons import NONE_YET, Reason
+from gpca.reporting.comparison_table import comparison_markdown, summary
 from gpca.runtime_file import COLUMNS as RUNTIME_COLUMNS
 
 NAN = math.nan
@@ -289,53 +289,3 @@ def test_the_page_counts_first_and_gives_each_reason_once():
     assert "## Table VII: Runtime" in page
     assert "Objects here: MODEL. Hardware here: A processor." in page
     assert "Intel i7-12700K and NVIDIA RTX 3090" in page
-
-
-# --- the reference on real objects ---
-
-
-def reference():
-    folder = ROOT / "results/reference/real"
-    real = yaml.safe_load((ROOT / "config/real.yaml").read_text())
-    objects = {name: {"title": name, "stand_in": entry["stand_in"]} for name, entry in real["sources"].items()}
-    objects |= {name: {"title": name, "stand_in": False} for name in ("real_rgbd", "model")}
-    numbers = read_published()
-    named = {number.counterpart.file for number in numbers if number.counterpart}
-    results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named)
-    return compare(numbers, results, objects, TOLERANCES, read_reasons(numbers))
-
-
-@pytest.fixture(scope="module")
-def shown():
-    """The comparison that the reference keeps."""
-    texts = dict.fromkeys(("reason", "objects", "hardware"), "")
-    return pd.read_csv(ROOT / "results/reference/real/comparison.csv").fillna(texts)
-
-
-def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
-    rows = reference()
-    assert len(rows) == len(shown) == 112
-    kept = (rows["verdict"] != "not run").to_numpy()  # the file behind Table V is too large to be kept
-    assert set(rows.loc[~kept, "table"]) <= {"V"}
-    for column in ("table", "row", "column", "published", "verdict", "reason"):
-        assert rows.loc[kept, column].tolist() == shown.loc[kept, column].tolist()
-
-
-def test_every_miss_of_the_reference_has_a_reason(shown):
-    assert shown[shown["reason"] == NONE_YET][["table", "row", "column"]].to_numpy().tolist() == []
-    assert (shown.loc[shown["verdict"] != "reproduced", "reason"] != "").all()
-    assert set(shown["verdict"]) == set(VERDICTS[:4])  # nothing that was not run
-    judged = shown["verdict"].isin(VERDICTS[:3])
-    assert not (shown.loc[judged, "reason"] == "procedural stand-in").any()
-
-
-def test_the_readme_counts_the_verdicts_of_the_reference(shown):
-    readme = (ROOT / "README.md").read_text()
-    assert counts_table(shown) in readme
-    words = " ".join(readme.split())
-    told = [f"{count} {verdict}" for verdict, count in counts(shown).items() if count]
-    assert f"**Of {len(shown)} printed numbers, on real objects: {', '.join(told)}**" in words
-    missed = shown[shown["verdict"] == "not reproduced"]
-    times = missed[missed["unit"].isin(["s", "ms"])]
-    assert (times["factor"] < 1).all()
-    assert f"{len(times)} of the {len(missed)} misses are times, all shorter than printed" in words

@@ -168,6 +168,11 @@ def test_a_reference_of_another_config_is_refused(folders, capsys):
         ("metrics.csv", "attribution\n", "holds no rows; make it anew"),
         ("metrics.csv", "", "is empty; make it anew"),
         ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n", "holds 'nan' in place of a number"),
+        (
+            "metrics.csv",
+            ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,0.9,0.8\n",
+            "has rows with more entries than columns",
+        ),
         ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "holds '' in place of a number"),
         (
             "tables/table1.csv",

@@ -60,13 +60,13 @@ def _rounded(path: str | Path, row: Mapping[str, str], name: str) -> str:
     if row.get(name, "") in ("", "nan"):
         return ""
     value = _number(path, row, name)
-    decimals = max(0, int(_number(path, row, "decimals")))  # below 0 for what is printed in round tens
+    decimals = max(0, _number(path, row, "decimals", int))  # below 0 for what is printed in round tens
     return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"
 
 
-def _number(path: str | Path, row: Mapping[str, str], name: str) -> float:
+def _number(path: str | Path, row: Mapping[str, str], name: str, kind: type = float):
     try:
-        value = float(row[name])
+        value = kind(row[name])
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
