@@ -2,7 +2,7 @@
 import sys
 
 sys.path.insert(0, workflow.basedir)
-from gpca import config as run_config
+from gpca.config import check as run_config
 from gpca.errors import InputError
 
 

@@ -1,1 +1,1 @@
-"""Rival explainers, one per file, found by :func:`gpca.explainer.explainers`."""
+"""Rival explainers, one per file, found by :func:`gpca.explainers.interface.explainers`."""

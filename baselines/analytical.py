@@ -13,11 +13,11 @@ from time import perf_counter
 
 import numpy as np
 
-from gpca.analytical_features import analytical_features
-from gpca.attribution import Attribution
-from gpca.concept_attribution import GPCA
-from gpca.dataset import Registrations
-from gpca.explainer import Entry
+from gpca.attribution.scores import Attribution
+from gpca.explainers.analytical_features import analytical_features
+from gpca.explainers.gpca import GPCA
+from gpca.explainers.interface import Entry
+from gpca.pairs.dataset import Registrations
 
 
 class AnalyticalGPC:
@@ -53,7 +53,7 @@ class AnalyticalGPC:
         return replace(attribution, seconds_N=attribution.seconds_N + seconds)
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the features (N, F) of :func:`gpca.analytical_features.analytical_features`."""
+        """Return the features (N, F) of :func:`gpca.explainers.analytical_features.analytical_features`."""
         return analytical_features(
             registrations,
             *self._axes,

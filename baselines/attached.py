@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.dataset import Registrations
 from gpca.errors import InputError
+from gpca.pairs.dataset import Registrations
 
 
 def attached(registrations: Registrations, name: str, *shape: int | None) -> np.ndarray:

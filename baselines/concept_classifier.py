@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
 
 
 class ConceptClassifier:

@@ -14,10 +14,10 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
-from gpca.attribution import Attribution, summarise_marginals
-from gpca.dataset import Registrations
-from gpca.explainer import Entry
-from gpca.perturbation import CONCEPTS
+from gpca.attribution.scores import Attribution, summarise_marginals
+from gpca.explainers.interface import Entry
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 
 JITTER = 1e-6
@@ -50,7 +50,7 @@ class DirichletGP:
         from gpytorch.likelihoods import DirichletClassificationLikelihood
         from sklearn.preprocessing import StandardScaler
 
-        from gpca.kernels import squared_distances
+        from gpca.classifier.covariances import squared_distances
 
         known_concepts(registrations.concept)
         h_N_d = attached(registrations, "embedding", None)
@@ -103,7 +103,7 @@ class DirichletGP:
         """Return mean and standard deviation (N, C) of the latents."""
         import torch
 
-        from gpca.kernels import squared_distances
+        from gpca.classifier.covariances import squared_distances
 
         inputs_N_d = self._scaled(attached(registrations, "embedding", None))
         with torch.no_grad():

@@ -15,10 +15,10 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
-from gpca.attribution import Attribution, summarise_draws
-from gpca.dataset import Registrations
-from gpca.explainer import Entry
-from gpca.perturbation import CONCEPTS
+from gpca.attribution.scores import Attribution, summarise_draws
+from gpca.explainers.interface import Entry
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
 
 BATCH_SIZE = 64

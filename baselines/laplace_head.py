@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.heads import HeadLearner
-from gpca.attribution import summarise_draws
-from gpca.diagnostics import negative_log_likelihood
-from gpca.explainer import Entry
-from gpca.perturbation import CONCEPTS
+from gpca.attribution.diagnostics import negative_log_likelihood
+from gpca.attribution.scores import summarise_draws
+from gpca.explainers.interface import Entry
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 
 

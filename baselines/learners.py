@@ -12,11 +12,11 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import ConceptClassifier, standardised_regression
-from gpca.attribution import Attribution
-from gpca.dataset import Registrations
+from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainer import Entry
-from gpca.perturbation import CONCEPTS
+from gpca.explainers.interface import Entry
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 
 PAPERS_RANDOM_STATE = 42
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import ConceptClassifier, standardised_regression
-from gpca.attribution import Attribution
-from gpca.dataset import Registrations
-from gpca.explainer import Entry
-from gpca.perturbation import CONCEPTS
+from gpca.attribution.scores import Attribution
+from gpca.explainers.interface import Entry
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
 FLOOR = 1e-6  # variance, as that of the uncertainty itself: a thousandth of a radian or of the diameter, squared
@@ -62,7 +62,7 @@ def features(registrations: Registrations, floor: float) -> np.ndarray:
     Raises:
         InputError: no covariance is attached, or it holds NaN.
     """
-    from gpca.uncertainty import log_determinant
+    from gpca.uncertainty.spread import log_determinant
 
     log_determinant_N = log_determinant(attached(registrations, "covariance", None, 6, 6)[:, OBSERVED], floor)
     pairs = [(registrations.cloud(i), registrations.target(i)) for i in range(len(registrations))]
@@ -75,7 +75,7 @@ def log_residual(from_P_3: np.ndarray, to_Q_3: np.ndarray) -> float:
     """Return the log of the RMS distance from each point of one cloud to the nearest of the other."""
     from scipy.spatial import cKDTree
 
-    from gpca.uncertainty import log_residual as to_tree
+    from gpca.uncertainty.spread import log_residual as to_tree
 
     return to_tree(from_P_3, cKDTree(to_Q_3))
 

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from baselines.values import KnobValues, LearnedValues, ScaledValues
-from gpca.explainer import Entry
+from gpca.explainers.interface import Entry
 
 ONE_AT_A_TIME = [0, 1, 2, 4]  # the corners with none or one of the three features present
 STEPS = [0, 8, 9, 10]  # of design ``additive``: untouched, and a small step of each knob
@@ -21,7 +21,7 @@ STEPS = [0, 8, 9, 10]  # of design ``additive``: untouched, and a small step of 
 
 def local_derivatives(uncertainty_N_K: np.ndarray) -> np.ndarray:
     """Return ∂u/∂knob (N, 3), forward differences from the untouched pair, knobs in units of their range."""
-    from gpca.designs import STEP
+    from gpca.uncertainty.designs import STEP
 
     return (uncertainty_N_K[:, STEPS[1:]] - uncertainty_N_K[:, :1]) / STEP
 
@@ -80,10 +80,10 @@ def sa_sobol_additive(source: str, seed: int) -> KnobValues:
 
 
 def _over_settings(sensitivities: Callable, kind: str, uncertainty_N_K: np.ndarray) -> np.ndarray:
-    from gpca.designs import sampled_knobs
+    from gpca.uncertainty.designs import sample_knobs
 
     # The first condition is the untouched pair, against which the uncertainty is measured.
-    return sensitivities(sampled_knobs(kind), uncertainty_N_K[:, 1:])
+    return sensitivities(sample_knobs(kind), uncertainty_N_K[:, 1:])
 
 
 def single_drops(worth_N_8: np.ndarray) -> np.ndarray:

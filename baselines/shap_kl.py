@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.values import KnobValues, LearnedValues, ScaledValues
-from gpca.explainer import Entry
+from gpca.explainers.interface import Entry
 
 ALL_CORNERS = list(range(8))
 

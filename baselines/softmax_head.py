@@ -5,10 +5,10 @@ from __future__ import annotations
 from time import perf_counter
 
 from baselines.attached import attached
-from gpca.attribution import Attribution
-from gpca.dataset import Registrations
-from gpca.explainer import Entry
-from gpca.perturbation import CONCEPTS
+from gpca.attribution.scores import Attribution
+from gpca.explainers.interface import Entry
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 
 
 class SoftmaxHead:

@@ -13,10 +13,10 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import ConceptClassifier, standardised_regression
-from gpca.attribution import Attribution
-from gpca.dataset import Registrations
+from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 
 WORTHS = ("uncertainty", "residual")  # of a condition: KL in nats, or log distance from the target to the source
 

@@ -62,8 +62,8 @@ def make_pool(options: argparse.Namespace):
     """Return a GPC that knows two of three blobs, and as projections the pool and a few more labelled samples."""
     import numpy as np
 
-    from gpca.gpc import GPC, GPCSettings
-    from gpca.perturbation import CONCEPTS
+    from gpca.classifier.gpc import GPC, GPCSettings
+    from gpca.pairs.perturbation import CONCEPTS
 
     random = np.random.default_rng(0)
     centres = 0.25 * random.normal(size=(3, 512))
@@ -83,7 +83,7 @@ def compare_bald(gpc, pool, options: argparse.Namespace) -> tuple[list[float], l
     """Return the seconds of the plain loop and of ours, in pairs, and the largest difference of their BALD."""
     import numpy as np
 
-    from gpca.attribution import summarise_marginals
+    from gpca.attribution.scores import summarise_marginals
 
     mean_N_C, deviation_N_C = gpc.posterior(pool)
     normal_M_C = np.random.default_rng(1).normal(size=(options.draws, mean_N_C.shape[1]))
@@ -117,7 +117,7 @@ def choose(gpc, pool):
     """Return the rows that BALD with k-means picks: all that a round does before it has the labels."""
     import numpy as np
 
-    from gpca.acquisition import Pool, select
+    from gpca.active_learning.acquisition import Pool, select
 
     scores_N_C, _, bald_N = gpc.attribute(pool)
     candidates = Pool(pool.inputs_N_d, scores_N_C, bald_N, pool.inputs_N_d[:0], np.full(len(pool), ""))

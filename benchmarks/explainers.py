@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
     for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ[variable] = "1"
     registrations, icp_seconds_S = make_registrations(options.samples)
-    from gpca.uncertainty import UncertaintySettings
+    from gpca.uncertainty.spread import UncertaintySettings
 
     settings = UncertaintySettings(starts=options.starts, points=options.points)
     speedup, error = compare_icp(registrations, settings)
@@ -61,8 +61,8 @@ def make_registrations(samples: int):
     """Return as many training as test registrations, and the seconds of ICP of each."""
     from gpca.objects.canonical import ObjectClouds, write_objects
     from gpca.objects.source import resolve, surfaces
-    from gpca.synthesis import RegistrationSettings
-    from gpca.synthesis import make_registrations as make
+    from gpca.pairs.synthesis import RegistrationSettings
+    from gpca.pairs.synthesis import make_registrations as make
 
     with tempfile.TemporaryDirectory() as folder:
         entry = resolve({"kind": "procedural", "family": SOURCE, "title": SOURCE}, None)
@@ -75,10 +75,10 @@ def compare_icp(registrations, settings) -> tuple[float, float]:
     """Return how many times as fast the batched runs are, and the largest difference of a pose."""
     import numpy as np
 
-    from gpca.batched_icp import BatchedICP
-    from gpca.designs import Pair
-    from gpca.registration import ICP
-    from gpca.twist import exp
+    from gpca.alignment.batched_icp import BatchedICP
+    from gpca.alignment.icp import ICP
+    from gpca.alignment.twist import exp
+    from gpca.uncertainty.designs import Pair
 
     starts_n = exp(np.random.default_rng(SEED).normal(size=(settings.starts, 6)) * settings.deviation_6())
     ratios, errors = [], []
@@ -99,9 +99,9 @@ def measure(registrations, icp_seconds_S, settings) -> dict[str, tuple[float, fl
     """Return for every explainer ICP calls and seconds per test sample, and the share of ICP."""
     import inspect
 
-    from gpca.designs import DESIGNS
-    from gpca.evaluation import design_rows, evaluate_design
-    from gpca.explainer import explainers
+    from baselines.registry import explainers
+    from gpca.uncertainty.designs import DESIGNS
+    from gpca.uncertainty.evaluation import design_rows, evaluate_design
 
     prepared = {"registrations": with_seconds(registrations, icp_seconds_S)}
     prepared["embeddings"] = embedded(prepared["registrations"])
@@ -142,7 +142,7 @@ def embedded(registrations):
 
     from gpca.encoders.registry import make_encoder
     from gpca.encoders.training import EncoderSettings, embed
-    from gpca.perturbation import CONCEPTS
+    from gpca.pairs.perturbation import CONCEPTS
 
     torch.set_num_threads(1)
     encoder = make_encoder("dgcnn", {})

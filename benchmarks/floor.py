@@ -2,11 +2,11 @@
 
     python benchmarks/floor.py results/real
 
-No ICP runs: the covariances of a run that is there give every uncertainty anew (gpca.uncertainty.divergence), and
-`shap_additive` and `sa_local_additive` are asked again. `clean` is the uncertainty of a clean pair against another one
-of the same object (design `causal`), in nats: what lies above its 95th percentile, in one source and seed, is causal.
-Numbers are means over the seeds. The last line is a JSON object: per source and floor the accuracies, clean_median,
-clean_95th, and the share of causal samples, of all and of each concept.
+No ICP runs: the covariances of a run that is there give every uncertainty anew (gpca.uncertainty.spread.divergence),
+and `shap_additive` and `sa_local_additive` are asked again. `clean` is the uncertainty of a clean pair against another
+one of the same object (design `causal`), in nats: what lies above its 95th percentile, in one source and seed, is
+causal. Numbers are means over the seeds. The last line is a JSON object: per source and floor the accuracies,
+clean_median, clean_95th, and the share of causal samples, of all and of each concept.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-from gpca.dataset import Registrations  # noqa: E402 (the script runs from a plain checkout)
-from gpca.designs import DESIGNS  # noqa: E402
+from baselines.registry import explainer_entry  # noqa: E402
+from gpca.attribution.metrics import CAUSAL_QUANTILE  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
-from gpca.explainer import explainer_entry  # noqa: E402
-from gpca.metrics import CAUSAL_QUANTILE  # noqa: E402
-from gpca.outcomes import Outcomes  # noqa: E402
-from gpca.perturbation import CONCEPTS  # noqa: E402
-from gpca.uncertainty import divergence  # noqa: E402
+from gpca.pairs.dataset import Registrations  # noqa: E402 (the script runs from a plain checkout)
+from gpca.pairs.perturbation import CONCEPTS  # noqa: E402
+from gpca.uncertainty.designs import DESIGNS  # noqa: E402
+from gpca.uncertainty.outcomes import Outcomes  # noqa: E402
+from gpca.uncertainty.spread import divergence  # noqa: E402
 
 FLOORS = tuple(float(f"1e-{digits}") for digits in range(9, 2, -1))
 EXPLAINERS = ("shap_additive", "sa_local_additive")

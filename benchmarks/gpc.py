@@ -4,8 +4,8 @@
                              [--kernel rbf] [--repeats 3]
 
 The embeddings are drawn: three overlapping blobs. The fit is compared with the form that gpytorch's tutorials teach
-(tests/gpytorch_form.py), in turn (A B A B …), from the same inducing inputs, kernels and random numbers; the ratio is
-the median over the pairs. Ours counts standardisation, k-means and the median distance too. An explanation is
+(tests/classifier/gpytorch_form.py), in turn (A B A B …), from the same inducing inputs, kernels and random numbers; the
+ratio is the median over the pairs. Ours counts standardisation, k-means and the median distance too. An explanation is
 everything from the embedding on: kernel, posterior, draws, scores, variances, BALD. The last line is a JSON object:
 fit_s, fit_speedup, one_sample_ms, ms_200_samples, and max_abs_error, the largest difference of a latent's mean.
 """
@@ -32,8 +32,8 @@ def main(arguments: list[str] | None = None) -> None:
     import numpy as np
     import torch
 
-    from gpca.gpc import GPC, GPCSettings
-    from gpca.perturbation import CONCEPTS
+    from gpca.classifier.gpc import GPC, GPCSettings
+    from gpca.pairs.perturbation import CONCEPTS
 
     torch.set_num_threads(1)
     h_N_d, labels_N = blobs(options.samples, options.width)
@@ -80,7 +80,7 @@ def blobs(n: int, width: int):
     """Return n points of three overlapping blobs, the same blobs at every call, and their labels."""
     import numpy as np
 
-    from gpca.perturbation import CONCEPTS
+    from gpca.pairs.perturbation import CONCEPTS
 
     blob = np.arange(n) % 3
     centres = 0.15 * np.random.default_rng(0).normal(size=(3, width))
@@ -90,15 +90,15 @@ def blobs(n: int, width: int):
 def plain_form(gpc, h_N_d, labels_N):
     """Return a call that fits gpytorch's form from where the GPC's fit started; its result is then its `model`."""
     import torch
-
-    from gpca.gpc import _inducing_inputs, _median_distance
-    from gpca.kernels import make_kernel
-    from gpca.seeds import seed_of
     from tests.gpytorch_form import fit
+
+    from gpca.classifier.covariances import make_covariance
+    from gpca.classifier.gpc import _inducing_inputs, _median_distance
+    from gpca.seeds import seed_of
 
     inputs_N_d, targets_N, settings = gpc._scaled(h_N_d), torch.from_numpy(gpc._targets(labels_N)), gpc.settings
     inducing_M_d = _inducing_inputs(inputs_N_d, settings, gpc._axes)
-    kernel = make_kernel(settings.kernel, len(gpc.classes), _median_distance(inputs_N_d, gpc._axes))
+    kernel = make_covariance(settings.kernel, len(gpc.classes), _median_distance(inputs_N_d, gpc._axes))
 
     def call():
         with torch.random.fork_rng():

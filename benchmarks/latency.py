@@ -5,12 +5,12 @@
 Both register the same clouds and hold the same weights and posterior, in one process and in turn (A B A B …), so that
 whatever else the machine does meets both. Ours is the explainer of `python -m gpca explain` with its model loaded. The
 plain composition calls Open3D's ICP, a DGCNN with one linear layer per edge (tests/encoders/per_edge.py) and gpytorch
-(tests/gpytorch_form.py), from which it draws, and works scores, variances and BALD out of the draws as Eqs. 4, 5 and 7
-read. Of a cloud of exactly as many points as the encoder sees, all draws of the protocol are the same cloud: ours
-embeds it once, and `speedup` is over a plain composition that does so too. `speedup_all_draws` is over one that embeds
-every draw, as the protocol reads. The clouds are perturbed ellipsoids, the encoder is not trained. Both sides draw
-their own numbers, so their scores differ by the error of sampling, which is printed beside the difference. The last
-line is a JSON object: median_ms, speedup, speedup_all_draws (medians over the repeats), max_score_difference.
+(tests/classifier/gpytorch_form.py), from which it draws, and works scores, variances and BALD out of the draws as Eqs.
+4, 5 and 7 read. Of a cloud of exactly as many points as the encoder sees, all draws of the protocol are the same cloud:
+ours embeds it once, and `speedup` is over a plain composition that does so too. `speedup_all_draws` is over one that
+embeds every draw, as the protocol reads. The clouds are perturbed ellipsoids, the encoder is not trained. Both sides
+draw their own numbers, so their scores differ by the error of sampling, which is printed beside the difference. The
+last line is a JSON object: median_ms, speedup, speedup_all_draws (medians over the repeats), max_score_difference.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def make_pair(n_points: int, *axes: object):
     """Return source and target (N, 3) on an ellipsoid of diameter one; the source noisy, moved or cropped."""
     import numpy as np
 
-    from gpca.perturbation import CONCEPTS, PERTURBATIONS, Severities
+    from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
     from gpca.seeds import generator
 
     random = generator("benchmark", *axes)
@@ -101,13 +101,13 @@ def make_explainer(options: argparse.Namespace):
     import numpy as np
     import torch
 
+    from gpca.alignment.icp import ICPSettings
+    from gpca.classifier.gpc import GPC, GPCSettings
     from gpca.encoders.training import EncoderSettings, make_model
-    from gpca.gpc import GPC, GPCSettings
-    from gpca.model import Model
-    from gpca.perturbation import CONCEPTS
-    from gpca.recovery import RecoveryPolicy
-    from gpca.registration import ICPSettings
-    from gpca.registration_explainer import Explainer
+    from gpca.model.explainer import Explainer
+    from gpca.model.file import Model
+    from gpca.pairs.perturbation import CONCEPTS
+    from gpca.recovery.policy import RecoveryPolicy
 
     torch.manual_seed(0)
     settings = EncoderSettings(points=options.points)
@@ -129,9 +129,9 @@ class PlainComposition:
         from copy import deepcopy
 
         import torch
+        from tests.gpytorch_form import LatentGPs
 
         from benchmarks.edge_conv import per_edge_form
-        from tests.gpytorch_form import LatentGPs
 
         self._model = model
         self._encoder = per_edge_form(model.encoder).eval()
@@ -149,9 +149,9 @@ class PlainComposition:
         import numpy as np
         import torch
 
-        from gpca.canonical_frame import CanonicalFrame
-        from gpca.registration import ICP
-        from gpca.rigid import transform
+        from gpca.alignment.canonical_frame import CanonicalFrame
+        from gpca.alignment.icp import ICP
+        from gpca.alignment.rigid import transform
 
         frame = CanonicalFrame.of(target)
         source, target = frame.coordinates(source), frame.coordinates(target)

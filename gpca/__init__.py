@@ -1,9 +1,9 @@
 """GP-CA Bench: Gaussian-process concept attribution for point cloud registration, and its rivals."""
 
 _EXPORTS = {
-    "CanonicalFrame": "gpca.canonical_frame",
-    "Explainer": "gpca.registration_explainer",
-    "Explanation": "gpca.explanation",
+    "CanonicalFrame": "gpca.alignment.canonical_frame",
+    "Explainer": "gpca.model.explainer",
+    "Explanation": "gpca.model.explanation",
 }
 __all__ = list(_EXPORTS)
 

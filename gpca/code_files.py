@@ -8,7 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("gpca", "baselines")
-BESIDE = {"gpca.reporting.style": "matplotlibrc"}  # a file that a module reads from its own folder
+BESIDE = {"gpca.reporting.figures.style": "matplotlibrc"}  # a file that a module reads from its own folder
 
 
 def code_files(*modules: str) -> list[str]:

@@ -6,13 +6,17 @@ import hashlib
 import os
 import shutil
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @contextmanager
@@ -145,3 +149,45 @@ def _check_array(path, name, array, shape, sizes, made_by) -> None:
         raise InputError(path, f"array '{name}' is {actual}, not {expected}", f"make it anew with '{made_by}'")
     if np.issubdtype(array.dtype, np.floating) and not np.isfinite(array).all():
         raise InputError(path, f"array '{name}' holds NaN or infinity", f"make it anew with '{made_by}'")
+
+
+def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
+    """Read a CSV file with at least these columns and one row, every entry as the text that stands there.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, no rows, rows longer than the head.
+    """
+    import pandas as pd
+
+    try:
+        rows = pd.read_csv(path, dtype=str, keep_default_na=False)
+    except FileNotFoundError as fault:
+        raise InputError(path, "no such file", "make it with snakemake") from fault
+    except pd.errors.EmptyDataError as fault:
+        raise InputError(path, "is empty", "make it anew") from fault
+    except (pd.errors.ParserError, UnicodeDecodeError, OSError) as fault:
+        raise InputError(path, f"is not a readable CSV file ({fault})", "make it anew") from fault
+    missing = [column for column in columns if column not in rows.columns]
+    if missing:
+        raise InputError(path, f"column '{missing[0]}' is missing", "make it anew")
+    if not isinstance(rows.index, pd.RangeIndex):  # pandas takes what is too much for an index, and shifts the rest
+        raise InputError(path, "has rows with more entries than columns", "make it anew")
+    if rows.empty:
+        raise InputError(path, "holds no rows", "make it anew")
+    return rows
+
+
+def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True) -> pd.Series:
+    """Return a column as float64; NaN where it is not `needed` and no number. InputError where it is needed."""
+    import pandas as pd
+
+    values = pd.to_numeric(rows[column], errors="coerce").astype(float)
+    if (~np.isfinite(values) & needed).any():
+        raise InputError(path, f"column '{column}' holds something that is not a finite number", "make it anew")
+    return values
+
+
+def write_csv(path: str | Path, frame: pd.DataFrame) -> None:
+    """Write a CSV file, whole or not at all, with six decimals."""
+    with whole_file(path) as partial:
+        frame.to_csv(partial, index=False, float_format="%.6f", lineterminator="\n")

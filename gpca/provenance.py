@@ -24,7 +24,7 @@ _ROOT = Path(__file__).resolve().parent.parent
 
 
 @contextmanager
-def recorded(
+def record_provenance(
     outputs: Sequence[Path | str], inputs: Sequence[Path | str], settings: Mapping, seed: int | None = None
 ) -> Iterator[None]:
     """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.

@@ -1,6 +1,6 @@
 """Settings against their schema: that of the whole config, or of the section that a step is given by hand.
 
-Apart from :mod:`gpca.config`, because every step imports this: what it imports counts as code of all of them.
+Apart from :mod:`gpca.config.check`, because every step imports this: what it imports counts as code of all of them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import yaml
 
 from gpca.errors import InputError
 
-SCHEMA = Path(__file__).resolve().parent.parent / "workflow" / "schemas" / "config.schema.yaml"
+SCHEMA = Path(__file__).parent / "config" / "config.schema.yaml"
 
 
 @cache
@@ -63,7 +63,7 @@ def require_valid(instance: dict, schema: dict, subject: str, complete: bool = T
         raise InputError(
             f"{subject} {path}", "unknown", f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
         )
-    raise InputError(f"{subject} {key}", fault.message, "see workflow/schemas/config.schema.yaml")
+    raise InputError(f"{subject} {key}", fault.message, "see gpca/config/config.schema.yaml")
 
 
 def _is_integer(_checker, value: object) -> bool:

@@ -35,7 +35,7 @@ def objects(tmp_path_factory):
 @pytest.fixture(scope="session")
 def registrations(objects):
     """36 training and 18 test registrations of clouds of up to 256 points."""
-    from gpca.synthesis import RegistrationSettings, make_registrations
+    from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
     return make_registrations(objects, "tiny", 0, RegistrationSettings(train=36, test=18, points=256))[0]
 
@@ -45,12 +45,12 @@ def model(registrations):
     """A model of an encoder that was not trained: its embeddings tell concepts apart well enough to be scored."""
     import torch
 
+    from gpca.alignment.icp import ICPSettings
+    from gpca.classifier.gpc import GPC, GPCSettings
     from gpca.encoders.training import EncoderSettings, embed, make_model
-    from gpca.gpc import GPC, GPCSettings
-    from gpca.model import Model
-    from gpca.perturbation import CONCEPTS
-    from gpca.recovery import RecoveryPolicy, Thresholds
-    from gpca.registration import ICPSettings
+    from gpca.model.file import Model
+    from gpca.pairs.perturbation import CONCEPTS
+    from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
     settings = EncoderSettings(points=64, draws=2, options={"k": 8, "point_features": 16})
     torch.manual_seed(0)

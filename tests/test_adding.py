@@ -10,8 +10,8 @@ import pytest
 import yaml
 from snakemake.utils import update_config
 
-from gpca import acquisition
-from gpca.config import check
+from gpca.active_learning import acquisition
+from gpca.config.check import check
 
 from .documents import ROOT, block
 
@@ -63,8 +63,8 @@ def test_a_dataset_by_an_entry(config, tmp_path):
 def test_an_explainer(config, added_modules, registrations, tmp_path):
     import pandas as pd
 
-    from gpca.explainer import explainer_entry
-    from gpca.predictions import write_predictions
+    from baselines.registry import explainer_entry
+    from gpca.attribution.predictions import write_predictions
 
     added_modules("baselines/nearest_quality.py")
     update_config(config, yaml.safe_load(block("config/config.yaml", "nearest_quality")))
@@ -98,14 +98,14 @@ def test_an_encoder(config, added_modules, registrations, monkeypatch):
 
 
 def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
-    from gpca.active_learning import ActiveLearningSettings, initial_gpc, learn, make_task
-    from gpca.gpc import GPCSettings
-    from gpca.learning_curves import POOL_COLUMNS, write_curves
-    from gpca.learning_metrics import collect_curves
-    from gpca.reporting.learning_tables import LEARNING_TABLES
+    from gpca.active_learning.curves import POOL_COLUMNS, write_curves
+    from gpca.active_learning.metrics import collect_curves
+    from gpca.active_learning.rounds import ActiveLearningSettings, initial_gpc, make_task, run_rounds
+    from gpca.classifier.gpc import GPCSettings
+    from gpca.reporting.tables.active_learning import LEARNING_TABLES
 
     monkeypatch.setitem(acquisition.STRATEGIES, "bald_dense", None)  # taken out again at the end
-    exec(block("gpca/acquisition.py"), dict(vars(acquisition)))
+    exec(block("gpca/active_learning/acquisition.py"), dict(vars(acquisition)))
     update_config(config, yaml.safe_load(block("config/config.yaml", "bald_dense")))
     check(config)
 
@@ -118,7 +118,7 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     start = initial_gpc(task, settings, "tiny", 0)
     paths = []
     for name in config["active_learning"]["strategies"]:
-        steps = learn(task.projected(start), start, name, settings, "tiny", 0)
+        steps = run_rounds(task.projected(start), start, name, settings, "tiny", 0)
         assert [step["labels"] for step in steps] == [0, 4, 8]
         paths.append(tmp_path / f"tiny/{name}/seed0.csv")
         paths[-1].parent.mkdir(parents=True)
@@ -132,10 +132,10 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
 
 
 def test_a_recovery_action_passes_the_check(config, monkeypatch):
-    from gpca import actions
+    from gpca.recovery import actions
 
     monkeypatch.setitem(actions.ACTIONS, "closer", None)
-    exec(block("gpca/actions.py"), dict(vars(actions)))
+    exec(block("gpca/recovery/actions.py"), dict(vars(actions)))
     update_config(config, yaml.safe_load(block("config/config.yaml", "closer")))
     check(config)
     assert config["recovery"]["actions"].keys() == actions.ACTIONS.keys()

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks import floor, pipeline
-from gpca.designs import DESIGNS
 from gpca.errors import InputError
-from gpca.outcomes import Outcomes
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.designs import DESIGNS
+from gpca.uncertainty.outcomes import Outcomes
 
 ROOT = Path(__file__).resolve().parents[1]
 

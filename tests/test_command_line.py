@@ -16,8 +16,8 @@ from gpca import __main__ as command_line
 from gpca.__main__ import STEPS, main
 from gpca.code_files import ROOT
 from gpca.files import save_arrays
-from gpca.model import Model
-from gpca.recovery import RecoveryPolicy, Thresholds
+from gpca.model.file import Model
+from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 ENCODER = {"points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {
@@ -107,7 +107,7 @@ STEP_OPTIONS = {
     },
     "explain": {"meshes/brick.stl": [], "meshes/cone.ply": [], "--unit": "mm", "--model": "model.pt", "--json": []},
 }  # fmt: skip
-# tests/frames/test_steps.py, tests/test_recover_step.py, tests/test_reference.py
+# tests/frames/test_steps.py, tests/steps/test_recover.py, tests/comparison/test_reference.py
 ELSEWHERE = {"scenes", "instances", "frame_registrations", "recover", "check-reference"}
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
 

@@ -14,10 +14,10 @@ import pytest
 import yaml
 
 from gpca.__main__ import STEPS
-from gpca.reporting.kernel_tables import KERNEL_TABLES
-from gpca.reporting.learner_figures import LEARNER_FIGURES
-from gpca.reporting.learner_tables import LEARNER_TABLES
-from gpca.reporting.learning_tables import LEARNING_TABLES
+from gpca.reporting.figures.learners import LEARNER_FIGURES
+from gpca.reporting.tables.active_learning import LEARNING_TABLES
+from gpca.reporting.tables.kernel_grid import KERNEL_TABLES
+from gpca.reporting.tables.learners import LEARNER_TABLES
 
 from .documents import PAGES, ROOT, commands, our_files, relative
 
@@ -167,7 +167,7 @@ def test_every_configured_learner_is_described():
 
 
 def test_every_key_of_a_source_is_described():
-    schema = yaml.safe_load((ROOT / "workflow/schemas/config.schema.yaml").read_text())
+    schema = yaml.safe_load((ROOT / "gpca/config/config.schema.yaml").read_text())
     keys = schema["$defs"]["source"]["properties"]
     described = {name for row in re.findall(r"^\| (`.+?) \|", (ROOT / "docs/adding.md").read_text(), re.MULTILINE)
                  for name in re.findall(r"`(\w+)`", row)}  # fmt: skip

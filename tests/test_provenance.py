@@ -8,7 +8,7 @@ import time
 import pytest
 
 from gpca import provenance
-from gpca.provenance import recorded, sha256_of_settings
+from gpca.provenance import record_provenance, sha256_of_settings
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def record(tmp_path, monkeypatch):
     monkeypatch.setenv("GPCA_CONFIG_SHA256", "c0ffee")
     source, outputs = tmp_path / "in.npz", [tmp_path / "out.npz", tmp_path / "out.csv"]
     source.write_bytes(b"data")
-    with recorded(outputs, [source], {"points": 5, "options": {"k": 3}}, seed=4):
+    with record_provenance(outputs, [source], {"points": 5, "options": {"k": 3}}, seed=4):
         assert not list(tmp_path.glob("*.json"))
         time.sleep(0.02)
     sidecars = [output.with_name(output.name + ".provenance.json").read_text() for output in outputs]
@@ -45,7 +45,7 @@ def test_another_setting_gives_another_hash():
 
 
 def test_a_failed_block_leaves_no_sidecar(tmp_path):
-    with pytest.raises(RuntimeError), recorded([tmp_path / "out.npz"], [], {}):
+    with pytest.raises(RuntimeError), record_provenance([tmp_path / "out.npz"], [], {}):
         raise RuntimeError
     assert list(tmp_path.iterdir()) == []
 

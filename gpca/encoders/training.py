@@ -15,11 +15,11 @@ import numpy as np
 import torch
 from torch import nn
 
-from gpca.dataset import Registrations
 from gpca.encoders.registry import make_encoder
 from gpca.errors import InputError
 from gpca.files import whole_file
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 

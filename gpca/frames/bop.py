@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.alignment.rigid import require_rotation
 from gpca.errors import InputError
 from gpca.files import read_image
-from gpca.rigid import require_rotation
 
 FEWEST_POINTS = 64
 REMEDY = "the folder may be half unpacked: unpack the dataset anew"

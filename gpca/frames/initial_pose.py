@@ -12,9 +12,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from gpca.alignment.rigid import inverse, random_direction, require_rotation, transform
 from gpca.errors import InputError
-from gpca.predictions import read_csv
-from gpca.rigid import inverse, random_direction, require_rotation, transform
+from gpca.files import read_csv
 
 RESULTS_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
 FORMS = ("results", "true_pose", "global_registration")
@@ -42,7 +42,7 @@ class InitialPoseSettings:
             raise InputError(f"initial pose '{self.form}'", "unknown", f"choose one of {', '.join(FORMS)}")
 
 
-def displaced(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPoseSettings, random) -> np.ndarray:
+def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPoseSettings, random) -> np.ndarray:
     """Return the true pose with a random error of at most the declared size."""
     T_object_displaced = np.eye(4)
     angle_rad = np.deg2rad(random.uniform(0, settings.rotation_deg))

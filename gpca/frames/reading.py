@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, TooFewPoints, read_frames, visible_points
-from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displaced, nearest_to, read_results
+from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace, nearest_to, read_results
 from gpca.frames.instances import Instances, groups_of_frames
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_centre
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import found_symmetries, listed_symmetries
+from gpca.objects.symmetry import find_symmetries, read_symmetries
 from gpca.progress import progress
-from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of
 
 
@@ -87,7 +87,7 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, Model]:
         T_model_object[:3, 3] = bounding_centre(surface)
         name = f"{dataset.name} {info[number].get('name', surface.name)}"
         centred = Surface(name, surface.vertices_m - T_model_object[:3, 3], surface.faces)
-        models[number] = Model(centred, T_model_object, listed_symmetries(info, number))
+        models[number] = Model(centred, T_model_object, read_symmetries(info, number))
     return models
 
 
@@ -166,7 +166,7 @@ class _Objects:
         i = self._index[number]
         diameter_m = float(self._objects.diameters_m[i])
         if self._settings.form == "true_pose":
-            return displaced(seen["T_camera_object_true"], diameter_m, self._settings, generator(*axes))
+            return displace(seen["T_camera_object_true"], diameter_m, self._settings, generator(*axes))
         if number not in self._registration:
             model = (self._objects.points(i), self._objects.normals(i))
             self._registration[number] = GlobalRegistration(*model, diameter_m, self._settings)
@@ -175,7 +175,7 @@ class _Objects:
     def _is_symmetric(self, number: int) -> bool:
         listed, i = self._models[number].listed_symmetries, self._index[number]
         return bool(
-            found_symmetries(self._objects.points(i)[:4096], self._objects.diameters_m[i]) if listed is None else listed
+            find_symmetries(self._objects.points(i)[:4096], self._objects.diameters_m[i]) if listed is None else listed
         )
 
 

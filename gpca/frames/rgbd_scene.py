@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
 from gpca.files import whole_folder
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at, shade
 from gpca.objects.canonical import canonical_cloud, diameter
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import found_symmetries
+from gpca.objects.symmetry import find_symmetries
 from gpca.progress import progress
-from gpca.rigid import inverse, transform
 from gpca.seeds import generator
 
 DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
@@ -77,7 +77,7 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
 
     Everything random is named by source, scene and view. The folder appears when it is complete.
     """
-    surfaces = [centred(surface) for surface in surfaces]
+    surfaces = [centre(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
         _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **asdict(settings)})
@@ -145,7 +145,7 @@ def table() -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def centred(surface: Surface) -> Surface:
+def centre(surface: Surface) -> Surface:
     """Return the surface with its bounding box's centre at the origin."""
     centre_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
     return Surface(surface.name, surface.vertices_m - centre_m, surface.faces)
@@ -182,7 +182,7 @@ def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
             "diameter": 1e3 * diameter(surface.vertices_m, surface.name),
             **{f"min_{axis}": value for axis, value in zip("xyz", low.tolist(), strict=True)},
             **{f"size_{axis}": value for axis, value in zip("xyz", (high - low).tolist(), strict=True)},
-            **found_symmetries(cloud_m, diameter_m),
+            **find_symmetries(cloud_m, diameter_m),
         }
     _write_json(folder / "models_info.json", info)
 

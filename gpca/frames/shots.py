@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gpca.alignment.rigid import inverse, transform
 from gpca.environment import require_open3d
 from gpca.frames.bop import back_project
 from gpca.frames.camera import Camera
-from gpca.rigid import inverse, transform
 
 NEIGHBOURS, OUTLIER_RATIO = 20, 2.0  # of statistical outlier removal: Open3D's usual ones
 NEAR = 0.05  # of the diameter: a measured point that near lies on the model
@@ -68,7 +68,7 @@ def median_depth(depth_n_H_W: np.ndarray) -> np.ndarray:
     return np.where(known, low, 0.0) / 2 + np.where(known, high, 0.0) / 2
 
 
-def fused(shots: Sequence[Shot], diameter_m: float, filtered: bool) -> np.ndarray:
+def fuse(shots: Sequence[Shot], diameter_m: float, filtered: bool) -> np.ndarray:
     """Return the object's points (P, 3) of all shots in the world, without statistical outliers where `filtered`."""
     points_m = np.concatenate([shot.object_points_m(diameter_m) for shot in shots])
     return without_outliers(points_m) if filtered and len(points_m) > NEIGHBOURS else points_m

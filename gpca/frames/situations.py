@@ -9,16 +9,16 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
-from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, centred, lay_table, rest, stable_poses, table
+from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, centre, lay_table, rest, stable_poses, table
 from gpca.frames.shots import Shot, median_depth
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import found_symmetries
-from gpca.perturbation import Severities, move
-from gpca.rigid import inverse, scale_translation, transform
+from gpca.objects.symmetry import find_symmetries
+from gpca.pairs.perturbation import Severities, move
 from gpca.seeds import generator, seed_of
 
 COARSE = 4  # the factor by which the image is thinned where only shares of pixels count
@@ -62,14 +62,14 @@ class Shelf:
     def __init__(
         self, surfaces: Sequence[Surface], source: str, points: int = 4096, estimator: InitialPoseSettings | None = None
     ) -> None:
-        self.surfaces = [centred(surface) for surface in surfaces]
+        self.surfaces = [centre(surface) for surface in surfaces]
         self.resting = [stable_poses(surface) for surface in self.surfaces]
         self._hulls_m = [surface.vertices_m[ConvexHull(surface.vertices_m).vertices] for surface in self.surfaces]
         clouds = [canonical_cloud(surface, source, points) for surface in self.surfaces]
         names = tuple(surface.name for surface in self.surfaces)
         diameters_m = np.array([diameter_m for *_, diameter_m in clouds])
         self.objects = ObjectClouds(names, diameters_m, tuple((p, n) for p, n, _ in clouds))
-        self.symmetric = [bool(found_symmetries(p[:4096], d)) for p, _, d in clouds]
+        self.symmetric = [bool(find_symmetries(p[:4096], d)) for p, _, d in clouds]
         self._settings = estimator or InitialPoseSettings()
         self._estimators: dict[int, GlobalRegistration] = {}
 

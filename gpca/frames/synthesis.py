@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.dataset import SPLITS, Registrations
+from gpca.alignment.pose_error import pose_error
+from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.environment import require_open3d
 from gpca.frames.instances import Instances
 from gpca.frames.occlusion import occlude
 from gpca.objects.canonical import ObjectClouds
-from gpca.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
-from gpca.pose_error import pose_error
+from gpca.pairs.dataset import SPLITS, Registrations
+from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
+from gpca.pairs.synthesis import RegistrationSettings, align_pair, as_registrations
 from gpca.progress import progress
-from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator
-from gpca.synthesis import RegistrationSettings, aligned, as_registrations
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,7 +93,7 @@ def _register_one(
     perturbed = PERTURBATIONS[concept](points, given.severities, random) if perturbed is None else perturbed
     T_object_init = inverse(instances.T_camera_object_true[i]) @ instances.T_camera_object_init[i]
     T_true = scale_translation(T_object_init, 1 / diameter_m) @ perturbed.T_target_source_true
-    return aligned(replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, given.icp), lost_to
+    return align_pair(replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, given.icp), lost_to
 
 
 def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict) -> dict:

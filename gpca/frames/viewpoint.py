@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+from gpca.alignment.rigid import transform
 from gpca.frames.camera import Camera, MeshScene, look_at
 from gpca.frames.rgbd_scene import table
 from gpca.frames.shots import NEAR, Shot
-from gpca.rigid import transform
 
 VOXEL_M = 0.012  # of what else was measured, each as a box that hides what is behind it
 ON_TABLE_M = 0.008  # what lies lower is the table
@@ -29,7 +29,7 @@ def candidates(centre_m: np.ndarray, distance_m: float, azimuths: int, elevation
     return np.array(poses)
 
 
-def occupied(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def occupy(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Return boxes around measured points above the table as one mesh, or None where there are none."""
     cells = np.unique(np.floor(points_m[points_m[:, 2] > ON_TABLE_M] / VOXEL_M).astype(int), axis=0)
     if not len(cells):
@@ -64,7 +64,7 @@ def expected_surface(
     seen_Q = np.zeros(len(placed_m), bool)
     if len(measured_m):
         seen_Q = cKDTree(measured_m).query(placed_m, distance_upper_bound=reach_m)[0] < reach_m
-    around = occupied(np.concatenate([shot.other_points_m() for shot in shots]))
+    around = occupy(np.concatenate([shot.other_points_m() for shot in shots]))
     meshes = [(transform(T_world_object, vertices_m), faces), table(), *([around] if around else [])]
     scene, shown_n_Q = MeshScene(meshes), []
     for T_world_camera in poses_n:

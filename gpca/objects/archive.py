@@ -40,7 +40,7 @@ class Member:
 
 
 @contextmanager
-def opened(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterator[list[Member]]:
+def open_archive(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterator[list[Member]]:
     """Yield the regular files of an archive, readable within the context.
 
     Raises:
@@ -65,7 +65,7 @@ def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_BY
         The folder.
 
     Raises:
-        InputError: see :func:`opened`.
+        InputError: see :func:`open_archive`.
     """
     folder = Path(folder)
     if folder.is_dir():
@@ -74,7 +74,7 @@ def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_BY
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".unpacking-") as temporary:
         content = Path(temporary, "content")
         content.mkdir()
-        with opened(path, largest_bytes) as members:
+        with open_archive(path, largest_bytes) as members:
             for member in members:
                 _write(member, content / member.name)
         os.replace(content, folder)

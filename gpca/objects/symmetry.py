@@ -11,7 +11,7 @@ DISCRETE_DEG = (90.0, 180.0)
 CONTINUOUS_DEG = (25.0, 50.0, 75.0)  # none is a symmetry of a square or hexagonal shape
 
 
-def listed_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None:
+def read_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None:
     """Return ``symmetries_discrete`` and ``symmetries_continuous`` of an object, or None where the file lists none.
 
     The file lists none for an object that has none, and for no object at all where its makers left them out.
@@ -23,7 +23,7 @@ def listed_symmetries(models_info: dict[int, dict], object_id: int) -> dict | No
     return lists.get(object_id, {}) if any(lists.values()) else None
 
 
-def found_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
+def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
     """Return the rotations about the axes of the bounding box that leave the shape as it is, as BOP writes them.
 
     A rotation changes nothing where the mean distance from a turned point to its nearest one is within `TOLERANCE` of

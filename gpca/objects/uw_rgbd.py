@@ -46,7 +46,7 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
     single = [path for path in paths if path.suffix.lower() == ".pcd"]
     yield from _chosen([(path.stem, path.read_bytes, str(path)) for path in single], scale, views_per_instance)
     for path in (path for path in paths if path not in single):
-        with archive.opened(path) as members:
+        with archive.open_archive(path) as members:
             views = [
                 (PurePosixPath(member.name).stem, member.read, f"{path}, member {member.name}")
                 for member in members

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager, redirect_stderr
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.provenance import recorded
+from gpca.provenance import record_provenance
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def job(snakemake) -> Iterator[None]:
             log = stack.enter_context(Path(snakemake.log[0]).open("w", encoding="utf-8"))
             stack.enter_context(redirect_stderr(log))
         try:
-            with recorded(list(snakemake.output), data, parameters):
+            with record_provenance(list(snakemake.output), data, parameters):
                 yield
         except InputError as fault:
             print(fault, file=sys.stderr)

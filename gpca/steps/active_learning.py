@@ -9,18 +9,18 @@ from pathlib import Path
 
 import torch
 
-from gpca.acquisition import STRATEGIES, STREAMS
-from gpca.active_learning import ActiveLearningSettings, Task, initial_gpc, learn, make_task
-from gpca.dataset import Registrations, load_embeddings
+from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
+from gpca.active_learning.rounds import ActiveLearningSettings, Task, initial_gpc, make_task, run_rounds
+from gpca.active_learning.stream import StreamSettings, run_stream
+from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.latents import Projection
 from gpca.errors import InputError
-from gpca.gpc import GPC, GPCSettings
-from gpca.latents import Projection
-from gpca.learning_curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
-from gpca.provenance import recorded
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.stream import StreamSettings, run_stream
 
 PAPERS = ("random", "bald_kmeans")  # the paper's two strategies, which also meet a rare concept
 
@@ -49,7 +49,7 @@ def run(options: Namespace) -> None:
         raise InputError(f"strategy '{sorted(unknown)[0]}'", "unknown", f"known are {known}")
     inputs = [options.registrations, options.embeddings, options.embeddings_without]
     axes = (options.source, options.seed)
-    with recorded(options.out, inputs, options.settings, seed=options.seed):
+    with record_provenance(options.out, inputs, options.settings, seed=options.seed):
         settings, stream = settings_from(options.settings), StreamSettings(**options.settings.get("stream", {}))
         curves: dict[str, dict] = {strategy: {} for strategy in options.strategies}
         for setting, task, gpc in progress(_tasks(options, settings), f"active learning on {options.source}"):
@@ -60,7 +60,7 @@ def run(options: Namespace) -> None:
                     labels = (
                         options.settings.get("rare_labels", settings.labels) if setting == "rare" else settings.labels
                     )
-                    curve = learn(task, gpc, strategy, replace(settings, labels=labels), *axes, setting)
+                    curve = run_rounds(task, gpc, strategy, replace(settings, labels=labels), *axes, setting)
                 else:
                     continue
                 curves[strategy][setting, task.held_out] = curve

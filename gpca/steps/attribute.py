@@ -6,14 +6,15 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from gpca.dataset import Registrations, load_embeddings
+from baselines.registry import explainer_entry, require_settings
+from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.errors import InputError
-from gpca.explainer import Entry, explainer_entry, require_settings
-from gpca.outcomes import Outcomes, read_seconds
-from gpca.predictions import read_timings, write_predictions, write_timings
-from gpca.provenance import recorded
+from gpca.explainers.interface import Entry
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
+from gpca.uncertainty.outcomes import Outcomes, read_seconds
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -40,7 +41,7 @@ def run(options: Namespace) -> None:
     files = ("registrations", "embeddings", "uncertainty", "uncertainty_timings", "input_timings")
     for seed, *inputs, predictions, timings in per_seed(options, *files, "predictions", "timings"):
         explainer = entry.make(options.source, seed, **options.settings)
-        with recorded([predictions, timings], [path for path in inputs if path], options.settings, seed=seed):
+        with record_provenance([predictions, timings], [path for path in inputs if path], options.settings, seed=seed):
             registrations = _load(options.explainer, entry, *inputs)
             train = registrations.rows("train")
             if len(train):  # a design may cover the test samples alone; what reads it learns nothing

@@ -9,8 +9,8 @@ from pathlib import Path
 import yaml
 
 from gpca.code_files import ROOT
+from gpca.comparison.reference import check_reference
 from gpca.errors import InputError
-from gpca.reference import check_reference
 from gpca.settings import check_settings
 
 

@@ -8,11 +8,11 @@ from time import perf_counter
 
 import torch
 
-from gpca.dataset import Registrations
+from gpca.attribution.predictions import read_timings, write_timings
 from gpca.encoders.training import EncoderSettings, embed, load_model
 from gpca.files import save_arrays
-from gpca.predictions import read_timings, write_timings
-from gpca.provenance import recorded
+from gpca.pairs.dataset import Registrations
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
 
@@ -33,7 +33,7 @@ def run(options: Namespace) -> None:
     check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
     inputs = [options.registrations, options.encoder]
-    with recorded([options.out, options.timings], inputs, options.settings, seed=options.seed):
+    with record_provenance([options.out, options.timings], inputs, options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         seconds_S, icp_seconds_S = read_timings(options.registration_timings, registrations)
         model = load_model(options.encoder, settings)

@@ -10,11 +10,11 @@ from pathlib import Path
 import torch
 
 from gpca.errors import InputError
-from gpca.model import Model, model_path
+from gpca.model.explainer import Explainer
+from gpca.model.file import Model, model_path
+from gpca.model.point_file import read_points, read_pose
 from gpca.objects.mesh_folder import METRES_PER_UNIT
-from gpca.point_file import read_points, read_pose
-from gpca.registration_explainer import Explainer
-from gpca.uncertainty import UncertaintySettings
+from gpca.uncertainty.spread import UncertaintySettings
 
 
 def add_arguments(parser: ArgumentParser) -> None:

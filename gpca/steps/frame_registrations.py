@@ -5,13 +5,14 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.attribution.predictions import write_timings
+from gpca.files import write_csv
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import FrameSettings, make_frame_registrations
 from gpca.objects.canonical import ObjectClouds
-from gpca.predictions import write_csv, write_timings
-from gpca.provenance import recorded
+from gpca.pairs.synthesis import RegistrationSettings
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.synthesis import RegistrationSettings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -33,7 +34,7 @@ def run(options: Namespace) -> None:
     check_settings(own, "real_world")
     settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(given))
     inputs = [options.instances, options.objects]
-    with recorded([options.out, options.poses, options.timings], inputs, options.settings, seed=options.seed):
+    with record_provenance([options.out, options.poses, options.timings], inputs, options.settings, seed=options.seed):
         instances, objects = Instances.load(options.instances), ObjectClouds.load(options.objects)
         made = make_frame_registrations(instances, objects, options.source, options.seed, settings)
         registrations, icp_seconds_S, poses = made

@@ -12,7 +12,7 @@ from gpca.frames.reading import Dataset, points_on_model, read_instances, read_m
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.source import folders
-from gpca.provenance import recorded
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
 
@@ -37,7 +37,7 @@ def run(options: Namespace) -> None:
     if options.scenes:
         inputs = sorted(path for pattern in patterns() for path in options.scenes.glob(pattern))
     initial_pose = InitialPoseSettings(**options.settings.get("initial_pose", {}))
-    with recorded([options.out, options.objects], inputs, {**options.settings, "points": options.points}):
+    with record_provenance([options.out, options.objects], inputs, {**options.settings, "points": options.points}):
         datasets = {
             name: Dataset(name, tuple(folders(entry, options.downloads)), **_given(entry))
             for name, entry in entries.items()

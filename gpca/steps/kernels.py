@@ -8,9 +8,9 @@ from pathlib import Path
 
 import torch
 
-from gpca.dataset import Registrations, load_embeddings
-from gpca.kernel_grid import KernelGrid, evaluate_grid, write_grid
-from gpca.provenance import recorded
+from gpca.classifier.kernel_grid import KernelGrid, evaluate_grid, write_grid
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
 
@@ -31,7 +31,7 @@ def run(options: Namespace) -> None:
     known = {field.name for field in fields(KernelGrid)}
     grid = KernelGrid(**{name: value for name, value in options.settings.items() if name in known})
     for seed, registrations, embeddings, out in per_seed(options, "registrations", "embeddings", "out"):
-        with recorded([out], [registrations, embeddings], options.settings, seed=seed):
+        with record_provenance([out], [registrations, embeddings], options.settings, seed=seed):
             loaded = Registrations.load(registrations)
             h_S_d = load_embeddings(embeddings, loaded, {"h": ("S", "d")}, "python -m gpca embed")["h"]
             loaded = replace(loaded, attached={"embedding": h_S_d})

@@ -15,15 +15,15 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.attribution import Attribution
-from gpca.dataset import Registrations, load_embeddings
+from gpca.active_learning.labelling import SKIPPED, LabelFile, Question, Session, require_name
+from gpca.attribution.predictions import write_predictions
+from gpca.attribution.scores import Attribution
+from gpca.classifier.gpc import GPCSettings
 from gpca.errors import InputError
-from gpca.gpc import GPCSettings
-from gpca.labelling import SKIPPED, LabelFile, Question, Session, require_name
-from gpca.perturbation import CONCEPTS
-from gpca.predictions import write_predictions
-from gpca.provenance import recorded
-from gpca.reporting.query_figure import draw_query
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.provenance import record_provenance
+from gpca.reporting.figures.query import draw_query
 from gpca.settings import check_settings
 
 COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this one", "/quit": "stop here"}
@@ -139,5 +139,5 @@ def _finish(session: Session, registrations: Registrations, options: Namespace) 
         said = Attribution.of_scores(session.gpc.classes, scores_N_C, seconds=0.0)
         said = replace(said, variances_N_C=variances_N_C, bald_N=bald_N)
         inputs = [options.registrations, options.embeddings, *([options.labels] if options.labels.is_file() else [])]
-        with recorded([options.predictions], inputs, options.settings):
+        with record_provenance([options.predictions], inputs, options.settings):
             write_predictions(options.predictions, registrations, said)

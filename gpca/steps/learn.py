@@ -6,14 +6,14 @@ from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
 
+from baselines.registry import explainer_entry, require_settings
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry, require_settings
-from gpca.learned import predict_sets
-from gpca.predictions import write_csv
+from gpca.files import write_csv
 from gpca.progress import progress
-from gpca.provenance import recorded
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.shifted_sets import ShiftedSets
+from gpca.shift.learners import predict_sets
+from gpca.shift.sets import ShiftedSets
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -46,6 +46,6 @@ def run(options: Namespace) -> None:
         title = f"learners on {options.source}, seed {seed}"
         for learner, out in progress(list(zip(options.learners, outputs, strict=True)), title):
             settings = options.settings.get(learner) or {}
-            with recorded([out], [path], settings, seed=seed):
+            with record_provenance([out], [path], settings, seed=seed):
                 make = partial(explainer_entry(learner).make, options.source, seed, **settings)
                 write_csv(out, predict_sets(make, sets))

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.dataset import Registrations, load_embeddings
+from gpca.alignment.icp import ICPSettings
+from gpca.classifier.gpc import GPC, GPCSettings
 from gpca.encoders.training import EncoderSettings, load_model
-from gpca.gpc import GPC, GPCSettings
-from gpca.model import Model
-from gpca.perturbation import CONCEPTS
-from gpca.provenance import recorded
-from gpca.recovery import RecoveryPolicy
-from gpca.registration import ICPSettings
+from gpca.model.file import Model
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.provenance import record_provenance
+from gpca.recovery.policy import RecoveryPolicy
 from gpca.settings import check_settings
 
 SECTIONS = {
@@ -46,12 +46,12 @@ def run(options: Namespace) -> None:
     for name, section in SECTIONS.items():
         check_settings(given[name], *section)
     inputs = [options.registrations, options.encoder, options.embeddings]
-    with recorded([options.out], inputs, options.settings, seed=options.seed):
+    with record_provenance([options.out], inputs, options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
         train = registrations.rows("train")
 
-        def fitted(rows: np.ndarray) -> GPC:
+        def fit_gpc(rows: np.ndarray) -> GPC:
             gpc = GPC(CONCEPTS, GPCSettings(**given["gpc"]), options.source, options.seed)
             return gpc.fit(h_S_d[rows], registrations.concept[rows])
 
@@ -59,21 +59,21 @@ def run(options: Namespace) -> None:
         Model(
             encoder=load_model(options.encoder, settings).encoder,
             encoder_settings=settings,
-            gpc=fitted(train),
+            gpc=fit_gpc(train),
             icp=ICPSettings(**given["registrations"].get("icp", {})),
             points=given["registrations"].get("points", 2048),
-            policy=_policy(given["recovery"], train, fitted, h_S_d),
+            policy=_policy(given["recovery"], train, fit_gpc, h_S_d),
             title=options.title,
             stand_in=options.stand_in,
         ).save(options.out)
 
 
-def _policy(recovery: dict, train: np.ndarray, fitted, h_S_d: np.ndarray) -> RecoveryPolicy:
+def _policy(recovery: dict, train: np.ndarray, fit_gpc, h_S_d: np.ndarray) -> RecoveryPolicy:
     """Return the config's policy; its threshold is chosen on training samples that a classifier did not learn."""
     if not recovery:
         return RecoveryPolicy()
     kept = np.arange(len(train)) % CALIBRATION == CALIBRATION - 1
-    _, _, bald_N = fitted(train[~kept]).attribute(h_S_d[train[kept]])
+    _, _, bald_N = fit_gpc(train[~kept]).attribute(h_S_d[train[kept]])
     return RecoveryPolicy.of_settings(
         recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"], bald_N
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gpca.objects.canonical import write_objects
 from gpca.objects.source import data_files, resolve, surfaces
-from gpca.provenance import recorded
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
 
@@ -24,5 +24,5 @@ def run(options: Namespace) -> None:
     """Read the source's surfaces, sample them and write the canonical clouds."""
     check_settings(options.settings, "sources", "*")
     entry = resolve(options.settings, options.data_dir)
-    with recorded([options.out], data_files(entry), {"entry": entry, "points": options.points}):
+    with record_provenance([options.out], data_files(entry), {"entry": entry, "points": options.points}):
         write_objects(surfaces(entry, Path(options.downloads)), options.source, options.out, options.points)

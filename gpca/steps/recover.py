@@ -11,25 +11,24 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.actions import action_of
-from gpca.closed_loop import Loop, LoopSettings, find_failures, labelled
 from gpca.encoders.training import EncoderSettings
 from gpca.errors import InputError
-from gpca.files import whole_file
+from gpca.files import whole_file, write_csv
 from gpca.frames.camera import Camera
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.situations import Shelf, Situations, SituationSettings
-from gpca.loop_explainers import LoopExplainers, learn_explainers
 from gpca.objects import procedural
-from gpca.policies import policy_entry
-from gpca.predictions import write_csv
-from gpca.provenance import recorded
-from gpca.recovery import RecoveryPolicy
-from gpca.recovery_example import save_example
+from gpca.pairs.synthesis import RegistrationSettings
+from gpca.provenance import record_provenance
+from gpca.recovery.actions import action_of
+from gpca.recovery.example import save_example
+from gpca.recovery.loop import Loop, LoopSettings, find_failures, register_situations
+from gpca.recovery.loop_explainers import LoopExplainers, learn_explainers
+from gpca.recovery.policies import policy_entry
+from gpca.recovery.policy import RecoveryPolicy
 from gpca.settings import check_settings
-from gpca.synthesis import RegistrationSettings
-from gpca.uncertainty import UncertaintySettings
+from gpca.uncertainty.spread import UncertaintySettings
 
 SOURCE = "recovery"  # names every random number of this step, tables included
 FEWEST_FAILED = 10  # calibration samples, for a threshold to be chosen on the failed ones alone
@@ -64,11 +63,11 @@ def run(options: Namespace) -> None:
     loop = LoopSettings(**recovery["loop"], points=registration.points, icp=registration.icp)
     outputs = [options.out, options.timings, options.policy, options.example]
     axes = (SOURCE, options.seed)
-    with recorded(outputs, [], given, seed=options.seed):
+    with record_provenance(outputs, [], given, seed=options.seed):
         surfaces = [surface for family in situation.scenes.families for surface in procedural.surfaces(family)]
         shelf = Shelf(surfaces, SOURCE, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
         tables = {part: Situations(shelf, situation, (*axes, part)) for part in ("train", "test", "failures")}
-        registrations, failed_S = labelled(tables, recovery["train"], recovery["calibration"], loop)
+        registrations, failed_S = register_situations(tables, recovery["train"], recovery["calibration"], loop)
         explainers = learn_explainers(
             [name for name in dict.fromkeys(entry.explainer for entry in entries.values()) if name],
             registrations,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.encoders.reduction import make_reduction, reduce
 from gpca.errors import InputError
 from gpca.files import load_arrays, save_arrays
-from gpca.provenance import recorded
-from gpca.reduction import make_reduction, reduce
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
 
@@ -29,7 +29,7 @@ def run(options: Namespace) -> None:
     make_reduction(options.reduction, options.settings)
     check_settings(options.settings, "reductions", options.reduction)
     for seed, embeddings, out in per_seed(options, "embeddings", "out"):
-        with recorded([out], [embeddings], options.settings, seed=seed):
+        with record_provenance([out], [embeddings], options.settings, seed=seed):
             arrays = load_arrays(embeddings, SHAPES, made_by="python -m gpca embed")
             h_S_d, train_S = arrays["h"], arrays["split"] == "train"
             if not train_S.any():

@@ -5,11 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.attribution.predictions import write_timings
 from gpca.objects.canonical import ObjectClouds
-from gpca.predictions import write_timings
-from gpca.provenance import recorded
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.synthesis import RegistrationSettings, make_registrations
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -26,7 +26,7 @@ def run(options: Namespace) -> None:
     check_settings(options.settings, "registrations")
     settings = RegistrationSettings.from_dict(options.settings)
     objects = ObjectClouds.load(options.objects)
-    with recorded([options.out, options.timings], [options.objects], options.settings, seed=options.seed):
+    with record_provenance([options.out, options.timings], [options.objects], options.settings, seed=options.seed):
         registrations, icp_seconds_S = make_registrations(objects, options.source, options.seed, settings)
         registrations.save(options.out)
         write_timings(options.timings, registrations, icp_seconds_S, icp_seconds_S)

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import torch
 
-from gpca.active_learning import make_task
-from gpca.dataset import Registrations, load_embeddings
-from gpca.model import Model
-from gpca.predictions import write_csv
-from gpca.provenance import recorded
-from gpca.runtime import measure
+from gpca.active_learning.rounds import make_task
+from gpca.files import write_csv
+from gpca.model.file import Model
+from gpca.model.runtime import measure
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps.active_learning import settings_from
 
@@ -36,7 +36,7 @@ def run(options: Namespace) -> None:
     check_settings(learning, "active_learning")
     axes = (options.source, options.seed)
     inputs = [options.model, options.registrations, options.embeddings]
-    with recorded([options.out], inputs, options.settings, seed=options.seed):
+    with record_provenance([options.out], inputs, options.settings, seed=options.seed):
         model = Model.load(options.model)
         registrations = Registrations.load(options.registrations)
         h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gpca.frames.rgbd_scene import SceneSettings, write_scenes
 from gpca.objects import procedural
-from gpca.provenance import recorded
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
 
@@ -21,6 +21,6 @@ def run(options: Namespace) -> None:
     """Lay the tables, look at them and write what was seen."""
     check_settings(options.settings, "real_world", "scenes")
     settings = SceneSettings.from_dict(options.settings)
-    with recorded([options.out], [], options.settings):
+    with record_provenance([options.out], [], options.settings):
         surfaces = (surface for family in settings.families for surface in procedural.surfaces(family))
         write_scenes(surfaces, options.source, settings, options.out)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import torch
 
-from gpca.dataset import Registrations, load_embeddings
 from gpca.encoders.training import EncoderSettings, load_model
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
-from gpca.provenance import recorded
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.shift import make_sets, settings_from
+from gpca.shift.samples import make_sets, settings_from
 from gpca.steps import per_seed
 
 SECTIONS = {"shift": ("shift",), "registrations": ("registrations",), "encoder": ("encoders", "*")}
@@ -46,7 +46,7 @@ def run(options: Namespace) -> None:
     files = ("registrations", "other_registrations", "embeddings", "encoders", "out")
     for seed, own, other, embeddings, weights, out in per_seed(options, *files):
         inputs = [path for path in (options.objects, own, other, embeddings, weights) if path]
-        with recorded([out], inputs, options.settings, seed=seed):
+        with record_provenance([out], inputs, options.settings, seed=seed):
             registrations = Registrations.load(own)
             h_S_d = load_embeddings(embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
             registrations = replace(registrations, attached={"embedding": h_S_d})

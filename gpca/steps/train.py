@@ -8,10 +8,10 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from gpca.dataset import Registrations
 from gpca.encoders.training import EncoderSettings, train_encoder
 from gpca.files import whole_file
-from gpca.provenance import recorded
+from gpca.pairs.dataset import Registrations
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
 
@@ -32,7 +32,7 @@ def run(options: Namespace) -> None:
     registrations = Registrations.load(options.registrations)
     # Not an output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = options.out.with_suffix(".checkpoint")
-    with recorded([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
+    with record_provenance([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
         model, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
         # Given a path, torch.save writes its name, here one with the process id, into the file.
         with whole_file(options.out) as partial, partial.open("wb") as file:

@@ -5,15 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.dataset import Registrations
-from gpca.designs import DESIGNS
-from gpca.evaluation import design_rows, evaluate_design
-from gpca.outcomes import write_seconds
-from gpca.provenance import recorded
-from gpca.registration import ICPSettings
+from gpca.alignment.icp import ICPSettings
+from gpca.pairs.dataset import Registrations
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
-from gpca.uncertainty import UncertaintySettings
+from gpca.uncertainty.designs import DESIGNS
+from gpca.uncertainty.evaluation import design_rows, evaluate_design
+from gpca.uncertainty.outcomes import write_seconds
+from gpca.uncertainty.spread import UncertaintySettings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -36,7 +36,7 @@ def run(options: Namespace) -> None:
     samples = given.pop("samples", None)
     settings = UncertaintySettings(**given, icp=ICPSettings(**icp))
     for seed, registrations_path, out, table, timings in per_seed(options, "registrations", "out", "tables", "timings"):
-        with recorded([out, table, timings], [registrations_path], options.settings, seed=seed):
+        with record_provenance([out, table, timings], [registrations_path], options.settings, seed=seed):
             registrations = Registrations.load(registrations_path)
             chosen = registrations.subset(design_rows(registrations, options.design, samples))
             outcomes, *seconds = evaluate_design(options.design, chosen, options.source, seed, settings)

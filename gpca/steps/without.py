@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.dataset import Registrations
 from gpca.encoders.training import EncoderSettings, embed, train_encoder
 from gpca.files import save_arrays
-from gpca.perturbation import CONCEPTS
-from gpca.provenance import recorded
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
 
@@ -30,7 +30,7 @@ def run(options: Namespace) -> None:
     torch.set_num_threads(options.threads)
     check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
-    with recorded([options.out], [options.registrations], options.settings, seed=options.seed):
+    with record_provenance([options.out], [options.registrations], options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         train = registrations.rows("train")
         arrays = {"sample": registrations.sample, "split": registrations.split}

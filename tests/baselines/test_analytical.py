@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from baselines.analytical import AnalyticalGPC
+from baselines.registry import explainer_entry
+from gpca.classifier.gpc import GPCSettings
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
-from gpca.gpc import GPCSettings
 from gpca.settings import check_settings
 
 QUICK = {"learning_rate": 0.1, "iterations": 60, "inducing": 16, "draws": 200, "points": 64}

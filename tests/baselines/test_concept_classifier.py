@@ -4,7 +4,7 @@ from sklearn.linear_model import LogisticRegression
 
 from baselines.concept_classifier import ConceptClassifier
 from gpca.errors import InputError
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
 
 CONCEPT_N = np.array(CONCEPTS)[np.arange(60) % 3]
 CENTRES = np.array([[-3.0, 0.0], [3.0, 0.0], [0.0, 4.0]])

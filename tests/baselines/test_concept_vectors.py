@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import minimize
 
 from baselines.concept_vectors import ConceptVectors
+from baselines.registry import explainer_entry
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.dirichlet_gp import JITTER, DirichletGP
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
 
 
 @pytest.fixture(scope="module")

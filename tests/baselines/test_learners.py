@@ -5,7 +5,7 @@ import pytest
 
 from baselines import dirichlet_gp, heads, laplace_head, learners
 from gpca.errors import InputError
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
 
 # With a class for every concept, variances and BALD.
 DRAWING = {**heads.EXPLAINERS, **laplace_head.EXPLAINERS, **dirichlet_gp.EXPLAINERS}

@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from baselines.registry import explainer_entry
 from baselines.residuals import FLOOR, features, log_residual
-from gpca.dataset import ragged
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.dataset import ragged
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import check_settings
-from gpca.uncertainty import SMALLEST_RESIDUAL
+from gpca.uncertainty.spread import SMALLEST_RESIDUAL
 
 RIVALS = ("residuals_logistic", "residuals_forest")
 

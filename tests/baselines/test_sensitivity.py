@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
+from baselines.registry import explainer_entry
 from baselines.sensitivity import local_derivatives, partial_rank_correlations, single_drops, total_indices
-from gpca.designs import STEP, sampled_knobs
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
-from gpca.knobs import UNTOUCHED, UPPER
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.designs import STEP, sample_knobs
+from gpca.uncertainty.knobs import UNTOUCHED, UPPER
 
 KINDS = {"sa_prcc_additive": "latin", "sa_sobol_additive": "saltelli"}
 ADDITIVE = ("sa_local_additive", *KINDS)
@@ -25,7 +25,7 @@ def unit_knobs(name):
     """The settings (K, 3) behind the conditions of that explainer's design, each knob in units of its range."""
     if name == "sa_local_additive":
         return np.vstack([np.zeros((8, 3)), STEP * np.eye(3)])
-    settings_K_3 = np.vstack([UNTOUCHED, sampled_knobs(KINDS[name])])
+    settings_K_3 = np.vstack([UNTOUCHED, sample_knobs(KINDS[name])])
     return (settings_K_3 - UNTOUCHED) / np.subtract(UPPER, UNTOUCHED)
 
 
@@ -87,7 +87,7 @@ def test_prcc_of_a_monotone_function_is_near_its_sign_however_curved():
 
 
 def test_prcc_of_an_input_that_alone_sets_the_order_is_its_sign():
-    inputs = sampled_knobs("latin")
+    inputs = sample_knobs("latin")
     outputs = np.array([np.exp(inputs[:, 0]), -inputs[:, 1], inputs[:, 2] ** 3])
     assert partial_rank_correlations(inputs, outputs) == pytest.approx(np.diag([1.0, -1.0, 1.0]), abs=1e-6)
 
@@ -108,8 +108,8 @@ def test_total_indices_equal_the_analytic_ones():
 
 def test_what_never_changes_has_no_sensitivity():
     constant = np.array([[0.0], [7.3], [1e-12]])
-    assert np.array_equal(partial_rank_correlations(sampled_knobs("latin"), np.tile(constant, 24)), np.zeros((3, 3)))
-    assert np.array_equal(total_indices(sampled_knobs("saltelli"), np.tile(constant, 40)), np.zeros((3, 3)))
+    assert np.array_equal(partial_rank_correlations(sample_knobs("latin"), np.tile(constant, 24)), np.zeros((3, 3)))
+    assert np.array_equal(total_indices(sample_knobs("saltelli"), np.tile(constant, 40)), np.zeros((3, 3)))
     assert np.array_equal(local_derivatives(np.tile(constant, 11)), np.zeros((3, 3)))
 
 

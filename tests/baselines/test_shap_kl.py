@@ -4,13 +4,15 @@ from itertools import permutations
 import numpy as np
 import pytest
 
+from baselines.registry import explainer_entry
 from baselines.shap_kl import shapley_values
-from gpca.designs import DESIGNS
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.designs import DESIGNS
 
-PRESENT_8_3 = (np.arange(8)[:, None] >> np.arange(3)) & 1  # which features corner b has, as gpca.designs numbers them
+PRESENT_8_3 = (
+    np.arange(8)[:, None] >> np.arange(3)
+) & 1  # which features corner b has, as gpca.uncertainty.designs numbers them
 
 
 def shapley_sum(worth_8):

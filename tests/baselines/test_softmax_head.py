@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from baselines.registry import explainer_entry
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
 
 
 def explain(registrations, logits):

@@ -4,12 +4,12 @@ from time import perf_counter
 import numpy as np
 import pytest
 
+from baselines.registry import explainer_entry, require_settings
 from baselines.sensitivity import ONE_AT_A_TIME, single_drops
 from baselines.shap_kl import ALL_CORNERS
 from baselines.values import WORTHS, ScaledValues, charged, corners
 from gpca.errors import InputError
-from gpca.explainer import explainer_entry, require_settings
-from gpca.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS
 
 SCALED = ("shap_removal", "sa_local_removal")
 LEARNED = ("shap_supervised", "sa_supervised")

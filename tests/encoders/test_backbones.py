@@ -8,8 +8,8 @@ import torch
 from gpca.encoders.registry import ENCODERS, make_encoder, parameter_count
 from gpca.encoders.training import EncoderSettings, embed, train_encoder
 from gpca.errors import InputError
-from gpca.perturbation import Severities
-from gpca.synthesis import RegistrationSettings, make_registrations
+from gpca.pairs.perturbation import Severities
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
 SMALL = {"pointnet": {"width": 8}, "pointnet2": {"width": 8, "centroids": 32}, "pointnext": {"width": 8}}
 backbones = pytest.mark.parametrize("backbone", SMALL)

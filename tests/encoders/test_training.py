@@ -6,8 +6,8 @@ import torch
 from gpca.encoders import training
 from gpca.encoders.training import EncoderSettings, load_model, train_encoder
 from gpca.errors import InputError
-from gpca.perturbation import Severities
-from gpca.synthesis import RegistrationSettings, make_registrations
+from gpca.pairs.perturbation import Severities
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
 SETTINGS = EncoderSettings(points=64, draws=2, epochs=6, batch_size=12, options={"k": 8, "point_features": 16})
 KEEP = training._keep

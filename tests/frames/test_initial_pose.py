@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gpca.alignment.pose_error import pose_error
+from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
-from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displaced, nearest_to, read_results
-from gpca.pose_error import pose_error
-from gpca.rigid import inverse, rotation_angle_rad
+from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace, nearest_to, read_results
 
 from .tiny import read
 
@@ -24,7 +24,7 @@ def test_an_error_is_within_its_declared_size():
     T = np.eye(4)
     T[:3, 3] = (0.1, 0.2, 0.9)
     settings = InitialPoseSettings("true_pose", rotation_deg=5.0, translation=0.03)
-    errors = [inverse(T) @ displaced(T, 0.2, settings, np.random.default_rng(seed)) for seed in range(100)]
+    errors = [inverse(T) @ displace(T, 0.2, settings, np.random.default_rng(seed)) for seed in range(100)]
     angles_deg = np.rad2deg([rotation_angle_rad(error) for error in errors])
     shifts_m = np.linalg.norm([error[:3, 3] for error in errors], axis=1)
     assert 4.5 < angles_deg.max() <= 5.0

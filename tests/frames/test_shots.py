@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from gpca.alignment.rigid import transform
 from gpca.frames.camera import Camera, MeshScene, look_at
-from gpca.frames.shots import Shot, agreement, fused, median_depth, without_outliers
-from gpca.rigid import transform
+from gpca.frames.shots import Shot, agreement, fuse, median_depth, without_outliers
 
 from .tiny import CAMERA
 
@@ -27,7 +27,7 @@ def seen(eye, T_world_object=None, camera=CAMERA, before=()):
 
 def test_points_lie_on_the_surface_and_two_views_are_fused_in_one_frame():
     shots = [seen((0.6, 0, 0.2)), seen((-0.6, 0, 0.2))]
-    points = fused(shots, 2 * D, filtered=False)
+    points = fuse(shots, 2 * D, filtered=False)
     assert np.linalg.norm(points, axis=1) == pytest.approx(0.1, abs=2e-3)
     assert points[:, 0].min() < -0.09
     assert points[:, 0].max() > 0.09
@@ -61,7 +61,7 @@ def test_the_median_ignores_what_was_not_measured():
 
 
 def test_outliers_go_and_the_surface_stays():
-    points = fused([seen((0.6, 0, 0.2))], 2 * D, filtered=False)
+    points = fuse([seen((0.6, 0, 0.2))], 2 * D, filtered=False)
     stray = np.vstack([points, [[0, 0, 0.3], [0.3, 0.1, 0]]])
     kept = without_outliers(stray)
     assert np.linalg.norm(kept, axis=1).max() < 0.11
@@ -71,7 +71,7 @@ def test_outliers_go_and_the_surface_stays():
 def test_the_true_pose_explains_the_shots_best():
     vertices, _, normals = ball()
     shots = [seen((0.6, 0, 0.2))]
-    points = fused(shots, 2 * D, filtered=False)
+    points = fuse(shots, 2 * D, filtered=False)
 
     def judged(shift):
         T = np.eye(4)
@@ -90,7 +90,7 @@ def test_surface_behind_something_measured_is_not_held_against_a_pose():
     wall.apply_translation((0.25, 0.15, 0))  # hides one half
     hidden = seen((0.6, 0, 0.0), before=[(wall.vertices, wall.faces)])
     assert 0.2 < hidden.mask.sum() / seen((0.6, 0, 0.0)).mask.sum() < 0.8
-    points = fused([hidden], 2 * D, filtered=False)
+    points = fuse([hidden], 2 * D, filtered=False)
     assert agreement([hidden], points, vertices, normals, np.eye(4), D) > 1.8
 
 

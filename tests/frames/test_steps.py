@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 from gpca.__main__ import main
-from gpca.dataset import Registrations
 from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
 
 REGISTRATIONS = {"train": 9, "test": 6, "points": 128, "test_share": 0.4, "occluders": 1.0}
 

@@ -3,7 +3,7 @@ import pytest
 
 from gpca.frames.camera import Camera
 from gpca.frames.shots import Shot
-from gpca.frames.viewpoint import VOXEL_M, best_viewpoint, candidates, expected_surface, occupied
+from gpca.frames.viewpoint import VOXEL_M, best_viewpoint, candidates, expected_surface, occupy
 
 CAMERA = Camera(192, 144, 180)
 CENTRE = np.array([0.1, -0.05, 0.06])
@@ -78,9 +78,9 @@ def test_the_best_viewpoint_adds_most_to_what_was_seen():
 
 
 def test_boxes_stand_where_points_are_and_the_table_is_left_out():
-    assert occupied(np.array([[0.1, 0.2, 0.0]])) is None
+    assert occupy(np.array([[0.1, 0.2, 0.0]])) is None
     point = np.array([0.101, 0.202, 0.051])
-    vertices, faces = occupied(np.array([point, point + 1e-4, [0.3, 0.3, 0.001]]))
+    vertices, faces = occupy(np.array([point, point + 1e-4, [0.3, 0.3, 0.001]]))
     assert vertices.shape == (8, 3)
     assert faces.shape == (12, 3)
     assert (vertices.min(axis=0) <= point).all()

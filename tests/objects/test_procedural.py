@@ -80,9 +80,9 @@ def test_cups_are_hollow_and_open_at_the_top(built):
         assert mesh.volume < 0.4 * mesh.convex_hull.volume, surface.name
         spec = cups.CUPS[surface.name]
         floor, top = spec.floor, spec.profile[-1][1] + 5
-        probe = solids.moved(solids.cylinder(10, top - floor - 0.3, (0, 0, (top + floor + 0.3) / 2)), scale=0.001)
+        probe = solids.move(solids.cylinder(10, top - floor - 0.3, (0, 0, (top + floor + 0.3) / 2)), scale=0.001)
         assert solids.difference(probe, mesh).volume == pytest.approx(probe.volume), surface.name
-        disc = solids.moved(solids.cylinder(10, 0.5 * floor, (0, 0, 0.65 * floor)), scale=0.001)
+        disc = solids.move(solids.cylinder(10, 0.5 * floor, (0, 0, 0.65 * floor)), scale=0.001)
         assert solids.intersection(disc, mesh).volume == pytest.approx(disc.volume), surface.name
 
 
@@ -138,7 +138,7 @@ def test_booleans_and_blend():
     assert solids.union(one, other).volume == pytest.approx(1.5)
     assert solids.difference(one, other).volume == pytest.approx(0.5)
     assert solids.intersection(one, other).volume == pytest.approx(0.5)
-    assert solids.hull(one, solids.moved(one, (2, 0, 0))).volume == pytest.approx(3)
+    assert solids.hull(one, solids.move(one, (2, 0, 0))).volume == pytest.approx(3)
     balls = [solids.ellipsoid(1), solids.ellipsoid(1, (1.5, 0, 0))]
     smooth, sharp = solids.blend(*balls, edge=0.15, rounds=5), solids.union(*balls)
     assert smooth.volume == pytest.approx(sharp.volume, rel=0.02)
@@ -152,12 +152,12 @@ def test_an_empty_solid_is_an_error_and_not_an_empty_mesh():
 
 def test_moved_turns_about_fixed_axes_then_shifts_and_leaves_the_original():
     bar = solids.box((4, 2, 1))
-    turned = solids.moved(bar, (10, 0, 0), (90, 0, 90), scale=2)  # x→y, y→z (about x), then about z
+    turned = solids.move(bar, (10, 0, 0), (90, 0, 90), scale=2)  # x→y, y→z (about x), then about z
     assert turned.bounds == pytest.approx(np.array([[9, -4, -2], [11, 4, 2]]))
     assert bar.extents == pytest.approx([4, 2, 1])
 
 
 def test_scaled_to():
     bar = solids.box((4, 2, 1))
-    assert solids.scaled_to(bar, (1, 2, 3)).extents == pytest.approx([1, 2, 3])
-    assert pdist(solids.scaled_to(bar, diameter=0.1).vertices).max() == pytest.approx(0.1)
+    assert solids.scale_to(bar, (1, 2, 3)).extents == pytest.approx([1, 2, 3])
+    assert pdist(solids.scale_to(bar, diameter=0.1).vertices).max() == pytest.approx(0.1)

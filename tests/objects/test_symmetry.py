@@ -4,14 +4,14 @@ import trimesh
 
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import found_symmetries, listed_symmetries
+from gpca.objects.symmetry import find_symmetries, read_symmetries
 
 create = trimesh.creation
 
 
 def symmetries(mesh):
     points, _, diameter = canonical_cloud(Surface("object", mesh.vertices, mesh.faces), "tests", 4096)
-    return found_symmetries(points, diameter)
+    return find_symmetries(points, diameter)
 
 
 def test_a_brick_may_be_turned_over_but_not_by_a_quarter():
@@ -44,6 +44,6 @@ def test_a_handle_takes_the_symmetry_away():
 
 def test_what_the_file_lists_counts_for_all_of_its_objects():
     info = {1: {"diameter": 1.0}, 2: {"diameter": 1.0, "symmetries_discrete": [[1]]}}
-    assert listed_symmetries(info, 1) == {}
-    assert listed_symmetries(info, 2) == {"symmetries_discrete": [[1]]}
-    assert listed_symmetries({1: {"diameter": 1.0}}, 1) is None
+    assert read_symmetries(info, 1) == {}
+    assert read_symmetries(info, 2) == {"symmetries_discrete": [[1]]}
+    assert read_symmetries({1: {"diameter": 1.0}}, 1) is None

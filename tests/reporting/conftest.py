@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gpca.attribution import Attribution
-from gpca.perturbation import CONCEPTS
-from gpca.predictions import write_predictions
+from gpca.attribution.predictions import write_predictions
+from gpca.attribution.scores import Attribution
+from gpca.pairs.perturbation import CONCEPTS
 
 
 @pytest.fixture(scope="session")
@@ -37,7 +37,7 @@ def predicted():
 def stage_files(registrations, tmp_path_factory):
     """Paths (registrations, embeddings, predictions); pose of sample p has score 0.5 + p / 100, all named right."""
     from gpca.files import save_arrays
-    from gpca.perturbation import CONCEPTS
+    from gpca.pairs.perturbation import CONCEPTS
 
     folder = tmp_path_factory.mktemp("stages")
     registrations.save(folder / "registrations.npz")
@@ -62,7 +62,7 @@ def stage_files(registrations, tmp_path_factory):
 @pytest.fixture
 def written(monkeypatch):
     """Draw and return all words of the figure that was saved last, of its panels too."""
-    from gpca.reporting import style
+    from gpca.reporting.figures import style
 
     words = []
     save_png = style.save_png

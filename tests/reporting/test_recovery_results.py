@@ -5,15 +5,15 @@ import json
 import numpy as np
 import pytest
 
+from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
 from gpca.files import read_image, save_arrays
-from gpca.metrics import tidy
-from gpca.perturbation import CONCEPTS
-from gpca.recovery_metrics import wilson_interval
-from gpca.reporting.mitigation_figure import draw_mitigation, read_policy
-from gpca.reporting.recovery_example import draw_recovery_example
-from gpca.reporting.recovery_figure import draw_recovery_rates
-from gpca.reporting.recovery_table import table8_recovery
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.metrics import wilson_interval
+from gpca.reporting.figures.policy import draw_mitigation, read_policy
+from gpca.reporting.figures.recovery_example import draw_recovery_example
+from gpca.reporting.figures.recovery_rates import draw_recovery_rates
+from gpca.reporting.tables.recovery import table8_recovery
 
 POLICIES = {"gpca": "GP-CA", "random": "Random action", "absent": "Absent"}
 POLICY = {

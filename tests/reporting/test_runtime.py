@@ -3,17 +3,17 @@
 import pandas as pd
 import pytest
 
+from gpca.comparison.published import printed_seconds, read_published
 from gpca.errors import InputError
-from gpca.published import printed_seconds, read_published
-from gpca.reporting.runtime_figure import _bars, draw_runtime
-from gpca.reporting.runtime_table import table7_runtime
-from gpca.runtime_file import COLUMNS, COMPONENTS, OF_ONE_EXPLANATION
+from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
+from gpca.reporting.figures.runtime import _bars, draw_runtime
+from gpca.reporting.tables.runtime import table7_runtime
 
 
 def rows(device="CPU", hardware="A processor, 2 cores", components=tuple(COMPONENTS), start=0.001):
     return pd.DataFrame(
         [(name, device, hardware, 1, 100, start * (i + 1), 0.0005, 0.002) for i, name in enumerate(components)],
-        columns=COLUMNS,
+        columns=RUNTIME_COLUMNS,
     )
 
 

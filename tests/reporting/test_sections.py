@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from gpca.reporting.page import rendered_caption
+from gpca.reporting.page.page import rendered_caption
 from gpca.reporting.sections import (
     OTHER,
     SECTIONS,

@@ -65,8 +65,8 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
 
 def test_a_strategy_and_an_encoder_of_the_docs_are_planned(project):
     """The config alone: that they run is tested without the workflow, in tests/test_adding.py."""
-    acquisition = project.folder / "gpca/acquisition.py"
-    acquisition.write_text(acquisition.read_text() + block("gpca/acquisition.py", "bald_dense"))
+    acquisition = project.folder / "gpca/active_learning/acquisition.py"
+    acquisition.write_text(acquisition.read_text() + block("gpca/active_learning/acquisition.py", "bald_dense"))
     registry = project.folder / "gpca/encoders/registry.py"
     registry.write_text(registry.read_text() + block("gpca/encoders/registry.py", "pointwise"))
     (project.folder / "gpca/encoders/pointwise.py").write_text(block("gpca/encoders/pointwise.py"))
@@ -81,9 +81,9 @@ def test_a_strategy_and_an_encoder_of_the_docs_are_planned(project):
 EXPLAINER = """
 import numpy as np
 
-from gpca.attribution import Attribution
-from gpca.explainer import Entry
-from gpca.perturbation import CONCEPTS
+from gpca.attribution.scores import Attribution
+from gpca.explainers.interface import Entry
+from gpca.pairs.perturbation import CONCEPTS
 
 
 class FitnessOnly:

@@ -25,7 +25,7 @@ WITH_GPC["explain"] += 2  # classic features on depth frames
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
     (project.folder / "baselines/lazy.py").write_text(
-        "from gpca.concept_attribution import GPCA\nfrom gpca.explainer import Entry\n"
+        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import Entry\n"
         "EXPLAINERS = {'lazy': Entry('Lazy', GPCA)}\n"
     )
     project.append("config/smoke.yaml", "  lazy: {}\n")
@@ -81,21 +81,22 @@ def test_a_finished_run_has_nothing_to_do(finished):
 
 
 EDITS = {
-    "gpca/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 4} | LEARNED | DIAGNOSED | KERNELS | BACKBONES
+    "gpca/classifier/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 4} | LEARNED | DIAGNOSED | KERNELS | BACKBONES
     | MODEL | RECOVERY | METHOD,
-    "gpca/shift.py": {"shift": 2} | DIAGNOSED,
+    "gpca/shift/samples.py": {"shift": 2} | DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
-    "gpca/reporting/kernel_figure.py": {"kernel_learning_curves": 1},
-    "gpca/acquisition.py": {"active_learning": 4, "fig4_pipeline": 1} | LEARNED | RUNTIME,
-    "gpca/stream.py": {"active_learning": 4, "fig4_pipeline": 1} | LEARNED | RUNTIME,
-    "gpca/reporting/learning_figure.py": {"active_learning_curves": 1, "fig4_pipeline": 1},
+    "gpca/reporting/figures/kernel_grid.py": {"kernel_learning_curves": 1},
+    "gpca/active_learning/acquisition.py": {"active_learning": 4, "fig4_pipeline": 1} | LEARNED | RUNTIME,
+    "gpca/active_learning/stream.py": {"active_learning": 4, "fig4_pipeline": 1} | LEARNED | RUNTIME,
+    "gpca/reporting/figures/active_learning.py": {"active_learning_curves": 1, "fig4_pipeline": 1},
     # Not Table II: it shows GP-CA alone.
-    "gpca/icp_kernels.py": {"uncertainty": 12} | ON_UNCERTAINTY | COLLECTORS | {"table": 2} | RUNTIME | RECOVERY,
+    "gpca/alignment/icp_kernels.py": {"uncertainty": 12, "table": 2}
+    | ON_UNCERTAINTY | COLLECTORS | RUNTIME | RECOVERY,
     "baselines/softmax_head.py": {"explain": 2} | COLLECTORS | {"table": 1} | RECOVERY,
-    "gpca/reporting/contact_sheet.py": {"objects_figure": 2},
-    "gpca/reporting/concepts_figure.py": {"fig3_concepts": 1, "fig5_real_world_example": 1} | METHOD,
+    "gpca/reporting/figures/contact_sheet.py": {"objects_figure": 2},
+    "gpca/reporting/figures/concepts.py": {"fig3_concepts": 1, "fig5_real_world_example": 1} | METHOD,
     # Not the pictures: they show an encoder without reduction.
-    "gpca/reduction.py": {
+    "gpca/encoders/reduction.py": {
         "reduced_embeddings": 1, "explain_with_backbone": 1, "real_world_metrics": 1, "table6_backbones": 1,
         "confusion_real_world": 1,
     },
@@ -105,11 +106,11 @@ EDITS = {
     "gpca/frames/bop.py": {
         "instances": 1, "frame_registrations": 2, "encoder": 2, "embeddings": 2, "reduced_embeddings": 1, "explain": 2,
     } | BACKBONES | MODEL | RECOVERY,
-    "gpca/recovery.py": MODEL | RECOVERY,
-    "gpca/reporting/tables.py": {
+    "gpca/recovery/policy.py": MODEL | RECOVERY,
+    "gpca/reporting/tables/explainers.py": {
         "table": 3, "learning_table": 3, "learner_table": 3, "kernel_table": 2, "kernel_learning_curves": 1,
     },
-    "gpca/reporting/confusions_figure.py": {"fig_attribution_confusions": 1, "confusion_real_world": 1},
+    "gpca/reporting/figures/confusions.py": {"fig_attribution_confusions": 1, "confusion_real_world": 1},
     "gpca/encoders/dgcnn.py": {
         "encoder": 6, "embeddings": 6, "embeddings_without": 4, "active_learning": 4, "shift": 2,
         "reduced_embeddings": 1,
@@ -128,7 +129,7 @@ def test_the_rules_that_use_a_module_depend_on_it_and_no_other(planned, module):
     assert without_ends(planned.behind(module)) == EDITS[module]
 
 
-@pytest.mark.parametrize("name", ["gpca/reporting/page_samples.py", "gpca/reporting/templates/page.js"])
+@pytest.mark.parametrize("name", ["gpca/reporting/page/samples.py", "gpca/reporting/page/templates/page.js"])
 def test_what_the_page_alone_uses_makes_the_page_alone(planned, name):
     assert planned.behind(name) == {"page": 1}
 
@@ -138,7 +139,7 @@ def test_the_comparison_comes_after_every_number(planned):
         assert "comparison" in planned.behind(f"results/smoke/{name}.csv")
 
 
-@pytest.mark.parametrize("module", ["gpca/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/uw_rgbd.py"])
+@pytest.mark.parametrize("module", ["gpca/classifier/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/uw_rgbd.py"])
 def test_an_edit_reruns_what_depends_on_the_module(finished, module):
     finished.append(module, "\n# edited\n")
     assert without_ends(finished.dry_run(*SMOKE).jobs) == EDITS[module]
@@ -158,7 +159,7 @@ def test_an_explainer_says_the_same_as_a_learner(smoke, name):
 
 
 def test_a_touched_but_unchanged_module_reruns_nothing(finished):
-    (finished.folder / "gpca/gpc.py").touch()
+    (finished.folder / "gpca/classifier/gpc.py").touch()
     assert not finished.dry_run(*SMOKE).jobs
 
 

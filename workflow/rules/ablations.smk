@@ -108,7 +108,7 @@ rule diagnostics:
             source=SOURCES,
             seed=SEEDS,
         ),
-        code=code_files("gpca.learner_metrics", "gpca.reporting.script"),
+        code=code_files("gpca.shift.metrics", "gpca.reporting.script"),
     output:
         "results/{run}/diagnostics.csv",
     log:
@@ -128,7 +128,7 @@ rule diagnostics:
 rule kernel_table:
     input:
         grids=KERNEL_GRIDS,
-        code=code_files("gpca.reporting.kernel_tables", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.tables.kernel_grid", "gpca.reporting.script"),
     output:
         csv=reported("results/{run}/tables/{table}.csv"),
         md="results/{run}/tables/{table}.md",
@@ -155,7 +155,7 @@ rule kernel_table:
 rule learner_table:
     input:
         metrics="results/{run}/diagnostics.csv",
-        code=code_files("gpca.reporting.learner_tables", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.tables.learners", "gpca.reporting.script"),
     output:
         csv=reported("results/{run}/tables/{table}.csv"),
         md="results/{run}/tables/{table}.md",
@@ -182,7 +182,7 @@ rule learner_table:
 rule kernel_learning_curves:
     input:
         grids=KERNEL_GRIDS,
-        code=code_files("gpca.reporting.kernel_figure", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.kernel_grid", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/kernel_learning_curves.pdf",
         png=reported("results/{run}/figures/kernel_learning_curves.png"),
@@ -214,7 +214,7 @@ rule learner_figure:
             if wildcards.figure == "uncertainty_vs_distance"
             else []
         ),
-        code=code_files("gpca.reporting.learner_figures", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.learners", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/{figure}.pdf",
         png=reported("results/{run}/figures/{figure}.png"),

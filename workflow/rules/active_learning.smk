@@ -65,7 +65,7 @@ rule active_learning:
 rule active_learning_metrics:
     input:
         curves=learning_curves(STRATEGIES),
-        code=code_files("gpca.learning_metrics", "gpca.reporting.script"),
+        code=code_files("gpca.active_learning.metrics", "gpca.reporting.script"),
     output:
         "results/{run}/active_learning.csv",
     log:
@@ -87,7 +87,7 @@ rule active_learning_metrics:
 rule learning_table:
     input:
         metrics="results/{run}/active_learning.csv",
-        code=code_files("gpca.reporting.learning_tables", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.tables.active_learning", "gpca.reporting.script"),
     output:
         csv=reported("results/{run}/tables/{table}.csv"),
         md="results/{run}/tables/{table}.md",
@@ -116,7 +116,7 @@ rule learning_table:
 rule active_learning_curves:
     input:
         curves=learning_curves(POOL_STRATEGIES),
-        code=code_files("gpca.reporting.learning_figure", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.active_learning", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/active_learning_curves.pdf",
         png=reported("results/{run}/figures/active_learning_curves.png"),

@@ -6,7 +6,7 @@ rule metrics:
             source=SOURCES,
             seed=SEEDS,
         ),
-        code=code_files("gpca.metrics", "gpca.reporting.script"),
+        code=code_files("gpca.attribution.metrics", "gpca.reporting.script"),
     output:
         "results/{run}/metrics.csv",
     log:
@@ -26,7 +26,7 @@ rule metrics:
 rule timings:
     input:
         timings=of_all_explainers("timings"),
-        code=code_files("gpca.metrics", "gpca.reporting.script"),
+        code=code_files("gpca.attribution.metrics", "gpca.reporting.script"),
     output:
         "results/{run}/timings.csv",
     log:

@@ -3,24 +3,25 @@ import os
 import shlex
 from pathlib import Path
 
-from gpca.acquisition import STRATEGIES as ACQUISITION, STREAMS
+from gpca.active_learning.acquisition import STRATEGIES as ACQUISITION, STREAMS
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.frames.source import REAL_WORLD, frame_files
-from gpca.explainer import explainer_entry, explainer_module
+from baselines.registry import explainer_entry, explainer_module
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import data_files
-from gpca.policies import policy_entry
-from gpca.published import PUBLISHED, read_published
-from gpca.reasons import REASONS
-from gpca.reporting.backbone_table import CLASSIC as CLASSIC_TITLES, encoder_title
-from gpca.reporting.kernel_tables import kernel_tables_of
-from gpca.reporting.learner_figures import LEARNER_FIGURES
-from gpca.reporting.learner_tables import LEARNER_TABLES
-from gpca.reporting.learning_tables import LEARNING_TABLES
-from gpca.reporting.pipeline_figure import TITLES as PIPELINE_STRATEGIES
+from gpca.recovery.policies import policy_entry
+from gpca.comparison.published import PUBLISHED, read_published
+from gpca.comparison.reasons import REASONS
+from gpca.reporting.tables.backbones import CLASSIC as CLASSIC_TITLES, encoder_title
+from gpca.reporting.tables.kernel_grid import kernel_tables_of
+from gpca.reporting.figures.learners import LEARNER_FIGURES
+from gpca.reporting.tables.learners import LEARNER_TABLES
+from gpca.reporting.tables.active_learning import LEARNING_TABLES
+from gpca.reporting.figures.pipeline import TITLES as PIPELINE_STRATEGIES
 from gpca.reporting.sections import caption_files, section_of, title_of_result
-from gpca.reporting.tables import GPCA, TABLE1, title_of
+from gpca.objects.title import title_of
+from gpca.reporting.tables.explainers import GPCA_FORMS, TABLE1
 
 PUBLISHED_NUMBERS = os.path.relpath(PUBLISHED)
 SEEDS = config["seeds"]
@@ -258,7 +259,7 @@ TABLE_EXPLAINERS = {
     for table, names in {
         "table1_single_baselines": TABLE1,
         "table1_extended": config["explainers"],
-        "table2_per_concept": GPCA,
+        "table2_per_concept": GPCA_FORMS,
     }.items()
     if (shown := [name for name in config["explainers"] if name in names])
 }
@@ -295,7 +296,7 @@ RECOVERY_FIGURES = {  # and what each is drawn from
     "fig1_recovery_example": f"recovery/example_seed{SEEDS[0]}.npz",
 }
 # One registration of the source that figures show, and what the stages of GP-CA make of it.
-GPCA_SHOWN = next((name for name in reversed(GPCA) if name in config["explainers"]), "")
+GPCA_SHOWN = next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), "")
 SHOWN_STAGES = {
     name: f"results/{{run}}/{name}/{config['figures']['source']}/{folder}seed{SEEDS[0]}.{suffix}"
     for name, folder, suffix in (

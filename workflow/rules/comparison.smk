@@ -11,7 +11,7 @@ COMPARED = sorted(
 rule kernel_metrics:
     input:
         grids=KERNEL_GRIDS,
-        code=code_files("gpca.kernel_metrics", "gpca.reporting.script"),
+        code=code_files("gpca.classifier.kernel_metrics", "gpca.reporting.script"),
     output:
         "results/{run}/kernels.csv",
     log:
@@ -34,8 +34,8 @@ rule comparison:
         published=PUBLISHED_NUMBERS,
         reasons=os.path.relpath(REASONS),
         code=code_files(
-            "gpca.comparison",
-            "gpca.reporting.comparison_table",
+            "gpca.comparison.verdicts",
+            "gpca.reporting.tables.comparison",
             "gpca.reporting.script",
         ),
     output:

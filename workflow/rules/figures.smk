@@ -1,7 +1,7 @@
 rule objects_figure:
     input:
         objects="results/{run}/objects/{source}.npz",
-        code=code_files("gpca.reporting.contact_sheet", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.contact_sheet", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/objects_{source}.pdf",
         png=reported("results/{run}/figures/objects_{source}.png"),
@@ -24,7 +24,7 @@ rule objects_figure:
 rule fig2_overview:
     input:
         **SHOWN_STAGES,
-        code=code_files("gpca.reporting.overview_figure", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.overview", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig2_overview.pdf",
         png=reported("results/{run}/figures/fig2_overview.png"),
@@ -50,7 +50,7 @@ rule fig3_concepts:
     input:
         objects=f"results/{{run}}/objects/{config['figures']['source']}.npz",
         registrations=f"results/{{run}}/registrations/{config['figures']['source']}/seed{SEEDS[0]}.npz",
-        code=code_files("gpca.reporting.concepts_figure", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.concepts", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig3_concepts.pdf",
         png=reported("results/{run}/figures/fig3_concepts.png"),
@@ -79,7 +79,7 @@ rule fig4_pipeline:
             strategy=SHOWN_STRATEGIES,
             seed=SEEDS,
         ),
-        code=code_files("gpca.reporting.pipeline_figure", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.pipeline", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig4_pipeline.pdf",
         png=reported("results/{run}/figures/fig4_pipeline.png"),
@@ -104,7 +104,7 @@ rule fig4_pipeline:
 rule fig_attribution_confusions:
     input:
         metrics="results/{run}/metrics.csv",
-        code=code_files("gpca.reporting.confusions_figure", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.confusions", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig_attribution_confusions.pdf",
         png=reported("results/{run}/figures/fig_attribution_confusions.png"),

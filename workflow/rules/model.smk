@@ -83,7 +83,7 @@ rule table7_runtime:
     input:
         runtime="results/{run}/runtime.csv",
         published=PUBLISHED_NUMBERS,
-        code=code_files("gpca.reporting.runtime_table", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.tables.runtime", "gpca.reporting.script"),
     output:
         csv=reported("results/{run}/tables/table7_runtime.csv"),
         md="results/{run}/tables/table7_runtime.md",
@@ -108,7 +108,7 @@ rule runtime_figure:
     input:
         runtime="results/{run}/runtime.csv",
         published=PUBLISHED_NUMBERS,
-        code=code_files("gpca.reporting.runtime_figure", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.runtime", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/runtime.pdf",
         png=reported("results/{run}/figures/runtime.png"),

@@ -143,7 +143,7 @@ rule explain_with_backbone:
             "results/{{run}}/timings/{{source}}/{{backbone}}/seed{seed}.csv",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.attribute", "gpca.concept_attribution"),
+        code=code_files("gpca.steps.attribute", "gpca.explainers.gpca"),
     output:
         predictions=collect(
             "results/{{run}}/predictions/{{source}}/{{backbone}}-{{reduction}}/seed{seed}.csv",
@@ -178,7 +178,7 @@ rule explain_with_backbone:
 rule real_world_metrics:
     input:
         predictions=real_world_predictions([*BACKBONES, *CLASSIC]),
-        code=code_files("gpca.metrics", "gpca.reporting.script"),
+        code=code_files("gpca.attribution.metrics", "gpca.reporting.script"),
     output:
         "results/{run}/real_world.csv",
     log:
@@ -198,7 +198,7 @@ rule real_world_metrics:
 rule table6_backbones:
     input:
         metrics="results/{run}/real_world.csv",
-        code=code_files("gpca.reporting.backbone_table", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.tables.backbones", "gpca.reporting.script"),
     output:
         csv=reported("results/{run}/tables/table6_backbones.csv"),
         md="results/{run}/tables/table6_backbones.md",
@@ -228,7 +228,7 @@ rule table6_backbones:
 rule confusion_real_world:
     input:
         metrics="results/{run}/real_world.csv",
-        code=code_files("gpca.reporting.real_world_confusions", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.real_world_confusions", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/confusion_real_world.pdf",
         png=reported("results/{run}/figures/confusion_real_world.png"),
@@ -256,7 +256,7 @@ rule fig5_real_world_example:
         registrations=f"results/{{run}}/registrations/{REAL_WORLD}/seed{SEEDS[0]}.npz",
         poses=f"results/{{run}}/poses/{REAL_WORLD}/seed{SEEDS[0]}.csv",
         predictions=f"results/{{run}}/predictions/{REAL_WORLD}/{BACKBONES[0]}/seed{SEEDS[0]}.csv",
-        code=code_files("gpca.reporting.real_world_example", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.real_world_example", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/fig5_real_world_example.pdf",
         png=reported("results/{run}/figures/fig5_real_world_example.png"),
@@ -287,7 +287,7 @@ rule real_world_failures:
             f"results/{{{{run}}}}/poses/{REAL_WORLD}/seed{{seed}}.csv", seed=SEEDS
         ),
         predictions=real_world_predictions(BACKBONES[:1]),
-        code=code_files("gpca.reporting.real_world_failures", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.figures.real_world_failures", "gpca.reporting.script"),
     output:
         pdf="results/{run}/figures/real_world_failures.pdf",
         png=reported("results/{run}/figures/real_world_failures.png"),

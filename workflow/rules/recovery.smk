@@ -48,7 +48,7 @@ rule recover:
 rule recovery_metrics:
     input:
         recovery=collect("results/{{run}}/recovery/seed{seed}.csv", seed=SEEDS),
-        code=code_files("gpca.recovery_metrics", "gpca.reporting.script"),
+        code=code_files("gpca.recovery.metrics", "gpca.reporting.script"),
     output:
         "results/{run}/recovery.csv",
     log:
@@ -72,7 +72,7 @@ rule table8_recovery:
     input:
         metrics="results/{run}/recovery.csv",
         timings=collect("results/{{run}}/timings/recovery/seed{seed}.csv", seed=SEEDS),
-        code=code_files("gpca.reporting.recovery_table", "gpca.reporting.script"),
+        code=code_files("gpca.reporting.tables.recovery", "gpca.reporting.script"),
     output:
         csv=reported("results/{run}/tables/table8_recovery.csv"),
         md="results/{run}/tables/table8_recovery.md",
@@ -98,8 +98,8 @@ rule recovery_figure:
     input:
         data=lambda wildcards: f"results/{wildcards.run}/{RECOVERY_FIGURES[wildcards.figure]}",
         code=code_files(
-            *("gpca.reporting.recovery_figure", "gpca.reporting.mitigation_figure"),
-            *("gpca.reporting.recovery_example", "gpca.reporting.script"),
+            *("gpca.reporting.figures.recovery_rates", "gpca.reporting.figures.policy"),
+            *("gpca.reporting.figures.recovery_example", "gpca.reporting.script"),
         ),
     output:
         pdf="results/{run}/figures/{figure}.pdf",

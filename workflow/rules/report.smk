@@ -23,8 +23,8 @@ rule page:
         samples=[file for files in SAMPLES.values() for file in files],
         captions=caption_files("workflow/report", SHOWN["tables"] + SHOWN["figures"]),
         code=[
-            *code_files("gpca.reporting.page", "gpca.reporting.script"),
-            *map(str, sorted(Path("gpca/reporting/templates").iterdir())),
+            *code_files("gpca.reporting.page.page", "gpca.reporting.script"),
+            *map(str, sorted(Path("gpca/reporting/page/templates").iterdir())),
         ],
     output:
         page="results/{run}/index.html",

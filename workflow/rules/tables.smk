@@ -2,7 +2,7 @@ rule table:
     input:
         unpack(table_inputs),
         code=code_files(
-            "gpca.metrics", "gpca.reporting.tables", "gpca.reporting.script"
+            "gpca.attribution.metrics", "gpca.reporting.tables.explainers", "gpca.reporting.script"
         ),
     output:
         csv=reported("results/{run}/tables/{table}.csv"),

@@ -1,9 +1,9 @@
 """Metrics of every backbone and reduction -> table6_backbones as CSV, Markdown, LaTeX."""
 
+from gpca.attribution.metrics import read_metrics
 from gpca.encoders.registry import make_encoder, parameter_count
-from gpca.metrics import read_metrics
-from gpca.reporting.backbone_table import table6_backbones
 from gpca.reporting.script import job
+from gpca.reporting.tables.backbones import table6_backbones
 
 with job(snakemake):
     given = snakemake.params

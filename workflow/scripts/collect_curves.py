@@ -1,7 +1,7 @@
 """Learning curves -> active_learning.csv."""
 
-from gpca.learning_metrics import collect_curves
-from gpca.metrics import write_metrics
+from gpca.active_learning.metrics import collect_curves
+from gpca.attribution.metrics import write_metrics
 from gpca.reporting.script import job
 
 with job(snakemake):

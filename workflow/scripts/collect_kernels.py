@@ -1,7 +1,7 @@
 """What every kernel and schedule gives -> kernels.csv."""
 
-from gpca.kernel_metrics import collect_grids
-from gpca.metrics import write_metrics
+from gpca.attribution.metrics import write_metrics
+from gpca.classifier.kernel_metrics import collect_grids
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,6 +1,6 @@
 """Prediction files, and what is causal among their samples -> metrics.csv."""
 
-from gpca.metrics import collect, write_metrics
+from gpca.attribution.metrics import collect, write_metrics
 from gpca.reporting.script import job
 
 with job(snakemake):

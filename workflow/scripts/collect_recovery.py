@@ -1,7 +1,7 @@
 """What policies did about failures -> recovery.csv."""
 
-from gpca.metrics import write_metrics
-from gpca.recovery_metrics import collect_recovery
+from gpca.attribution.metrics import write_metrics
+from gpca.recovery.metrics import collect_recovery
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,6 +1,6 @@
 """Timing files -> timings.csv."""
 
-from gpca.metrics import collect_timings, write_metrics
+from gpca.attribution.metrics import collect_timings, write_metrics
 from gpca.reporting.script import job
 
 with job(snakemake):

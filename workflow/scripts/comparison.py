@@ -1,11 +1,11 @@
 """A run's collected numbers beside the printed ones -> comparison.csv and .md."""
 
-from gpca.comparison import Tolerance, compare, measured_on, read_results
+from gpca.comparison.published import read_published
+from gpca.comparison.reasons import read_reasons
+from gpca.comparison.verdicts import Tolerance, compare, measured_on, read_results
 from gpca.files import whole_file
-from gpca.published import read_published
-from gpca.reasons import read_reasons
-from gpca.reporting.comparison_table import comparison_markdown
 from gpca.reporting.script import job
+from gpca.reporting.tables.comparison import comparison_markdown
 
 with job(snakemake):
     given, params = snakemake.input, snakemake.params

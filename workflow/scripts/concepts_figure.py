@@ -1,6 +1,6 @@
 """Objects and registrations of one source -> fig3_concepts."""
 
-from gpca.reporting.concepts_figure import draw_concepts_figure
+from gpca.reporting.figures.concepts import draw_concepts_figure
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,6 +1,6 @@
 """Metrics of every explainer -> fig_attribution_confusions."""
 
-from gpca.reporting.confusions_figure import draw_confusions_figure
+from gpca.reporting.figures.confusions import draw_confusions_figure
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,6 +1,6 @@
 """Objects of one source -> one picture of each."""
 
-from gpca.reporting.contact_sheet import draw_contact_sheet
+from gpca.reporting.figures.contact_sheet import draw_contact_sheet
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,7 +1,7 @@
 """Grids of kernels and schedules -> kernel_learning_curves."""
 
-from gpca.kernel_grid import read_grids
-from gpca.reporting.kernel_figure import draw_kernel_curves
+from gpca.classifier.kernel_grid import read_grids
+from gpca.reporting.figures.kernel_grid import draw_kernel_curves
 from gpca.reporting.script import job
 
 with job(snakemake):

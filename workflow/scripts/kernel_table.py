@@ -1,8 +1,8 @@
 """Grids of kernels and schedules -> the table {table} as CSV, Markdown, LaTeX."""
 
-from gpca.kernel_grid import read_grids
-from gpca.reporting.kernel_tables import KERNEL_TABLES
+from gpca.classifier.kernel_grid import read_grids
 from gpca.reporting.script import job
+from gpca.reporting.tables.kernel_grid import KERNEL_TABLES
 
 with job(snakemake):
     grid = read_grids(snakemake.input.grids)

@@ -1,8 +1,8 @@
 """Diagnostics of the learners -> the table {table} as CSV, Markdown, LaTeX."""
 
-from gpca.metrics import read_metrics
-from gpca.reporting.learner_tables import LEARNER_TABLES
+from gpca.attribution.metrics import read_metrics
 from gpca.reporting.script import job
+from gpca.reporting.tables.learners import LEARNER_TABLES
 
 with job(snakemake):
     metrics = read_metrics(snakemake.input.metrics)

@@ -1,6 +1,6 @@
 """Learning curves of every source and strategy -> active_learning_curves."""
 
-from gpca.reporting.learning_figure import draw_learning_curves
+from gpca.reporting.figures.active_learning import draw_learning_curves
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,8 +1,8 @@
 """Metrics of active learning -> the table {table} as CSV, Markdown, LaTeX."""
 
-from gpca.metrics import read_metrics
-from gpca.reporting.learning_tables import LEARNING_TABLES
+from gpca.attribution.metrics import read_metrics
 from gpca.reporting.script import job
+from gpca.reporting.tables.active_learning import LEARNING_TABLES
 
 with job(snakemake):
     given = snakemake.params

@@ -1,6 +1,6 @@
 """Registrations, embeddings and predictions of GP-CA -> fig2_overview."""
 
-from gpca.reporting.overview_figure import draw_overview
+from gpca.reporting.figures.overview import draw_overview
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from gpca.reporting.page import Run, write_page
+from gpca.reporting.page.page import Run, write_page
 from gpca.reporting.script import job
 
 with job(snakemake):

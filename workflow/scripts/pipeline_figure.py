@@ -1,6 +1,6 @@
 """Registrations, embeddings and predictions of GP-CA, and learning curves -> fig4_pipeline."""
 
-from gpca.reporting.pipeline_figure import draw_pipeline
+from gpca.reporting.figures.pipeline import draw_pipeline
 from gpca.reporting.script import job
 
 with job(snakemake):

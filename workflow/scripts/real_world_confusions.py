@@ -1,6 +1,6 @@
 """Metrics of every backbone -> confusion_real_world."""
 
-from gpca.reporting.real_world_confusions import draw_real_world_confusions
+from gpca.reporting.figures.real_world_confusions import draw_real_world_confusions
 from gpca.reporting.script import job
 
 with job(snakemake):

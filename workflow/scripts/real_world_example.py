@@ -1,6 +1,6 @@
 """Frames, registrations and predictions of one seed -> fig5_real_world_example."""
 
-from gpca.reporting.real_world_example import draw_real_world_example
+from gpca.reporting.figures.real_world_example import draw_real_world_example
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,6 +1,6 @@
 """Registrations and predictions of all seeds -> real_world_failures."""
 
-from gpca.reporting.real_world_failures import draw_real_world_failures
+from gpca.reporting.figures.real_world_failures import draw_real_world_failures
 from gpca.reporting.script import job
 
 with job(snakemake):

@@ -1,9 +1,9 @@
 """What came of recovery -> one of its figures."""
 
-from gpca.metrics import read_metrics
-from gpca.reporting.mitigation_figure import draw_mitigation
-from gpca.reporting.recovery_example import draw_recovery_example
-from gpca.reporting.recovery_figure import draw_recovery_rates
+from gpca.attribution.metrics import read_metrics
+from gpca.reporting.figures.policy import draw_mitigation
+from gpca.reporting.figures.recovery_example import draw_recovery_example
+from gpca.reporting.figures.recovery_rates import draw_recovery_rates
 from gpca.reporting.script import job
 
 with job(snakemake):

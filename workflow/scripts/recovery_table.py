@@ -1,9 +1,9 @@
 """Metrics and seconds of recovery -> table8_recovery as CSV, Markdown, LaTeX."""
 
-from gpca.metrics import read_metrics
-from gpca.recovery_metrics import mean_seconds
-from gpca.reporting.recovery_table import table8_recovery
+from gpca.attribution.metrics import read_metrics
+from gpca.recovery.metrics import mean_seconds
 from gpca.reporting.script import job
+from gpca.reporting.tables.recovery import table8_recovery
 
 with job(snakemake):
     metrics, seconds = read_metrics(snakemake.input.metrics), mean_seconds(snakemake.input.timings)

@@ -1,9 +1,9 @@
 """Seconds of every stage -> runtime."""
 
-from gpca.published import read_published
-from gpca.reporting.runtime_figure import draw_runtime
+from gpca.comparison.published import read_published
+from gpca.model.runtime_file import read_runtime
+from gpca.reporting.figures.runtime import draw_runtime
 from gpca.reporting.script import job
-from gpca.runtime_file import read_runtime
 
 with job(snakemake):
     runtime, numbers = read_runtime(snakemake.input.runtime), read_published(snakemake.input.published)

@@ -1,9 +1,9 @@
 """Seconds of every stage -> table7_runtime as CSV, Markdown, LaTeX."""
 
-from gpca.published import read_published
-from gpca.reporting.runtime_table import table7_runtime
+from gpca.comparison.published import read_published
+from gpca.model.runtime_file import read_runtime
 from gpca.reporting.script import job
-from gpca.runtime_file import read_runtime
+from gpca.reporting.tables.runtime import table7_runtime
 
 with job(snakemake):
     runtime, numbers = read_runtime(snakemake.input.runtime), read_published(snakemake.input.published)

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
-from gpca.metrics import collect, read_metrics
+from gpca.attribution.metrics import collect, read_metrics
 from gpca.reporting.script import job
-from gpca.reporting.tables import TABLES
+from gpca.reporting.tables.explainers import TABLES
 
 with job(snakemake):
     given = snakemake.input

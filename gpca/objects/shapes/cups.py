@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from scipy.interpolate import PchipInterpolator
 
-from gpca.objects.shapes.solids import difference, moved, revolve, tube, union
+from gpca.objects.shapes.solids import difference, move, revolve, tube, union
 
 # Handles as curves from the upper to the lower joint: (share of the reach, share of the way up from the lower joint).
 HANDLES: dict[str, Sequence[tuple[float, float]]] = {
@@ -92,10 +92,10 @@ def build(cup: Cup) -> trimesh.Trimesh:
         parts.append(revolve(np.stack([middle + cup.rim * np.cos(angles), top - lip + cup.rim * np.sin(angles)], -1)))
     if cup.handle:
         handle = _handle(cup, HANDLES[cup.handle], outline)
-        parts += [moved(handle, rotation_xyz_deg=(0, 0, 360 * turn / cup.handles)) for turn in range(cup.handles)]
+        parts += [move(handle, rotation_xyz_deg=(0, 0, 360 * turn / cup.handles)) for turn in range(cup.handles)]
     # Handles reach into the wall, so that the cavity is cut last and trims what would stand out inside.
     recess = revolve([(0, -1), (0.8 * outer[0], -1), (0.76 * outer[0], 0.3 * cup.floor), (0, 0.3 * cup.floor)])
-    return moved(difference(union(*parts), cavity, recess), scale=0.001)
+    return move(difference(union(*parts), cavity, recess), scale=0.001)
 
 
 def _heights(bottom: float, fillet: float, top: float, lip: float) -> np.ndarray:

@@ -24,9 +24,9 @@ from gpca.objects.shapes.solids import (
     hull,
     intersection,
     loft,
-    moved,
+    move,
     revolve,
-    scaled_to,
+    scale_to,
     tube,
     union,
 )
@@ -60,7 +60,7 @@ def benchvise() -> trimesh.Trimesh:
     holes = [cylinder(6, 30, (0, y * 52, 5)) for y in BOTH]
     fixed = [(-75, 72), (-75, 118), (-62, 130), (-30, 132), (-30, 176), (0, 176), (0, 72)]
     sliding = [(30, 96), (30, 176), (58, 176), (66, 148), (74, 136), (74, 90), (40, 90)]
-    blocks = [moved(extrude(side, 56, 2), (0, 28, 0), (90, 0, 0)) for side in (fixed, sliding)]
+    blocks = [move(extrude(side, 56, 2), (0, 28, 0), (90, 0, 0)) for side in (fixed, sliding)]
     jaws = [box((7, 84, 32), (x, 0, 164), 1.5) for x in (3, 27)]
     bar = [box((118, 30, 24), (20, 0, 98), 3), cylinder(11, 150, (20, 0, 120), "x")]
     screw = [cylinder(14, 30, (85, 0, 120), "x"), cylinder(11, 30, (98, 0, 120), "x")]
@@ -77,7 +77,7 @@ def camera() -> trimesh.Trimesh:
     lens = [(0, 0), (35, 0), (35, 14), (32, 16), (32, 40), (34, 42), (34, 66), (32, 68), (32, 86), (29, 88)]
     lens += [(27, 78), (24, 70)]
     glass = [(22 * np.cos(a), 66 + 8 * np.sin(a)) for a in np.linspace(0, np.pi / 2, 8)]
-    barrel = moved(revolve(lens + glass), (12, 0, 40), (0, 90, 0))
+    barrel = move(revolve(lens + glass), (12, 0, 40), (0, 90, 0))
     details = [cylinder(10, 8, (-4, 50, 80)), cylinder(6, 7, (14, -56, 78)), box((14, 18, 4), (-6, 0, 98))]
     eyecup = difference(box((14, 34, 20), (-22, 0, 80), 4), box((10, 22, 11), (-30, 0, 80), 2))
     screen = difference(box((6, 68, 46), (-21, 6, 36), 2), box((4, 60, 38), (-25, 6, 36)))
@@ -90,7 +90,7 @@ def can() -> trimesh.Trimesh:
     outline = [(0, 0), (50, 0), (50, 4), (48, 6), (48, 24), (50, 26), (48, 28), (48, 84), (50, 86), (48, 88)]
     body = revolve([*outline, (48, 112), (50, 114), (50, 118), (0, 118)])
     spout = tube([(0, -40, 22), (0, -66, 62), (0, -82, 108)], [13, 10, 8])
-    rose = moved(revolve([(0, -8), (8, -8), (20, 18), (20, 22), (0, 26)]), (0, -84, 113), (26, 0, 0))
+    rose = move(revolve([(0, -8), (8, -8), (20, 18), (20, 22), (0, 26)]), (0, -84, 113), (26, 0, 0))
     back = tube([(0, 42, 98), (0, 68, 104), (0, 84, 84), (0, 76, 54), (0, 42, 34)], 6, side=(1, 0, 0), aspect=1.5)
     bow = tube(
         [(-44, 0, 100), (-46, 0, 140), (-30, 0, 178), (0, 0, 192), (30, 0, 178), (46, 0, 140), (44, 0, 100)],
@@ -112,7 +112,7 @@ def cat() -> trimesh.Trimesh:
             tube([(-2, y * 15, 14), (-2, y * 22, 28), (-3, y * 27, 41)], [13, 9, 2], side=(1, 0, 0), aspect=0.6)
         )
         head.append(ellipsoid((5, 6, 7), (22, y * 10, 5)))
-    head = [moved(part, (4, 36, 78), (0, 0, 40)) for part in head]
+    head = [move(part, (4, 36, 78), (0, 0, 40)) for part in head]
     body = [ellipsoid((18, 37, 19), (0, -12, 44)), ellipsoid((17, 18, 22), (1, 16, 52))]
     for x in BOTH:
         body.append(tube([(x * 10, 18, 42), (x * 13, 24, 20), (x * 14, 24, 6)], [11, 8.5, 8]))
@@ -138,7 +138,7 @@ def driller() -> trimesh.Trimesh:
         (0, 130),
     ]
     chuck = [(0, 126), (21, 126), (22, 130), (22, 152), (20, 156), (10, 182), (7, 186), (0, 186)]
-    head = moved(union(revolve(motor), revolve(chuck), cylinder(3, 24, (0, 0, 194))), (-70, 0, 172), (0, 90, 0))
+    head = move(union(revolve(motor), revolve(chuck), cylinder(3, 24, (0, 0, 194))), (-70, 0, 172), (0, 90, 0))
     ribs = [box((3, 40, 66), (x, 0, 172), 1) for x in (-52, -44, -36)]
     grip = tube([(-6, 0, 160), (-14, 0, 100), (-18, 0, 40)], [27, 21, 24], side=(1, 0, 0), aspect=1.15)
     trigger = hull(box((14, 14, 30), (22, 0, 128), 4), box((10, 14, 14), (12, 0, 110), 4))
@@ -169,10 +169,10 @@ def duck() -> trimesh.Trimesh:
 def eggbox() -> trimesh.Trimesh:
     """Closed box for two rows of three eggs: cups below, rim, bevelled lid with bulges above."""
     nests = [(x, y) for x in (-48, 0, 48) for y in (-25, 25)]
-    cups = [moved(revolve([(0, 0), (15, 0), (19, 4), (26, 36), (0, 36)]), (x, y, 0)) for x, y in nests]
+    cups = [move(revolve([(0, 0), (15, 0), (19, 4), (26, 36), (0, 36)]), (x, y, 0)) for x, y in nests]
     lower = [*cups, box((120, 74, 16), (0, 0, 28))]
-    rim = moved(extrude(_rectangle(150, 107), 5, 26), (0, 0, 35))
-    lid = hull(moved(extrude(_rectangle(144, 100), 4, 24), (0, 0, 38)), box((112, 68, 10), (0, 0, 63), 4))
+    rim = move(extrude(_rectangle(150, 107), 5, 26), (0, 0, 35))
+    lid = hull(move(extrude(_rectangle(144, 100), 4, 24), (0, 0, 38)), box((112, 68, 10), (0, 0, 63), 4))
     bulges = [ellipsoid((25, 25, 27), (x * 1.02, y * 1.02, 40)) for x, y in nests]
     top = blend(lid, *bulges, edge=6, rounds=3)
     label = box((70, 44, 2), (0, 0, 68), 0.8)
@@ -183,7 +183,7 @@ def glue() -> trimesh.Trimesh:
     """Flat glue bottle with sloping shoulders, a nub at the side and a stepped nozzle."""
     half = [(30, 0), (37, 4), (38, 40), (36, 66), (30, 90), (20, 118), (14, 126)]
     outline = half + [(-y, z) for y, z in reversed(half)]
-    bottle = moved(extrude(outline, 37, 4, 8), (-18.5, 0, 0), (90, 0, 90))
+    bottle = move(extrude(outline, 37, 4, 8), (-18.5, 0, 0), (90, 0, 90))
     nub = hull(*(cylinder(r, 14, (0, y, z), "x") for r, y, z in ((6, -30, 104), (5, -18, 96), (4, -18, 112))))
     nozzle = [(0, 118), (13, 118), (13, 130), (11, 132), (11, 142), (8, 145), (5.5, 166), (5.5, 172), (0, 173)]
     ribs = [cylinder(1.4, 10, (12.6 * np.cos(a), 12.6 * np.sin(a), 125)) for a in np.arange(16) * np.pi / 8]
@@ -196,14 +196,14 @@ def holepuncher() -> trimesh.Trimesh:
     tray = union(box((96, 106, 9), (0, 0, 4.5), 3), box((60, 96, 14), (-10, 0, 14), 3))
     paper_slot = box((46, 120, 3), (22, 0, 15))
     cheek = [(-40, 8), (-40, 36), (-28, 48), (-8, 44), (18, 22), (20, 8)]
-    cheeks = [moved(extrude(cheek, 8, 3), (0, 4 + y * 42, 0), (90, 0, 0)) for y in BOTH]
+    cheeks = [move(extrude(cheek, 8, 3), (0, 4 + y * 42, 0), (90, 0, 0)) for y in BOTH]
     punches = [cylinder(6, 44, (8, y * 28, 30)) for y in BOTH]
     springs = [revolve([(6, z - 1.5), (9, z - 1), (9, z + 1), (6, z + 1.5)]) for z in (26, 31, 36, 41)]
-    springs = [moved(spring, (8, y * 28, 0)) for spring in springs for y in BOTH]
+    springs = [move(spring, (8, y * 28, 0)) for spring in springs for y in BOTH]
     axle = [cylinder(4, 100, (-30, 0, 36), "y")]
     flanges = [box((84, 8, 20), (0, y * 44, -8), 3) for y in BOTH]
     lever = union(box((104, 96, 8), (10, 0, 0), 3.5), box((12, 96, 18), (58, 0, -4), 5), *flanges)
-    lever = moved(difference(lever, box((10, 34, 60), (28, 0, 0), 4)), (-4, 0, 62), (0, -28, 0))
+    lever = move(difference(lever, box((10, 34, 60), (28, 0, 0), 4)), (-4, 0, 62), (0, -28, 0))
     return union(difference(tray, paper_slot), *cheeks, *punches, *springs, *axle, lever)
 
 
@@ -238,10 +238,10 @@ def lamp() -> trimesh.Trimesh:
     shade += [(45, 38), (26, 0), (0, 0)]
     bulb = [(0, -6), (11, -6), (11, 8), (13, 12)]
     bulb += [(22 * np.cos(a), 32 + 22 * np.sin(a)) for a in np.linspace(-0.9, np.pi / 2, 12)]
-    slits = [moved(box((8, 3, 20), (24, 0, -44)), rotation_xyz_deg=(0, 0, turn)) for turn in range(0, 360, 45)]
+    slits = [move(box((8, 3, 20), (24, 0, -44)), rotation_xyz_deg=(0, 0, turn)) for turn in range(0, 360, 45)]
     rings = [revolve([(20, z), (27, z), (27, z + 4), (20, z + 4)]) for z in (-26, -16)]
     head = union(difference(revolve(shade), *slits), revolve(bulb), *rings)
-    return union(*foot, post, fin, moved(head, (4, 0, 152), (0, 100, 0)))
+    return union(*foot, post, fin, move(head, (4, 0, 152), (0, 100, 0)))
 
 
 def phone() -> trimesh.Trimesh:
@@ -251,7 +251,7 @@ def phone() -> trimesh.Trimesh:
     body = union(box((28, 52, 158), (8, 0, 79), 10), cylinder(8, 5, (22, 0, 88), "x"), *keys)
     slots = [box((8, 18, 2.4), (22, 0, z)) for z in (139, 144, 149)]
     handset = difference(body, box((8, 36, 30), (22, 0, 116), 2), *slots)
-    handset = moved(handset, (-8, -40, 16), (0, -14, 0))
+    handset = move(handset, (-8, -40, 16), (0, -14, 0))
     dial = [cylinder(9, 20, (8, 36, 34)), *(box((8, 12, 4), (-16, y, 47), 1.5) for y in (20, 48))]
     return union(base, handset, *dial)
 
@@ -280,8 +280,8 @@ DRAWN = {  # name: (drawing, extents mm, diameter mm)
 def build(name: str) -> trimesh.Trimesh:
     """Mesh of one object in metres, foot at z = 0."""
     draw, extents_mm, diameter_mm = DRAWN[name]
-    mesh = scaled_to(draw(), np.multiply(extents_mm, 0.001), diameter_mm * 0.001)
-    return moved(mesh, (0, 0, -mesh.bounds[0, 2]))
+    mesh = scale_to(draw(), np.multiply(extents_mm, 0.001), diameter_mm * 0.001)
+    return move(mesh, (0, 0, -mesh.bounds[0, 2]))
 
 
 OBJECTS: dict[str, Callable[[], trimesh.Trimesh]] = {name: partial(build, name) for name in DRAWN}

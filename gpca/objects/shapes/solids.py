@@ -145,7 +145,7 @@ def blend(*meshes: trimesh.Trimesh, edge: float, rounds: int = 10) -> trimesh.Tr
     return _trimesh(_manifold(filter_laplacian(joined, iterations=rounds)).simplify(edge / 30))
 
 
-def moved(mesh: trimesh.Trimesh, translation: Point = (0, 0, 0), rotation_xyz_deg: Point = (0, 0, 0), scale: float = 1):
+def move(mesh: trimesh.Trimesh, translation: Point = (0, 0, 0), rotation_xyz_deg: Point = (0, 0, 0), scale: float = 1):
     """Copy of the mesh, scaled, then turned about the fixed axes x, y, z through the origin, then shifted."""
     x, y, z = np.radians(rotation_xyz_deg)
     transform = euler_matrix(x, y, z, axes="sxyz")
@@ -154,7 +154,7 @@ def moved(mesh: trimesh.Trimesh, translation: Point = (0, 0, 0), rotation_xyz_de
     return mesh.copy().apply_transform(transform)
 
 
-def scaled_to(mesh: trimesh.Trimesh, extents: Point | None = None, diameter: float | None = None) -> trimesh.Trimesh:
+def scale_to(mesh: trimesh.Trimesh, extents: Point | None = None, diameter: float | None = None) -> trimesh.Trimesh:
     """Copy scaled about the origin, per axis to `extents` and then evenly to `diameter`; at least one is given."""
     scaled = mesh.copy()
     if extents is not None:

@@ -23,9 +23,9 @@ from gpca.objects.shapes.solids import (
     extrude,
     hull,
     loft,
-    moved,
+    move,
     revolve,
-    scaled_to,
+    scale_to,
     tube,
     union,
 )
@@ -45,7 +45,7 @@ def _can(radius: float, height: float, ribs: int = 0) -> trimesh.Trimesh:
 def _pull_tab(at: tuple[float, float, float], turn_deg: float = 0) -> trimesh.Trimesh:
     ring = revolve([(7, 0), (10.5, 0), (10.5, 2.2), (7, 2.2)])
     tab = union(ring, box((12, 8, 2.2), (12, 0, 1.1)))
-    return moved(tab, at, (0, 0, turn_deg))
+    return move(tab, at, (0, 0, turn_deg))
 
 
 def _rectangle(x: float, y: float) -> list[tuple[float, float]]:
@@ -73,8 +73,8 @@ def _bottle(stations: list[tuple[float, float, float, float, float]]) -> trimesh
 
 def _potted_meat_can() -> trimesh.Trimesh:
     body = extrude(_rectangle(96, 51.5), 80, rounding=19)
-    seams = [moved(extrude(_rectangle(101.5, 57.4), 4, rounding=21), (0, 0, z)) for z in (0, 79.5)]
-    lids = [moved(extrude(_rectangle(94, 50), 9, rounding=18), (0, 0, z)) for z in (-7, 79.5)]
+    seams = [move(extrude(_rectangle(101.5, 57.4), 4, rounding=21), (0, 0, z)) for z in (0, 79.5)]
+    lids = [move(extrude(_rectangle(94, 50), 9, rounding=18), (0, 0, z)) for z in (-7, 79.5)]
     return union(difference(union(body, *seams), *lids), _pull_tab((26, 6, 79), 200))
 
 
@@ -112,7 +112,7 @@ def _bleach_cleanser() -> trimesh.Trimesh:
         ]
     )  # fmt: skip
     cap = revolve([(0, 226), (12.5, 226), (12.5, 232), (15, 232), (15, 240), (13.5, 241), (13, 250.6), (0, 250.6)])
-    return union(body, moved(cap, (60.5, 0, 0)))
+    return union(body, move(cap, (60.5, 0, 0)))
 
 
 def _mustard_bottle() -> trimesh.Trimesh:
@@ -144,7 +144,7 @@ def _mug() -> trimesh.Trimesh:
 def _power_drill() -> trimesh.Trimesh:
     """Lies on its side: the chuck points to -y, the grip to +x, the battery at its end."""
     spin = [(0, 0), (9, 0), (13, 4), (19, 24), (21, 26), (21, 46), (23, 50), (23, 64), (0, 64)]
-    chuck = moved(revolve(spin), (28, 0, 28.5), (-90, 0, 0))
+    chuck = move(revolve(spin), (28, 0, 28.5), (-90, 0, 0))
     gearbox = tube(
         [(28, 52, 28.5), (29, 70, 28.5), (31, 100, 28.5), (31, 120, 28.5)], [23.5, 26, 26, 24], side=(1, 0, 0)
     )
@@ -161,13 +161,13 @@ def _power_drill() -> trimesh.Trimesh:
 def _scissors() -> trimesh.Trimesh:
     """Lie flat, points to +y: two thin blades crossed at the pivot, two thick finger loops of unequal size."""
     blades = [
-        moved(extrude([(24, 96), (42, 108), (38, 120), (8, 197), (4, 198), (12, 160)], 2.8), (0, 0, 7.9)),
-        moved(extrude([(26, 106), (44, 100), (40, 118), (15, 190), (10, 191), (16, 160)], 2.8), (0, 0, 5.2)),
+        move(extrude([(24, 96), (42, 108), (38, 120), (8, 197), (4, 198), (12, 160)], 2.8), (0, 0, 7.9)),
+        move(extrude([(26, 106), (44, 100), (40, 118), (15, 190), (10, 191), (16, 160)], 2.8), (0, 0, 5.2)),
     ]
     loops = [
         difference(
             extrude(_ellipse(x, y, at, turn), 15, rounding_z=3.4),
-            moved(extrude(_ellipse(x - 7, y - 7, at, turn), 30), (0, 0, -5)),
+            move(extrude(_ellipse(x - 7, y - 7, at, turn), 30), (0, 0, -5)),
         )
         for x, y, at, turn in ((21.5, 29.5, (25, 30), -4), (19, 33, (66, 41), 14))
     ]
@@ -183,7 +183,7 @@ def _marker() -> trimesh.Trimesh:
         (0, 0), (4, 0), (4.3, 5), (8.6, 6), (9.4, 8), (9.5, 30), (8.8, 30.5), (8.8, 33), (9.2, 34), (9.2, 119),
         (8.6, 120.8), (5, 120.8), (5, 116), (0, 116),
     ]  # fmt: skip
-    return moved(revolve(profile), (0, 0, 9.5), (-90, 0, 0))
+    return move(revolve(profile), (0, 0, 9.5), (-90, 0, 0))
 
 
 def _clamp(
@@ -204,7 +204,7 @@ def _clamp(
     mouth = np.array(mouth_upper + [(x, -y) for x, y in reversed(mouth_upper)]) * (jaw, jaw_half)
     jaws = difference(
         extrude(outline, thick, rounding=2, rounding_z=4),
-        moved(extrude(mouth, 2 * thick, rounding=2), (0, 0, -thick / 2)),
+        move(extrude(mouth, 2 * thick, rounding=2), (0, 0, -thick / 2)),
     )
     grips = [
         hull(
@@ -251,7 +251,7 @@ _DRAWINGS: dict[str, tuple[Callable[[], trimesh.Trimesh], tuple[float, float, fl
 
 def _built(name: str) -> trimesh.Trimesh:
     draw, extents_mm = _DRAWINGS[name]
-    return scaled_to(draw(), np.array(extents_mm) / 1000)
+    return scale_to(draw(), np.array(extents_mm) / 1000)
 
 
 OBJECTS: dict[str, Callable[[], trimesh.Trimesh]] = {name: partial(_built, name) for name in _DRAWINGS}

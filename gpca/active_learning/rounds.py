@@ -1,0 +1,179 @@
+"""Learning a concept that the classifier has never seen from few labels (paper Sec. III-C and IV-C).
+
+A GPC that knows two concepts meets a pool with all three. In rounds, a strategy picks B samples, their labels join the
+labelled ones and the GPC is retrained; its accuracy on the test samples over the labels spent is the learning curve.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from gpca.active_learning.acquisition import Pool, require_strategy, select
+from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.latents import Projection
+from gpca.errors import InputError
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.seeds import generator
+
+
+@dataclass(frozen=True)
+class ActiveLearningSettings:
+    """How the rounds go; the same for every strategy.
+
+    Attributes:
+        initial: labelled samples of the known concepts before the first query, balanced.
+        labels: L, the budget of queries.
+        batch: B, labels per round.
+        iterations, tolerance: the most passes over the labels in a retraining, and when it ends before.
+        gpc: the classifier that knows two concepts; its kernel and inducing inputs stay from then on.
+    """
+
+    initial: int = 120
+    labels: int = 60
+    batch: int = 4
+    iterations: int = 100
+    tolerance: float = 1e-3
+    gpc: GPCSettings = field(default_factory=lambda: GPCSettings(learning_rate=0.1))
+
+
+Inputs = TypeVar("Inputs", np.ndarray, Projection)
+
+
+@dataclass(frozen=True)
+class Samples(Generic[Inputs]):
+    """N embeddings (N, d), later their :class:`Projection`, and their concepts (N,)."""
+
+    h: Inputs
+    concept_N: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.concept_N)
+
+
+@dataclass(frozen=True)
+class Task(Generic[Inputs]):
+    """What one experiment starts from: the concept held out, labelled samples of the others, pool and test samples."""
+
+    held_out: str
+    initial: Samples
+    pool: Samples
+    test: Samples
+
+    def project(self, gpc: GPC) -> Task[Projection]:
+        """Return the task with every embedding as the GPC's kernel sees it."""
+        parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
+        return Task(self.held_out, *parts)
+
+
+def make_task(
+    registrations: Registrations,
+    held_out: str,
+    settings: ActiveLearningSettings,
+    *axes: object,
+    new_share: float | None = None,
+) -> Task[np.ndarray]:
+    """Split the training samples into those labelled at the start and the pool, which holds all the rest.
+
+    Args:
+        registrations: with embeddings attached.
+        held_out: the concept of which no sample is labelled at the start.
+        axes: names of the draw (source, seed).
+        new_share: share, below 1, of the pool that is of that concept, or as much of it as there is; by default all of
+            its training samples are in the pool.
+
+    Raises:
+        InputError: too few training samples.
+    """
+    train = generator(*axes, "initial", held_out).permutation(registrations.rows("train"))
+    concept_S = registrations.concept
+    known = [concept for concept in CONCEPTS if concept != held_out]
+    each = settings.initial // len(known)
+    initial = np.concatenate([train[concept_S[train] == concept][:each] for concept in known])
+    pool = np.setdiff1d(train, initial)
+    new = pool[concept_S[pool] == held_out]
+    if new_share is not None:
+        kept = round((len(pool) - len(new)) * new_share / (1 - new_share))
+        new_kept = generator(*axes, "rare", held_out).permutation(new)[:kept]
+        pool, new = np.setdiff1d(pool, np.setdiff1d(new, new_kept)), new_kept
+    if len(initial) < each * len(known) or len(pool) == len(new) or not len(new):
+        raise InputError(
+            f"active learning with {settings.initial} labelled samples of {' and '.join(known)}",
+            f"leaves no pool of {len(train)} training samples",
+            "lower active_learning.initial or raise registrations.train",
+        )
+    rows = (initial, pool, registrations.rows("test"))
+    return Task(held_out, *(Samples(registrations.embedding[part], concept_S[part]) for part in rows))
+
+
+def initial_gpc(task: Task[np.ndarray], settings: ActiveLearningSettings, *axes: object) -> GPC:
+    """Fit the GPC that knows two of its three concepts.
+
+    Scaling, inducing inputs and lengthscale are initialised on the unlabelled pool too: it lies open, and inducing
+    inputs at the labelled samples alone would leave none where the new concept is.
+    """
+    gpc = GPC(CONCEPTS, settings.gpc, *axes, "active_learning", task.held_out)
+    around = np.concatenate([task.initial.h, task.pool.h])
+    gpc.fit(task.initial.h, task.initial.concept_N, around)
+    gpc.level()
+    return gpc
+
+
+def run_rounds(
+    task: Task[Projection], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
+) -> list[dict[str, float]]:
+    """Spend the budget by one strategy.
+
+    Args:
+        task: projected by `gpc`.
+        gpc: of :func:`initial_gpc`; it is left as it is.
+        axes: names of the draws (source, seed, …).
+
+    Returns:
+        a step per round, the first before any label: ``labels`` spent, ``new_labels`` of the concept held out,
+        ``accuracy`` on all test samples, ``accuracy_new`` on those of the concept held out, and ``epochs`` of the
+        retraining.
+    """
+    random = generator(*axes, "active_learning", task.held_out, strategy)
+    gpc = copy(gpc)
+    left = np.arange(len(task.pool))
+    queried: list[int] = []
+    steps = [_step(task, gpc, queried, epochs=0)]
+    while len(queried) < settings.labels and len(left):
+        pool = pool_of(task, gpc, left, queried, require_strategy(strategy).needs_scores)
+        chosen = left[select(strategy, pool, min(settings.batch, settings.labels - len(queried)), random)]
+        epochs = gpc.update(task.pool.h[chosen], task.pool.concept_N[chosen], settings.iterations, settings.tolerance)
+        queried += chosen.tolist()
+        left = np.setdiff1d(left, chosen)
+        steps.append(_step(task, gpc, queried, epochs))
+    return steps
+
+
+def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
+    """Return what a strategy chooses from: the rows `left` of the pool, and what the GPC makes of them."""
+    h = task.pool.h[left]
+    scores_N_C, _, bald_N = gpc.attribute(h) if needs_scores else (np.empty((len(left), 0)), None, np.empty(len(left)))
+    labelled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])
+    return Pool(h.inputs_N_d, scores_N_C, bald_N, labelled, task.pool.concept_N[left])
+
+
+def _step(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
+    accuracy, accuracy_new = accuracies(task, gpc)
+    return {
+        "labels": len(queried),
+        "new_labels": int(np.sum(task.pool.concept_N[queried] == task.held_out)) if queried else 0,
+        "accuracy": accuracy,
+        "accuracy_new": accuracy_new,
+        "epochs": epochs,
+    }
+
+
+def accuracies(task: Task[Projection], gpc: GPC) -> tuple[float, float]:
+    """Return the accuracy over all test samples and over those of the concept held out; NaN of none."""
+    right_N = np.array(gpc.classes)[gpc.attribute(task.test.h)[0].argmax(axis=1)] == task.test.concept_N
+    new_N = task.test.concept_N == task.held_out
+    return float(right_N.mean()), float(right_N[new_N].mean()) if new_N.any() else float("nan")

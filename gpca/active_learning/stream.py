@@ -1,0 +1,131 @@
+"""The online form of active learning: samples arrive one at a time, and a label is asked for where it is worth it.
+
+The paper's loop (Sec. III-C and Fig. 4) as Narr et al. (2016) and CLEVER (2025) run it: the GPC names a concept as a
+sample arrives; where its uncertainty passes a threshold, and the budget allows, it asks for the label and learns.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.active_learning.rounds import ActiveLearningSettings, Task, accuracies
+from gpca.classifier.gpc import GPC
+from gpca.classifier.latents import Projection
+from gpca.errors import InputError
+from gpca.seeds import generator
+
+
+@dataclass(frozen=True)
+class StreamSettings:
+    """How samples arrive and how many labels may be asked for.
+
+    Attributes:
+        arrivals: length of the stream.
+        quiet: arrivals before the first of the new concept; after them it is a third of what arrives.
+        budget: share of the arrivals that may be asked about; a threshold keeps to it on average.
+        window: arrivals whose BALD sets the threshold, and over which the running accuracy is taken.
+        every: arrivals between two rows of the result.
+    """
+
+    arrivals: int = 300
+    quiet: int = 60
+    budget: float = 0.1
+    window: int = 50
+    every: int = 10
+
+
+def arrival_order(task: Task, stream: StreamSettings, *axes: object) -> np.ndarray:
+    """Return the rows of the pool in the order of arrival: known concepts alone while `quiet`, then all in equal parts.
+
+    Raises:
+        InputError: the pool is too small for such a stream.
+    """
+    random = generator(*axes, "stream", task.held_out)
+    order = random.permutation(len(task.pool))
+    is_new = task.pool.concept_N[order] == task.held_out
+    new, known = order[is_new], order[~is_new]
+    mixed = stream.arrivals - stream.quiet
+    n_new = round(mixed / len(np.unique(task.pool.concept_N)))
+    if n_new > len(new) or stream.arrivals - n_new > len(known) or n_new < 1:
+        raise InputError(
+            f"a stream of {stream.arrivals} arrivals",
+            f"needs more than a pool of {len(known)} known and {len(new)} new samples",
+            "lower active_learning.stream.arrivals",
+        )
+    rest = known[stream.quiet : stream.arrivals - n_new]
+    return np.concatenate([known[: stream.quiet], random.permutation(np.concatenate([new[:n_new], rest]))])
+
+
+def run_stream(
+    task: Task[Projection],
+    gpc: GPC,
+    strategy: str,
+    settings: ActiveLearningSettings,
+    stream: StreamSettings,
+    *axes: object,
+) -> list[dict[str, float]]:
+    """Let the samples arrive, ask about some, learn at once.
+
+    ``stream_bald`` asks where BALD exceeds a quantile of the last `window` arrivals, raised or lowered to stay within
+    the budget (Balanced Incremental Quantile Filter, Kottke et al. 2015); ``stream_random`` asks at random.
+
+    Args:
+        task: projected by `gpc`.
+        gpc: of :func:`gpca.active_learning.rounds.initial_gpc`; it is left as it is.
+
+    Returns:
+        every so many arrivals: ``arrived``; ``present``, whether the quiet time is over; ``labels``
+        asked for, ``new_labels`` of the new concept; ``running`` accuracy over the last `window` arrivals, each judged
+        before its label is known; ``accuracy`` and ``accuracy_new`` on the test samples.
+    """
+    from skactiveml.stream import StreamRandomSampling
+    from skactiveml.stream.budgetmanager import BalancedIncrementalQuantileFilter
+
+    random = generator(*axes, "stream", task.held_out, strategy)
+    if strategy == "stream_random":
+        seed = int(random.integers(2**31))
+        manager = StreamRandomSampling(budget=stream.budget, allow_exceeding_budget=False, random_state=seed)
+    else:
+        manager = BalancedIncrementalQuantileFilter(w=stream.window, w_tol=stream.window, budget=stream.budget)
+    gpc = copy(gpc)
+    right: list[bool] = []
+    asked: list[int] = []
+    steps = [_row(task, gpc, right, asked, stream)]
+    for row in arrival_order(task, stream, *axes):
+        h, concept = task.pool.h[[row]], task.pool.concept_N[row]
+        scores_1_C, _, bald_1 = gpc.attribute(h)
+        right.append(gpc.classes[int(scores_1_C.argmax())] == concept)
+        if _asks(manager, bald_1):
+            asked.append(row)
+            gpc.update(h, task.pool.concept_N[[row]], settings.iterations, settings.tolerance)
+        if len(right) % stream.every == 0:
+            steps.append(_row(task, gpc, right, asked, stream))
+    return steps
+
+
+def _asks(manager, bald_1: np.ndarray) -> bool:
+    if hasattr(manager, "query_by_utility"):
+        queried = manager.query_by_utility(bald_1)
+        manager.update(bald_1[:, None], queried, bald_1)
+    else:
+        queried = manager.query(bald_1[:, None])
+        manager.update(bald_1[:, None], queried)
+    return len(queried) > 0
+
+
+def _row(
+    task: Task[Projection], gpc: GPC, right: list[bool], asked: list[int], stream: StreamSettings
+) -> dict[str, float]:
+    accuracy, accuracy_new = accuracies(task, gpc)
+    return {
+        "arrived": len(right),
+        "present": int(len(right) >= stream.quiet),
+        "labels": len(asked),
+        "new_labels": int(np.sum(task.pool.concept_N[asked] == task.held_out)) if asked else 0,
+        "running": float(np.mean(right[-stream.window :])) if right else float("nan"),
+        "accuracy": accuracy,
+        "accuracy_new": accuracy_new,
+    }

@@ -1,0 +1,58 @@
+"""ICP of one source to one target from many initial poses, with everything that the runs share worked out once.
+
+Point-to-point runs are our own compiled loop with Open3D's steps and stopping rule, and end at Open3D's poses wherever
+the correspondences determine one (tests/alignment/test_batched_icp.py). Open3D builds a tree of the target for every
+initial pose and searches it for every point in every iteration; `benchmarks/explainers.py` measures both. The other
+methods call Open3D once per initial pose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.alignment.icp import ICP, ICPSettings, require_cloud
+from gpca.alignment.icp_kernels import align_all, make_target
+
+
+class BatchedICP:
+    """ICP to one target.
+
+    Args:
+        target: (P, 3) points, any unit; results come in the same unit.
+        settings: the correspondence distance is in the unit of the points.
+        target_normals: (P, 3), needed by point-to-plane and generalized ICP.
+
+    Raises:
+        InputError: fewer than three points, or NaN.
+    """
+
+    def __init__(self, target: np.ndarray, settings: ICPSettings, target_normals: np.ndarray | None = None) -> None:
+        require_cloud("target cloud", target)
+        self._settings = settings
+        if settings.method == "point_to_point":
+            self._target = make_target(target, settings.correspondence_distance)
+        else:
+            self._icp = ICP(target, target_normals, settings)
+
+    def register(
+        self, source: np.ndarray, T_target_source_init_n: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Align `source` (N, 3) from n initial poses (n, 4, 4).
+
+        Returns:
+            T_target_source (n, 4, 4), fitness (n,), inlier RMSE (n,), as
+            :class:`gpca.alignment.icp.Registration` has them.
+
+        Raises:
+            InputError: fewer than three points, or NaN.
+        """
+        require_cloud("source cloud", source)
+        poses_n = np.array(T_target_source_init_n, np.float64)
+        if self._settings.method == "point_to_point":
+            fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
+            source = np.ascontiguousarray(source, np.float64)
+            align_all(source, self._target, poses_n, fitness_n, rmse_n, self._settings.max_iterations)
+            return poses_n, fitness_n, rmse_n
+        runs = [self._icp.register(source, pose) for pose in poses_n]
+        fitness_n, rmse_n = np.array([(run.fitness, run.inlier_rmse) for run in runs]).T
+        return np.array([run.T_target_source for run in runs]), fitness_n, rmse_n

@@ -1,0 +1,59 @@
+"""The canonical frame of a target, in which encoders are trained: centred on its bounding box, in diameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.objects.canonical import FEWEST_CLOUD_POINTS, diameter, require_points, require_size
+from gpca.objects.mesh_folder import metres_per
+from gpca.seeds import generator
+
+MEASURED_POINTS = 10_000  # by which the frame of a larger cloud is measured: all of them may lie on its hull
+
+
+@dataclass(frozen=True)
+class CanonicalFrame:
+    """Where the origin lies, the centre of the upright bounding box, and the unit: the diameter."""
+
+    centre_3: np.ndarray
+    diameter: float
+
+    @classmethod
+    def of(cls, points: np.ndarray, unit: str = "m", subject: object = "target") -> CanonicalFrame:
+        """Measure the points (N, 3) of a target.
+
+        Raises:
+            InputError: too few points, NaN, points on one line, or a diameter that the unit does not give.
+        """
+        require_cloud_points(points, subject)
+        points = thin(points, MEASURED_POINTS, "frame")
+        size = diameter(points, subject)
+        require_size(size * metres_per(unit), subject)
+        return cls((points.min(axis=0) + points.max(axis=0)) / 2, size)
+
+    def coordinates(self, points: np.ndarray) -> np.ndarray:
+        """Return points (N, 3) in this frame."""
+        return (points - self.centre_3) / self.diameter
+
+    def pose_outside(self, T_b_a: np.ndarray) -> np.ndarray:
+        """Return a motion (4, 4) of this frame as one of the points that it was measured on."""
+        outside = T_b_a.copy()
+        outside[:3, 3] = self.diameter * T_b_a[:3, 3] + self.centre_3 - T_b_a[:3, :3] @ self.centre_3
+        return outside
+
+
+def require_cloud_points(points: np.ndarray, subject: object) -> None:
+    """Raise an InputError unless the points are (N, 3), finite, and as many as the encoders have seen at least."""
+    require_points(points, subject)
+    if len(points) < FEWEST_CLOUD_POINTS:
+        raise InputError(subject, f"holds {len(points)} points", f"give {FEWEST_CLOUD_POINTS} or more")
+
+
+def thin(points: np.ndarray, most: int, *axes: object) -> np.ndarray:
+    """Return the points (N, 3), or `most` of them, drawn at random by the named axes."""
+    if len(points) <= most:
+        return points
+    return points[generator("thinned", *axes).choice(len(points), most, replace=False, shuffle=False)]

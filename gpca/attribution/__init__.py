@@ -1,0 +1,1 @@
+"""What explainers say of registrations: scores, the prediction file, metrics, diagnostics."""

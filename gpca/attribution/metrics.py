@@ -1,0 +1,229 @@
+"""From predictions to numbers: over the test rows of every source, explainer and seed, as one tidy table.
+
+An abstained sample counts as wrong, so that an explainer cannot gain by staying silent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.predictions import TIMING_COLUMNS, concepts_of, read_predictions, require_samples
+from gpca.errors import InputError
+from gpca.files import numbers, read_csv
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ALL = "all"  # stands for every concept together in the column `concept`
+TIDY_COLUMNS = ("table", "source", "method", "metric", "concept", "seed", "value")
+PREDICTED_AS, ABSTAINED = "predicted_as_", "abstained"  # metrics of the confusion: predicted_as_<concept or abstained>
+CAUSAL_QUANTILE = 0.95  # of the clean uncertainties: what lies above is not the scatter of clean registrations
+_CAUSAL_COLUMNS = ("sample", "split", "uncertainty_observed", "uncertainty_clean")
+
+
+def accuracy(concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray) -> float:
+    """Return the share in [0, 1] of the S samples whose concept was named and right; S = 0 raises ValueError."""
+    if len(concept_true_S) == 0:
+        raise ValueError("accuracy of no samples")
+    return float(np.mean((concept_true_S == concept_predicted_S) & ~abstained_S))
+
+
+def concept_accuracy(
+    concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Iterable[str]
+) -> dict[str, float]:
+    """Return for each concept the accuracy over the samples that truly are of it (its recall).
+
+    A concept without samples is left out: its accuracy is not defined.
+    """
+    of_concept = {concept: concept_true_S == concept for concept in concepts}
+    return {
+        concept: accuracy(concept_true_S[mask], concept_predicted_S[mask], abstained_S[mask])
+        for concept, mask in of_concept.items()
+        if mask.any()
+    }
+
+
+def confusion(
+    concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Iterable[str]
+) -> np.ndarray:
+    """Return counts (C, C + 1): rows the true concepts, columns the predicted ones and, last, the abstained."""
+    concepts = list(concepts)
+    columns = [(concept_predicted_S == concept) & ~abstained_S for concept in concepts] + [abstained_S]
+    return np.array([[np.sum(column & (concept_true_S == true)) for column in columns] for true in concepts])
+
+
+def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
+    """Return the largest accuracy over all one-to-one relabellings of the predicted concepts.
+
+    Far above the plain accuracy it shows that an explainer tells the concepts apart but names them wrongly: an
+    artefact of sign or scale. It looks at the truth, so it is an upper bound and never a result: of many balanced
+    guesses it is slightly above 1/C. Solved as an assignment (Kuhn 1955).
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    named_C_C = confusion_C_C1[:, :-1]
+    return float(named_C_C[linear_sum_assignment(named_C_C, maximize=True)].sum() / confusion_C_C1.sum())
+
+
+def mean_interval(values_R: Iterable[float], level: float = 0.95) -> tuple[float, float, float]:
+    """Return the mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R.
+
+    The bounds are symmetric about the mean and not clipped, as the function does not know what the values are.
+    One repeat has NaN bounds; none raises ValueError. No repeat is ever dropped: a NaN makes all three NaN.
+    """
+    from scipy.stats import t as student_t
+
+    values_R = np.asarray(list(values_R), dtype=float)
+    if values_R.size == 0:
+        raise ValueError("interval of no repeats")
+    mean = float(values_R.mean())
+    if values_R.size == 1:
+        return mean, np.nan, np.nan
+    standard_error = values_R.std(ddof=1) / np.sqrt(values_R.size)
+    half_width = float(student_t.ppf((1 + level) / 2, values_R.size - 1) * standard_error)
+    return mean, mean - half_width, mean + half_width
+
+
+def read_causal(path: str | Path) -> pd.Series:
+    """Return whether each sample is causal, indexed by (split, sample) as text: something made it uncertain.
+
+    Causal is what has an observed uncertainty above the 95th percentile of the clean ones in the file, which holds
+    those of one source and seed (KL divergences in nats, one row per test sample).
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, a sample twice, an uncertainty not finite.
+    """
+    rows = read_csv(path, _CAUSAL_COLUMNS)
+    require_samples(path, rows)
+    threshold = numbers(path, rows, "uncertainty_clean").quantile(CAUSAL_QUANTILE)
+    return (numbers(path, rows, "uncertainty_observed") > threshold).set_axis(_samples(rows))
+
+
+def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:
+    """Return the tidy metrics (`TIDY_COLUMNS`) of prediction files named `…/{source}/{explainer}/seed{seed}.csv`.
+
+    results/README.md lists them; the column `table` is "attribution". Values are shares in [0, 1], counts or means
+    per sample. Rows follow the order of the files. Causal metrics are those of the sources and seeds of
+    `causal_files`, named `…/{source}/{design}/seed{seed}.csv`; they may hold more samples than an explainer explains.
+
+    Raises:
+        InputError: no files, a name of another form, a file that :func:`read_predictions` or :func:`read_causal`
+            refuses or that has no test rows, a test sample that the causal file of its source and seed lacks.
+    """
+    causal = {
+        (source, seed): (path, read_causal(path))
+        for path in causal_files
+        for source, _, seed in [source_method_seed(path)]
+    }
+    records = []
+    for path in prediction_files:
+        source, method, seed = source_method_seed(path)
+        rows = read_predictions(path)
+        test = rows[rows["split"] == "test"]
+        if test.empty:
+            raise InputError(path, "holds no test rows", "make it anew")
+        metrics = _attribution_metrics(test, concepts_of(rows))
+        if (source, seed) in causal:
+            metrics |= _causal_metrics(path, test, *causal[source, seed])
+        for metric, of_concept in metrics.items():
+            records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
+    return tidy(records, "predictions")
+
+
+def _attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, dict[str, float]]:
+    """Return metric -> concept or `ALL` -> value; a concept without samples has none."""
+    judged = _judged(test)
+    counts = confusion(*judged, concepts)
+    samples = {concept: n for concept, n in zip(concepts, counts.sum(axis=1), strict=True) if n}
+    metrics = {
+        "accuracy": {ALL: accuracy(*judged)} | concept_accuracy(*judged, concepts),
+        "test_samples": {ALL: len(test)} | samples,
+        "abstention_rate": {ALL: test["abstained"].mean()},
+        "permuted_accuracy": {ALL: permuted_accuracy(counts)},
+        "icp_calls": {ALL: test["icp_calls"].mean()},
+    }
+    for predicted, column in zip((*concepts, ABSTAINED), counts.T, strict=True):
+        of_concept = dict(zip(concepts, column, strict=True))
+        metrics[PREDICTED_AS + predicted] = {concept: of_concept[concept] for concept in samples}
+    return metrics
+
+
+def _causal_metrics(path, test: pd.DataFrame, causal_path, causal: pd.Series) -> dict[str, dict[str, float]]:
+    keys = _samples(test)
+    if not (known := keys.isin(causal.index)).all():
+        split, sample = keys[~known][0]
+        raise InputError(causal_path, f"lacks {split} sample {sample} of {path}", "make both anew from one config")
+    shown = test[causal[keys].to_numpy()]
+    metrics: dict[str, dict[str, float]] = {"causal_samples": {ALL: len(shown)}}
+    if len(shown):
+        metrics["causal_accuracy"] = {ALL: accuracy(*_judged(shown))}
+    return metrics
+
+
+def _judged(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return tuple(rows[name].to_numpy() for name in ("concept_true", "concept_predicted", "abstained"))
+
+
+def _samples(rows: pd.DataFrame) -> pd.MultiIndex:
+    import pandas as pd
+
+    return pd.MultiIndex.from_frame(rows[["split", "sample"]])
+
+
+def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return mean `seconds_per_sample` and `icp_seconds_per_sample`, tidy as :func:`collect`, with table "runtime".
+
+    Means are over the test rows, as in :func:`collect`. Apart from the metrics, because times differ from run to run
+    and metrics must not.
+    """
+    records = []
+    for path in timing_files:
+        source, method, seed = source_method_seed(path)
+        rows = read_csv(path, TIMING_COLUMNS)
+        test = rows[rows["split"] == "test"]
+        if test.empty:
+            raise InputError(path, "holds no test rows", "make it anew")
+        for column in ("seconds", "icp_seconds"):
+            mean = float(numbers(path, test, column).mean())
+            records.append(("runtime", source, method, f"{column}_per_sample", ALL, seed, mean))
+    return tidy(records, "timings")
+
+
+def read_metrics(path: str | Path) -> pd.DataFrame:
+    """Read a tidy file that :func:`collect` or :func:`collect_timings` made.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, a seed or value that is not a finite number.
+    """
+    rows = read_csv(path, TIDY_COLUMNS)
+    rows["seed"] = numbers(path, rows, "seed").astype(int)
+    rows["value"] = numbers(path, rows, "value")
+    return rows
+
+
+def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
+    """Write tidy metrics as CSV; floats keep every digit, so that equal metrics give equal bytes."""
+    from gpca.files import whole_file
+
+    with whole_file(path) as partial:
+        metrics.to_csv(partial, index=False, lineterminator="\n")
+
+
+def source_method_seed(path: str | Path) -> tuple[str, str, int]:
+    parts = Path(path).with_suffix("").parts
+    seed = parts[-1].removeprefix("seed") if parts else ""
+    if len(parts) < 3 or not parts[-1].startswith("seed") or not seed.isdecimal():
+        raise InputError(path, "is not named …/{source}/{explainer}/seed{number}.csv", "rename it")
+    return parts[-3], parts[-2], int(seed)
+
+
+def tidy(records: list[tuple], name: str) -> pd.DataFrame:
+    import pandas as pd
+
+    if not records:
+        raise InputError(name, "no files were given", "name at least one explainer in the config")
+    return pd.DataFrame(records, columns=list(TIDY_COLUMNS))

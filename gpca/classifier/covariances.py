@@ -1,0 +1,71 @@
+"""Kernels by name, and their covariances: of C kernels of one kind, one per latent GP, over the same inputs.
+
+The parameters and their constraints are gpytorch's. The covariances are computed here, because gpytorch measures the
+distances once per kernel, although the kernels differ in scale alone: most of the time of a fit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import gpytorch
+import torch
+from torch import Tensor
+
+
+class ScaledPolynomialKernel(gpytorch.kernels.PolynomialKernel):
+    """(xᵀx' / d + c)²: inputs divided by √d, as with inner products of some hundred dimensions nothing is learnt."""
+
+    def __init__(self, **options) -> None:
+        super().__init__(power=2, **options)
+
+    def forward(self, x1: Tensor, x2: Tensor, **options) -> Tensor:
+        """Return the covariance of the inputs."""
+        width = math.sqrt(x1.shape[-1])
+        return super().forward(x1 / width, x2 / width, **options)
+
+
+COVARIANCES = {
+    "rbf": gpytorch.kernels.RBFKernel,
+    "matern32": lambda **options: gpytorch.kernels.MaternKernel(nu=1.5, **options),
+    "polynomial": ScaledPolynomialKernel,
+}
+
+
+def make_covariance(name: str, n_classes: int, lengthscale: float) -> gpytorch.kernels.ScaleKernel:
+    """Return C kernels, each with a scale of its own; the polynomial one has an offset and no lengthscale."""
+    batch = torch.Size([n_classes])
+    kernel = gpytorch.kernels.ScaleKernel(COVARIANCES[name](batch_shape=batch), batch_shape=batch)
+    if kernel.base_kernel.has_lengthscale:
+        kernel.base_kernel.lengthscale = lengthscale
+    return kernel
+
+
+def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
+    """Return k_c(a, b), (C, A, B), of kernels of batch shape (C,); of those without a form here by gpytorch itself."""
+    base, scale_C_1_1 = kernel.base_kernel, kernel.outputscale[:, None, None]
+    if isinstance(base, ScaledPolynomialKernel):
+        inner_A_B = a_A_d @ b_B_d.T / a_A_d.shape[1]
+        return scale_C_1_1 * (inner_A_B + base.offset[:, :, None]).square()
+    squared_A_B = squared_distances(a_A_d, b_B_d)
+    if isinstance(base, gpytorch.kernels.MaternKernel):
+        # Not zero under the root, where its derivative would be infinite.
+        scaled_C_A_B = squared_A_B.clamp_min(1e-15).sqrt() * (math.sqrt(3) / base.lengthscale)
+        return scale_C_1_1 * (1 + scaled_C_A_B) * torch.exp(-scaled_C_A_B)
+    if isinstance(base, gpytorch.kernels.RBFKernel):
+        return scale_C_1_1 * torch.exp(squared_A_B * (-0.5 / base.lengthscale.square()))
+    return kernel(a_A_d, b_B_d).to_dense()
+
+
+def variance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
+    """Return k_c(a, a), (C, A)."""
+    base, scale_C_1 = kernel.base_kernel, kernel.outputscale[:, None]
+    if isinstance(base, ScaledPolynomialKernel):
+        return scale_C_1 * (a_A_d.square().mean(dim=1) + base.offset).square()
+    return scale_C_1.expand(-1, len(a_A_d)) if base.is_stationary else kernel(a_A_d, diag=True)
+
+
+def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
+    """Return |a - b|², (A, B)."""
+    squares_A_1, squares_B = a_A_d.square().sum(dim=1, keepdim=True), b_B_d.square().sum(dim=1)
+    return torch.addmm(squares_A_1 + squares_B, a_A_d, b_B_d.T, alpha=-2).clamp_min(0)

@@ -1,0 +1,217 @@
+"""Multi-class Gaussian process classification by sparse variational inference (paper Sec. III-B).
+
+One latent GP per concept, inducing inputs shared by all, Cholesky variational posterior, softmax likelihood
+(Hensman et al. 2015). A class of the label space without a label yet has its GP already. A fit learns kernel, inducing
+inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels then move the posterior alone
+(:mod:`gpca.classifier.latents`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import torch
+from sklearn.cluster import KMeans
+from sklearn.preprocessing import StandardScaler
+
+from gpca.attribution.scores import summarise_marginals
+from gpca.classifier.covariances import COVARIANCES, make_covariance
+from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
+from gpca.classifier.prior import Prior
+from gpca.classifier.sparse_gp import SparseGPs
+from gpca.errors import InputError
+from gpca.progress import progress
+from gpca.seeds import generator, seed_of
+
+
+@dataclass(frozen=True)
+class GPCSettings:
+    """How the classifier is built and fitted; the defaults are the paper's.
+
+    Attributes:
+        kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
+        learning_rate, iterations: of Adam on the ELBO of the whole training set.
+        inducing: number of shared inducing inputs N_Z.
+        draws: M, posterior draws per explanation.
+    """
+
+    kernel: str = "rbf"
+    learning_rate: float = 0.01
+    iterations: int = 100
+    inducing: int = 64
+    draws: int = 1000
+
+    def __post_init__(self) -> None:
+        if self.kernel not in COVARIANCES:
+            raise InputError(f"kernel '{self.kernel}'", "unknown", f"known are {', '.join(COVARIANCES)}")
+
+
+class GPC:
+    """Gaussian process classifier over embeddings.
+
+    Args:
+        classes: (C,) the label space, in the order of the score columns.
+        settings: see :class:`GPCSettings`.
+        axes: names of the seed (source, seed, …).
+    """
+
+    def __init__(self, classes: tuple[str, ...], settings: GPCSettings, *axes: object) -> None:
+        self.classes = classes
+        self.settings = settings
+        self._axes = axes
+        self._sites: Sites | None = None  # what the labels say of the latents, once they were refined
+
+    def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
+        """Maximise the ELBO (variational parameters, inducing inputs, kernel parameters).
+
+        Inputs are standardised, inducing inputs start at k-means centres and the lengthscale at the median distance:
+        with gpytorch's default lengthscale an RBF kernel on some hundred dimensions stays at chance.
+
+        Args:
+            h_N_d, labels_N: labelled embeddings.
+            around_R_d: embeddings by which the inputs are standardised and the inducing inputs and the lengthscale
+                initialised, where those to come lie elsewhere than the labelled ones; by default the labelled ones.
+        """
+        for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N, around_R_d):
+            pass
+        return self
+
+    def fit_up_to(
+        self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None
+    ) -> Iterator[int]:
+        """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many."""
+        around_R_d = h_N_d if around_R_d is None else around_R_d
+        self._scaler = StandardScaler().fit(around_R_d)
+        starts_R_d = self._scaled(around_R_d)
+        inputs_N_d, targets_N = self._scaled(h_N_d), self._targets(labels_N)
+        random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
+        kernel = make_covariance(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
+        model = SparseGPs(kernel, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
+        optimiser = torch.optim.Adam(model.parameters(), lr=self.settings.learning_rate)
+        stops = sorted(set(iterations))
+        for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
+            optimiser.zero_grad()
+            (-model.elbo(inputs_N_d, torch.from_numpy(targets_N))).backward()
+            optimiser.step()
+            if done in stops:
+                self._prior, self._latents = Prior.of(model), model.latents()
+                self._labelled, self._targets_N, self._sites = self.project(h_N_d), targets_N, None
+                yield done
+
+    def elbo(self) -> float:
+        """Return the evidence lower bound per labelled sample in nats."""
+        return elbo(self._labelled, self._targets_N, self._latents) / len(self._targets_N)
+
+    def update(
+        self, h_L_d: np.ndarray | Projection, labels_L: np.ndarray, iterations: int = 100, tolerance: float = 1e-3
+    ) -> int:
+        """Learn further labels at fixed kernel and inducing inputs; those of before count as much as ever.
+
+        Args:
+            h_L_d: their embeddings, or what :meth:`project` returned for them.
+            labels_L: classes of the label space.
+            iterations, tolerance: see :func:`gpca.classifier.latents.refine`.
+
+        Returns:
+            the number of iterations, each a pass over all labels.
+        """
+        self._labelled = self._labelled.followed_by(self.project(h_L_d))
+        self._targets_N = np.concatenate([self._targets_N, self._targets(labels_L)])
+        return self.refine(iterations, tolerance)
+
+    def refine(self, iterations: int = 100, tolerance: float = 1e-3) -> int:
+        """Move the posterior to the best one for the labels, kernel and inducing inputs; see :meth:`update`.
+
+        It starts from the posterior of the call before, or from the prior where there was none.
+        """
+        sites = Sites.silent(0, 0) if self._sites is None else self._sites
+        sites = sites.extended(len(self._targets_N), len(self.classes))
+        self._sites, self._latents, done = refine(self._labelled, self._targets_N, sites, iterations, tolerance)
+        return done
+
+    def level(self) -> None:
+        """Give classes without a label the mean kernel of the others, and refit the posterior."""
+        known_C = np.isin(np.arange(len(self.classes)), self._targets_N)
+        self._set_prior(self._prior.levelled(known_C))
+
+    def grow(self, name: str) -> None:
+        """Add a class that the label space never had; its kernel is the geometric mean of the others'.
+
+        The other classes keep kernels, labels and posterior; the new one learns what it is not.
+        """
+        if not name or name in self.classes:
+            raise InputError(f"concept '{name}'", "is empty or known already", f"known are {', '.join(self.classes)}")
+        self.classes = (*self.classes, name)
+        self._set_prior(self._prior.grown())
+
+    def _set_prior(self, prior: Prior) -> None:
+        self._prior = prior
+        self._labelled = prior.project(torch.from_numpy(self._labelled.inputs_N_d))
+        self.refine()
+
+    def project(self, h_N_d: np.ndarray | Projection) -> Projection:
+        """Return what the kernel says of the embeddings, to be computed once where they are asked about repeatedly."""
+        return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
+
+    def posterior(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and standard deviation (N, C) of the latent logits q(f(h)); the latents are independent."""
+        return self._latents.marginals(self.project(h_N_d))
+
+    def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
+
+        All points share the same M·C standard normal numbers, so a point's result does not depend on the others;
+        per-point marginals suffice, because none of the three uses correlations between points.
+        """
+        normal_M_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
+        return summarise_marginals(*self.posterior(h_N_d), normal_M_C)
+
+    def state(self) -> dict[str, object]:
+        """Return all that was learnt as tensors, numbers and names, for :meth:`from_state`."""
+        return {
+            "classes": list(self.classes),
+            "settings": asdict(self.settings),
+            "axes": list(self._axes),
+            "scaler_mean": torch.from_numpy(self._scaler.mean_),
+            "scaler_scale": torch.from_numpy(self._scaler.scale_),
+            "kernel": self._prior.kernel.state_dict(),
+            "inducing": self._prior.inducing_M_d,
+            "mean": torch.from_numpy(self._latents.mean_C_M),
+            "covariance": torch.from_numpy(self._latents.covariance_C_M_M),
+            "labelled": torch.from_numpy(self._labelled.inputs_N_d),
+            "targets": torch.from_numpy(self._targets_N),
+        }
+
+    @classmethod
+    def from_state(cls, state: dict) -> GPC:
+        """Return the classifier of a :meth:`state`: it attributes alike, and learns further labels."""
+        gpc = cls(tuple(state["classes"]), GPCSettings(**state["settings"]), *state["axes"])
+        gpc._scaler = StandardScaler()
+        gpc._scaler.mean_, gpc._scaler.scale_ = state["scaler_mean"].numpy(), state["scaler_scale"].numpy()
+        kernel = make_covariance(gpc.settings.kernel, len(gpc.classes), lengthscale=1.0).requires_grad_(False)
+        kernel.load_state_dict(state["kernel"])
+        gpc._prior = Prior(kernel, state["inducing"])
+        gpc._latents = Latents(state["mean"].numpy(), state["covariance"].numpy())
+        gpc._labelled, gpc._targets_N = gpc._prior.project(state["labelled"]), state["targets"].numpy()
+        return gpc
+
+    def _targets(self, labels_N: np.ndarray) -> np.ndarray:
+        return np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
+
+    def _scaled(self, h_N_d: np.ndarray) -> torch.Tensor:
+        return torch.from_numpy(self._scaler.transform(h_N_d).astype(np.float32))
+
+
+def _inducing_inputs(inputs_N_d: torch.Tensor, settings: GPCSettings, axes: tuple) -> torch.Tensor:
+    clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
+    kmeans = KMeans(clusters, n_init=1, random_state=seed_of(*axes, "inducing") % 2**32)
+    return torch.from_numpy(kmeans.fit(inputs_N_d.numpy()).cluster_centers_.astype(np.float32))
+
+
+def _median_distance(inputs_N_d: torch.Tensor, axes: tuple, most: int = 1000) -> float:
+    """Median of the distances between distinct points (the median heuristic), at most `most` points drawn."""
+    order = generator(*axes, "median").permutation(len(inputs_N_d))[:most]
+    median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
+    return median if median > 0 else 1.0

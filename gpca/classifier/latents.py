@@ -1,0 +1,146 @@
+"""The posterior over a sparse GP classifier's latents in whitened form, and how labels move it; numpy alone.
+
+Kernel and inducing inputs Z are fixed here. With K_ZZ = L Lᵀ and u = L v, the prior of v is N(0, I) and each latent is
+f(x) = w(x)ᵀ v + r with w(x) = L⁻¹ k(Z, x) and r ~ N(0, k(x, x) - |w(x)|²) (Hensman et al. 2015). Everything that the
+inputs contribute is then in w and the variance of r, computed once however often labels arrive.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.special import softmax
+from scipy.stats import norm, qmc
+
+
+@dataclass(frozen=True)
+class Projection:
+    """N inputs, and how C latent GPs see them: weights w on the inducing values, variance of the residual r."""
+
+    inputs_N_d: np.ndarray
+    weights_C_N_M: np.ndarray
+    residual_C_N: np.ndarray
+
+    def __len__(self) -> int:
+        return self.residual_C_N.shape[1]
+
+    def __getitem__(self, rows: np.ndarray | slice | list[int]) -> Projection:
+        return Projection(self.inputs_N_d[rows], self.weights_C_N_M[:, rows], self.residual_C_N[:, rows])
+
+    def followed_by(self, other: Projection) -> Projection:
+        """Return the inputs of this one and then those of the other."""
+        return Projection(
+            np.concatenate([self.inputs_N_d, other.inputs_N_d]),
+            np.concatenate([self.weights_C_N_M, other.weights_C_N_M], axis=1),
+            np.concatenate([self.residual_C_N, other.residual_C_N], axis=1),
+        )
+
+
+@dataclass(frozen=True)
+class Latents:
+    """q(v_c) = N(mean (C, M), covariance (C, M, M)) of the whitened inducing values."""
+
+    mean_C_M: np.ndarray
+    covariance_C_M_M: np.ndarray
+
+    def marginals(self, projection: Projection) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and standard deviation (N, C) of the latents at N inputs; the C latents are independent."""
+        weights_C_N_M = projection.weights_C_N_M
+        mean_C_N = np.einsum("cnm,cm->cn", weights_C_N_M, self.mean_C_M)
+        spread_C_N = np.einsum("cnm,cnm->cn", weights_C_N_M @ self.covariance_C_M_M, weights_C_N_M)
+        return mean_C_N.T, np.sqrt(np.maximum(spread_C_N + projection.residual_C_N, 0)).T
+
+    def divergence(self) -> float:
+        """Return KL(q(v) ‖ N(0, I)) in nats, the ELBO's second term."""
+        _, log_determinants = np.linalg.slogdet(self.covariance_C_M_M)
+        traces = np.trace(self.covariance_C_M_M, axis1=1, axis2=2)
+        return 0.5 * float(
+            (traces + np.square(self.mean_C_M).sum(axis=1) - self.mean_C_M.shape[1] - log_determinants).sum()
+        )
+
+
+@dataclass(frozen=True)
+class Sites:
+    """One Gaussian factor per labelled input and latent, in natural parameters: what its label says of the latent.
+
+    The posterior is q(v) ∝ N(0, I) Π_n exp(linear_n f_n - precision_n f_n² / 2). A site of zeros says nothing.
+    """
+
+    linear_N_C: np.ndarray
+    precision_N_C: np.ndarray
+
+    @classmethod
+    def silent(cls, n: int, n_classes: int) -> Sites:
+        """Return sites that say nothing: the posterior is the prior."""
+        return cls(np.zeros((n, n_classes)), np.zeros((n, n_classes)))
+
+    def extend(self, n: int, n_classes: int) -> Sites:
+        """Return these sites, with silent ones for inputs and classes that they do not cover yet."""
+        grown = ((0, n - len(self.linear_N_C)), (0, n_classes - self.linear_N_C.shape[1]))
+        return Sites(np.pad(self.linear_N_C, grown), np.pad(self.precision_N_C, grown))
+
+    def posterior(self, projection: Projection) -> Latents:
+        """Return q(v): Gaussian factors on a Gaussian prior, so it is exact."""
+        weights_C_N_M = projection.weights_C_N_M
+        weighted_C_M_N = np.swapaxes(weights_C_N_M * self.precision_N_C.T[:, :, None], 1, 2)
+        covariance_C_M_M = np.linalg.inv(np.eye(weights_C_N_M.shape[2]) + weighted_C_M_N @ weights_C_N_M)
+        linear_C_M = np.einsum("cnm,nc->cm", weights_C_N_M, self.linear_N_C)
+        return Latents(np.einsum("cmk,ck->cm", covariance_C_M_M, linear_C_M), covariance_C_M_M)
+
+
+def refine(
+    projection: Projection, targets_N: np.ndarray, sites: Sites, iterations: int, tolerance: float, step: float = 0.5
+) -> tuple[Sites, Latents, int]:
+    """Ascend the ELBO of the softmax likelihood by natural gradients; each iteration passes once over all labels.
+
+    Conjugate-computation variational inference (Khan & Lin 2017): a step towards the sites with precision
+    E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c], the ELBO's natural gradient. Unlike a gradient on mean
+    and covariance, it needs no learning rate to be tuned and ends after some ten steps.
+
+    Args:
+        projection, targets_N: the N labelled inputs and the numbers of their classes.
+        sites: where to start; those of an earlier call, extended, continue from what was learnt.
+        iterations, tolerance: the most steps, and the largest change of a probability at which they end.
+
+    Returns:
+        the sites, their posterior, and the number of iterations.
+    """
+    wanted_N_C = np.eye(sites.linear_N_C.shape[1])[targets_N]
+    latents = sites.posterior(projection)
+    before_N_C = None
+    for iteration in range(1, iterations + 1):
+        mean_N_C, deviation_N_C = latents.marginals(projection)
+        p_N_C, curvature_N_C = _expected_softmax(mean_N_C, deviation_N_C)
+        if before_N_C is not None and np.abs(p_N_C - before_N_C).max() < tolerance:
+            return sites, latents, iteration - 1
+        linear_N_C = wanted_N_C - p_N_C + curvature_N_C * mean_N_C
+        sites = Sites(
+            (1 - step) * sites.linear_N_C + step * linear_N_C, (1 - step) * sites.precision_N_C + step * curvature_N_C
+        )
+        latents, before_N_C = sites.posterior(projection), p_N_C
+    return sites, latents, iterations
+
+
+def elbo(projection: Projection, targets_N: np.ndarray, latents: Latents) -> float:
+    """Return the evidence lower bound in nats: Σ E_q[log softmax(f)_y] - KL(q ‖ prior)."""
+    mean_N_C, deviation_N_C = latents.marginals(projection)
+    logits_Q_N_C = mean_N_C + deviation_N_C * _normal_points(mean_N_C.shape[1])[:, None]
+    largest_Q_N_1 = logits_Q_N_C.max(axis=2, keepdims=True)
+    log_p_Q_N_C = logits_Q_N_C - largest_Q_N_1
+    log_p_Q_N_C = log_p_Q_N_C - np.log(np.exp(log_p_Q_N_C).sum(axis=2, keepdims=True))
+    return float(log_p_Q_N_C[:, np.arange(len(targets_N)), targets_N].mean(axis=0).sum()) - latents.divergence()
+
+
+def _expected_softmax(mean_N_C: np.ndarray, deviation_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return E_q[p] and E_q[p (1 - p)], each (N, C)."""
+    p_Q_N_C = softmax(mean_N_C + deviation_N_C * _normal_points(mean_N_C.shape[1])[:, None], axis=2)
+    p_N_C = p_Q_N_C.mean(axis=0)
+    return p_N_C, p_N_C - np.square(p_Q_N_C).mean(axis=0)
+
+
+@cache
+def _normal_points(n_classes: int, log2_points: int = 6) -> np.ndarray:
+    """Return 64 points (Q, C) of a scrambled Sobol sequence as standard normal numbers, the same at every call."""
+    return norm.ppf(qmc.Sobol(n_classes, rng=0).random_base2(log2_points))

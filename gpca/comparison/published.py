@@ -1,0 +1,287 @@
+"""What the paper prints: every number of its tables and text, from ``published.csv`` (docs/comparison.md)."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gpca.errors import InputError
+
+PUBLISHED = Path(__file__).with_name("published.csv")
+HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # of the paper's times (Sec. IV-E)
+TEXT = "text"  # stands for the running text in the column `table`; its rows and columns are free
+FILES = ("metrics.csv", "timings.csv", "active_learning.csv", "kernels.csv", "diagnostics.csv", "real_world.csv",
+         "runtime.csv", "recovery.csv")  # fmt: skip
+STATISTICS = ("mean", "deviation")  # over the seeds
+_COUNTERPART = ("in_file", "in_table", "source", "method", "metric", "concept", "statistic")
+PUBLISHED_COLUMNS = (
+    "table",
+    "row",
+    "column",
+    "value",
+    "upper",
+    "decimals",
+    "unit",
+    "device",
+    "place",
+    *_COUNTERPART,
+    "note",
+)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as printed: factor from the unit of the results' files, least and largest possible value."""
+
+    factor: float
+    least: float = 0.0
+    most: float = math.inf
+
+
+UNITS = {
+    "%": Unit(100, most=100),
+    "labels": Unit(1),
+    "epochs": Unit(1),
+    "s": Unit(1),
+    "ms": Unit(1000),
+    "correlation": Unit(1, -1, 1),
+    "risk": Unit(1, most=1),  # area under risk and coverage
+    "share": Unit(1, most=1),
+}
+TIMES = ("s", "ms")
+_SOURCES = ("Coffee Cup", "LINEMOD", "YCB")
+_REDUCTIONS = ("No Reduction", "PCA", "UMAP", "AE")
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """A table of the paper: what it shows, its rows and columns."""
+
+    title: str
+    rows: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+
+
+TABLES = {
+    "I": PaperTable("Single-concept attribution", _SOURCES, ("SHAP", "SA", "GP-CA")),
+    "II": PaperTable("Accuracy per concept", _SOURCES, ("Noise", "Pose", "Overlap")),
+    "III": PaperTable("Active learning", _SOURCES, ("#Labels BALD", "#Labels Random", "Acc.", "Epochs")),
+    "IV": PaperTable(
+        "Kernel and schedule",
+        (
+            "RBF, lr=.01, 100 iterations",
+            "Matérn 3/2, lr=.01, 200 iterations",
+            "Poly. p=2, lr=.01, 200 iterations",
+            "RBF, lr=.001, 200 iterations",
+            "Poly. p=2, lr=.001, 200 iterations",
+        ),
+        ("YCB", "LINEMOD"),
+    ),
+    "V": PaperTable("Learners", ("GPC", "RF", "Linear SVM"), ("CC", "LM", "YCB", "ρ", "AUC", "ECE")),
+    "VI": PaperTable(
+        "Backbones and reductions on depth frames",
+        tuple(f"{b}, {r}" for b in ("DGCNN", "PointNet", "PointNet++", "PointNeXt") for r in _REDUCTIONS),
+        ("Mean Acc.", "Std. Dev."),
+    ),
+    "VII": PaperTable(
+        "Runtime",
+        (
+            "ICP alignment",
+            "DGCNN feature extraction",
+            "GPC posterior sampling (1000 draws)",
+            "GP-CA score computation",
+            "BALD selection (optional)",
+            "GPC retraining (optional)",
+        ),
+        ("Time",),
+    ),
+    TEXT: PaperTable("In the text"),
+}
+
+
+@dataclass(frozen=True)
+class Counterpart:
+    """Which value of a run stands beside a printed number.
+
+    Attributes:
+        file: in ``results/{run}/``.
+        table: of its tidy rows; of ``runtime.csv`` always "components".
+        sources: their mean is taken, seed by seed; of ``runtime.csv`` "model", what the model was trained on.
+        methods: their sum is taken.
+        metrics: one, or two of which the first is divided by the second.
+        concept: as in the tidy rows; of ``runtime.csv`` the device.
+        statistic: of the values over the seeds.
+    """
+
+    file: str
+    table: str
+    sources: tuple[str, ...]
+    methods: tuple[str, ...]
+    metrics: tuple[str, ...]
+    concept: str
+    statistic: str
+
+
+@dataclass(frozen=True)
+class Number:
+    """One printed number, or the range from `value` to `upper`, with `decimals` digits (-1: in tens)."""
+
+    table: str
+    row: str
+    column: str
+    value: float
+    upper: float
+    decimals: int
+    unit: str
+    device: str
+    place: str
+    counterpart: Counterpart | None
+    note: str
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Table, row and column, which name it."""
+        return self.table, self.row, self.column
+
+    @property
+    def rounding(self) -> float:
+        """Half of the last printed digit."""
+        return 0.5 * 10.0**-self.decimals
+
+    def text(self) -> str:
+        """Return the number as printed, without its unit."""
+        digits = max(self.decimals, 0)
+        return f"{self.value:.{digits}f}" + f" to {self.upper:.{digits}f}" * (self.upper > self.value)
+
+
+def read_published(path: str | Path = PUBLISHED) -> list[Number]:
+    """Read the printed numbers, in the order of the file.
+
+    Raises:
+        InputError: missing or unreadable file, wrong columns, unknown table, row, column, unit, file or statistic,
+            something that is not a number, a range upside down, more digits than `decimals`, half a counterpart, none
+            and no note, the same cell twice. It names the line.
+    """
+    numbers: list[Number] = []
+    first: dict[tuple[str, str, str], int] = {}
+    for line, fields in read_lines(path, PUBLISHED_COLUMNS):
+        where = f"{path}, line {line}"
+        number = _number(where, fields)
+        if number.key in first:
+            raise InputError(where, f"holds {_named(number.key)} again", f"line {first[number.key]} has it")
+        first[number.key] = line
+        numbers.append(number)
+    if not numbers:
+        raise InputError(path, "holds no numbers", "restore it")
+    return numbers
+
+
+def printed_seconds(numbers: Iterable[Number]) -> dict[str, Number]:
+    """Return component -> its time in Table VII, with `value` and `upper` in seconds."""
+    from dataclasses import replace
+
+    return {
+        n.counterpart.methods[0]: replace(n, value=n.value / f, upper=n.upper / f, unit="s")
+        for n in numbers
+        if n.table == "VII" and n.counterpart
+        for f in [UNITS[n.unit].factor]
+    }
+
+
+def read_lines(path: str | Path, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, str]]]:
+    """Yield the number of each line of a CSV file, and its fields without the spaces around them.
+
+    Raises:
+        InputError: missing or unreadable file, other columns, more or fewer fields than columns.
+    """
+    try:
+        with Path(path).open(newline="", encoding="utf-8") as file:
+            reader = csv.reader(file, strict=True)
+            if tuple(next(reader, ())) != tuple(columns):
+                raise InputError(f"{path}, line 1", "other columns", f"they have to be {','.join(columns)}")
+            for fields in reader:
+                if len(fields) != len(columns):
+                    fault = f"{len(fields)} fields for {len(columns)} columns"
+                    raise InputError(f"{path}, line {reader.line_num}", fault, "put a text with a comma in quotes")
+                yield reader.line_num, {name: field.strip() for name, field in zip(columns, fields, strict=True)}
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "restore it") from None
+    except (UnicodeDecodeError, csv.Error, IsADirectoryError) as fault:
+        raise InputError(path, f"is no readable CSV file: {fault}", "restore it") from fault
+
+
+def _number(where: str, fields: dict[str, str]) -> Number:
+    table = require_known(where, "table", fields["table"], TABLES)
+    if table != TEXT:
+        require_known(where, "row", fields["row"], TABLES[table].rows)
+        require_known(where, "column", fields["column"], TABLES[table].columns)
+    for name in ("row", "column", "place"):
+        if not fields[name]:
+            raise InputError(where, f"'{name}' is empty", "fill it in")
+    require_known(where, "unit", fields["unit"], UNITS)
+    value = _finite(where, "value", fields["value"])
+    upper = _finite(where, "upper", fields["upper"]) if fields["upper"] else value
+    try:
+        decimals = int(fields["decimals"])
+    except ValueError:
+        raise InputError(where, f"'decimals' is '{fields['decimals']}'", "give a whole number") from None
+    if upper < value:
+        raise InputError(where, f"'upper' {upper:g} lies below 'value' {value:g}", "swap them")
+    if any(round(bound, decimals) != bound for bound in (value, upper)):
+        raise InputError(where, f"a value with more digits than {decimals} decimals", "correct one of them")
+    return Number(
+        **{name: fields[name] for name in ("table", "row", "column", "unit", "device", "place", "note")},
+        value=value,
+        upper=upper,
+        decimals=decimals,
+        counterpart=_counterpart(where, fields),
+    )
+
+
+def _counterpart(where: str, fields: dict[str, str]) -> Counterpart | None:
+    given = [name for name in _COUNTERPART if fields[name]]
+    if not given:
+        if not fields["note"]:
+            raise InputError(where, "neither a counterpart nor a note that says why there is none", "give one")
+        return None
+    if len(given) < len(_COUNTERPART):
+        empty = next(name for name in _COUNTERPART if not fields[name])
+        raise InputError(where, f"names a counterpart, but '{empty}' is empty", "fill in all of it or nothing")
+    require_known(where, "in_file", fields["in_file"], FILES)
+    require_known(where, "statistic", fields["statistic"], STATISTICS)
+    metrics = tuple(fields["metric"].split("/"))
+    if len(metrics) > 2 or not all(metrics):
+        raise InputError(where, f"'metric' is '{fields['metric']}'", "give one, or one divided by another")
+    return Counterpart(
+        fields["in_file"],
+        fields["in_table"],
+        tuple(fields["source"].split()),
+        tuple(fields["method"].split("+")),
+        metrics,
+        fields["concept"],
+        fields["statistic"],
+    )
+
+
+def require_known(where: str, name: str, given: str, known: Iterable[str]) -> str:
+    """Return what was given, or raise an InputError that lists what is known."""
+    if given not in known:
+        raise InputError(where, f"unknown {name} '{given}'", f"known are {', '.join(known)}")
+    return given
+
+
+def _finite(where: str, name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(where, f"'{name}' is '{text}'", "give a finite number")
+    return value
+
+
+def _named(key: tuple[str, str, str]) -> str:
+    return " / ".join(key)

@@ -1,0 +1,75 @@
+"""Analytical features of a registration: how well source and target agree, without anything learnt.
+
+The paper names "RMSE, normal consistency, planarity, linearity, and point-count ratios" and no more; how each is
+computed is chosen here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.pairs.dataset import Registrations
+from gpca.seeds import generator
+
+
+def analytical_features(
+    registrations: Registrations, *axes: object, points: int = 256, neighbours: int = 16, point_count: bool = True
+) -> np.ndarray:
+    """Return (N, F): inlier RMSE (of diameters), then those of :func:`compare`, the point-count ratio last.
+
+    Args:
+        registrations: N of them.
+        axes: name the draws.
+        points: source points at which local shape is measured, drawn by split and sample; all where there are fewer.
+        neighbours: of a point, itself included, that make its local shape.
+        point_count: whether the point-count ratio is among the features.
+    """
+    rows = []
+    for i in range(len(registrations)):
+        source, target = registrations.cloud(i), registrations.target(i)
+        random = generator(*axes, registrations.split[i], registrations.sample[i])
+        drawn = random.permutation(len(source))[:points]
+        row = [registrations.inlier_rmse[i], *compare(source, target, drawn, neighbours)]
+        rows.append(row + [len(source) / len(target)] * point_count)
+    return np.array(rows)
+
+
+def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, neighbours: int) -> list[float]:
+    """Compare the local shape of the aligned source at the drawn points with that of the nearest target points.
+
+    Returns:
+        mean |cosine| between the normals; mean planarity and mean linearity of the source; both less those of the
+        target.
+    """
+    from scipy.spatial import cKDTree
+
+    source_tree, target_tree = cKDTree(source_P_3), cKDTree(target_Q_3)
+    query_D_3 = source_tree.data[drawn]
+    _, nearest_D = target_tree.query(query_D_3)
+    normals_D_3, planarity_D, linearity_D = local_shape(source_tree, query_D_3, neighbours)
+    target_normals_D_3, target_planarity_D, target_linearity_D = local_shape(
+        target_tree, target_tree.data[nearest_D], neighbours
+    )
+    return [
+        np.abs(np.sum(normals_D_3 * target_normals_D_3, axis=1)).mean(),
+        planarity_D.mean(),
+        linearity_D.mean(),
+        (planarity_D - target_planarity_D).mean(),
+        (linearity_D - target_linearity_D).mean(),
+    ]
+
+
+def local_shape(tree, query_D_3: np.ndarray, neighbours: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return normals (D, 3) without a sign, planarity (D,) and linearity (D,) of a cloud at the query points.
+
+    From the eigenvalues λ1 ≥ λ2 ≥ λ3 of the covariance of the nearest `neighbours` points of `tree` (all where it has
+    fewer): planarity (λ2 - λ3)/λ1 and linearity (λ1 - λ2)/λ1 (Weinmann et al. 2015); the normal is the eigenvector
+    of λ3. Points that coincide have neither.
+    """
+    _, rows_D_K = tree.query(query_D_3, k=min(neighbours, tree.n))
+    points_D_K_3 = tree.data[rows_D_K]
+    offsets_D_K_3 = points_D_K_3 - points_D_K_3.mean(axis=1, keepdims=True)
+    eigenvalues_D_3, eigenvectors_D_3_3 = np.linalg.eigh(offsets_D_K_3.transpose(0, 2, 1) @ offsets_D_K_3)
+    smallest_D, middle_D, largest_D = eigenvalues_D_3.T
+    scale_D = np.where(largest_D > 0, largest_D, 1.0)
+    return eigenvectors_D_3_3[:, :, 0], (middle_D - smallest_D) / scale_D, (largest_D - middle_D) / scale_D

@@ -1,0 +1,1 @@
+"""One registration of a user: the model file, its explanation, and how long it takes."""

@@ -1,0 +1,167 @@
+"""GP-CA for one registration of a user's own, with a trained model: align, embed, attribute.
+
+What the workflow does with its samples is done here to two clouds, from the same functions: the target's canonical
+frame, ICP, the mean embedding of random draws, posterior draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import torch
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points, thin
+from gpca.alignment.rigid import require_rigid, transform
+from gpca.attribution.scores import entropy
+from gpca.encoders.training import best_device
+from gpca.errors import InputError
+from gpca.model.explanation import Explanation, Spread
+from gpca.model.file import Model, model_path
+from gpca.objects.canonical import estimate_normals
+from gpca.recovery.policy import RecoveryPolicy
+from gpca.seeds import generator
+from gpca.uncertainty.spread import UncertaintySettings, run_from_starts
+
+LARGEST_RATIO = 8.0  # of the extents of source and target, either way; in the wrong unit it is 10 or more
+
+
+class Explainer:
+    """GP-CA with a trained model.
+
+    Args:
+        model: by default that of :func:`gpca.model.file.model_path`.
+        policy: from scores to what to do; by default the model's own.
+        device: of the encoder; by default a GPU where torch finds one.
+    """
+
+    def __init__(
+        self, model: Model | None = None, policy: RecoveryPolicy | None = None, device: str | None = None
+    ) -> None:
+        self.model = Model.load(model_path()) if model is None else model
+        self.policy = self.model.policy if policy is None else policy
+        self._device = best_device() if device is None else torch.device(device)
+        self.model.encoder.to(self._device)
+
+    @classmethod
+    def load(cls, path: str | Path | None = None) -> Explainer:
+        """Return the explainer of a model file, or of the one that :func:`gpca.model.file.model_path` finds."""
+        return cls(Model.load(model_path(path)))
+
+    def explain(
+        self,
+        source_points: np.ndarray,
+        target_points: np.ndarray,
+        T_target_source_init: np.ndarray | None = None,
+        unit: str = "m",
+        frame: CanonicalFrame | None = None,
+        uncertainty: UncertaintySettings | None = None,
+    ) -> Explanation:
+        """Register the source to the target, and say why that is uncertain. The same clouds give the same numbers.
+
+        Args:
+            source_points, target_points: (N, 3) what was observed, and the reference that it is aligned to.
+            T_target_source_init: (4, 4) where ICP starts; the identity by default.
+            unit: of points and pose: ``m``, ``cm`` or ``mm``.
+            frame: of the target, where it is known already; by default measured on its points.
+            uncertainty: how the spread of the pose is measured; by default it is not.
+
+        Raises:
+            InputError: too few points, NaN, a unit that cannot be right, source and target of unlike sizes, or an
+                initial pose that is no rigid transform.
+        """
+        started = perf_counter()
+        seconds: dict[str, float] = {}
+        notes: list[str] = []
+        with _timed(seconds, "preparation"):
+            source, target = (np.asarray(points, np.float64) for points in (source_points, target_points))
+            T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
+            require_rigid(T_init, "initial pose")
+            require_cloud_points(source, "source")
+            frame = frame or CanonicalFrame.of(target, unit)
+            target = frame.coordinates(self._thinned(target, "target", notes))
+            source = frame.coordinates(transform(T_init, self._thinned(source, "source", notes)))
+            _require_like_sizes(source, target)
+            icp = self._icp(target)
+        with _timed(seconds, "icp"):
+            T_icp, fitness, rmse = (of_starts[0] for of_starts in icp.register(source, np.eye(4)[None]))
+        with _timed(seconds, "embedding"):
+            h_1_d = self.embed(transform(T_icp, source))
+        with _timed(seconds, "attribution"):
+            (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
+        spread = None
+        if uncertainty is not None:
+            with _timed(seconds, "uncertainty"):
+                spread = _spread(icp, source, T_icp, uncertainty, frame.diameter)
+        if fitness == 0:
+            notes.append("no source point is near the target at the initial pose, so the scores mean nothing")
+        decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
+        return Explanation(
+            T_target_source=frame.pose_outside(T_icp) @ T_init,
+            fitness=float(fitness),
+            inlier_rmse=float(rmse) * frame.diameter,
+            scores=dict(zip(self.model.concepts, scores_C.tolist(), strict=True)),
+            variances=dict(zip(self.model.concepts, variances_C.tolist(), strict=True)),
+            bald=float(bald),
+            entropy=float(entropy(scores_C)),
+            concept=self.model.concepts[scores_C.argmax()],
+            action=decision.action,
+            reason=decision.reason,
+            spread=spread,
+            unit=unit,
+            seconds=seconds | {"total": perf_counter() - started},
+            notes=tuple(notes),
+        )
+
+    @torch.inference_mode()
+    def embed(self, aligned: np.ndarray) -> np.ndarray:
+        """Return the embedding (1, d) of an aligned source cloud (N, 3) in the canonical frame.
+
+        The mean over as many draws as in the training; of exactly as many points as the encoder sees, all draws are
+        the same.
+        """
+        settings = self.model.encoder_settings
+        draws, n = (1 if len(aligned) == settings.points else settings.draws), settings.points
+        repeated = len(aligned) < n
+        rows_D_N = [
+            generator("explanation", "draw", draw).choice(len(aligned), n, replace=repeated, shuffle=False)
+            for draw in range(draws)
+        ]
+        clouds_D_N_3 = torch.from_numpy(aligned.astype(np.float32)[np.array(rows_D_N)])
+        return self.model.encoder(clouds_D_N_3.to(self._device)).mean(dim=0, keepdim=True).cpu().numpy()
+
+    def _thinned(self, points: np.ndarray, role: str, notes: list[str]) -> np.ndarray:
+        kept = thin(points, self.model.points, role)
+        if len(kept) < len(points):
+            notes.append(f"{role}: {len(kept)} of {len(points)} points, drawn at random")
+        return kept
+
+    def _icp(self, target: np.ndarray) -> BatchedICP:
+        settings = self.model.icp
+        return BatchedICP(target, settings, None if settings.method == "point_to_point" else estimate_normals(target))
+
+
+def _require_like_sizes(source: np.ndarray, target: np.ndarray) -> None:
+    extents = [float(np.linalg.norm(np.ptp(cloud, axis=0))) for cloud in (source, target)]
+    ratio = extents[0] / extents[1]
+    if not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
+        raise InputError("source", f"is {ratio:.3g} times as large as the target", "give both in the same unit")
+
+
+def _spread(
+    icp: BatchedICP, source: np.ndarray, T_icp: np.ndarray, settings: UncertaintySettings, diameter: float
+) -> Spread:
+    xi_n_6 = generator("explanation", "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
+    runs = run_from_starts(icp, thin(source, settings.points, "spread"), np.eye(4), xi_n_6)
+    return Spread(runs.covariance(T_icp), settings.starts, diameter)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], stage: str) -> Iterator[None]:
+    started = perf_counter()
+    yield
+    seconds[stage] = perf_counter() - started

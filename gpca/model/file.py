@@ -1,0 +1,135 @@
+"""The model file: all that it takes to explain a registration, in one file that can be handed on.
+
+It holds tensors, numbers and names alone, so that loading one runs nobody's code.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from gpca.alignment.icp import ICPSettings
+from gpca.classifier.gpc import GPC
+from gpca.encoders.registry import make_encoder
+from gpca.encoders.training import EncoderSettings
+from gpca.errors import InputError
+from gpca.files import whole_file
+from gpca.recovery.policy import RecoveryPolicy, Thresholds
+
+FORMAT, VERSION = "GP-CA model", 2
+VARIABLE = "GPCA_MODEL"  # of the environment: the file that is taken where none is named
+RESULTS = Path(__file__).resolve().parents[2] / "results"
+BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
+REMEDY = "make one with 'make results', or alone with 'snakemake -j2 results/embedded/model.pt'"
+
+
+@dataclass(frozen=True)
+class Model:
+    """An encoder, a classifier on its embeddings, and how registrations were made for them.
+
+    Attributes:
+        encoder: from clouds (B, N, 3) to embeddings (B, d), ready for inference.
+        encoder_settings: also how many points it sees and how many draws make an embedding.
+        gpc: the classifier; its classes are the concepts.
+        icp: how ICP ran.
+        points: of source and of target, at most.
+        policy: what to do about which scores.
+        title, stand_in: of the objects of the training, and whether they were drawn by the package.
+    """
+
+    encoder: nn.Module
+    encoder_settings: EncoderSettings
+    gpc: GPC
+    icp: ICPSettings
+    points: int
+    policy: RecoveryPolicy
+    title: str
+    stand_in: bool
+
+    @property
+    def concepts(self) -> tuple[str, ...]:
+        """Names of the causes that it tells apart, in the order of the scores."""
+        return self.gpc.classes
+
+    def save(self, path: str | Path) -> None:
+        """Write the file; the same model gives the same bytes."""
+        content = {
+            "format": FORMAT,
+            "version": VERSION,
+            "encoder": self.encoder.state_dict(),
+            "encoder_settings": asdict(self.encoder_settings),
+            "gpc": self.gpc.state(),
+            "icp": asdict(self.icp),
+            "points": self.points,
+            "thresholds": asdict(self.policy.thresholds),
+            "treatments": dict(self.policy.treatments),
+            "title": self.title,
+            "stand_in": self.stand_in,
+        }
+        # Given a path, torch.save writes its name, here one with the process id, into the file.
+        with whole_file(path) as partial, partial.open("wb") as file:
+            torch.save(content, file)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Model:
+        """Read the file.
+
+        Raises:
+            InputError: missing, damaged, pickled, no model, or one of another version.
+        """
+        if not Path(path).is_file():
+            raise InputError(path, "no such model", REMEDY)
+        try:
+            content = torch.load(path, weights_only=True, map_location="cpu")
+        except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
+            raise InputError(path, "is damaged or no model", REMEDY) from fault
+        if not isinstance(content, Mapping) or content.get("format") != FORMAT:
+            raise InputError(path, "is no model", REMEDY)
+        if (version := content.get("version")) != VERSION:
+            raise InputError(path, f"is a model of version {version}, not of version {VERSION}", REMEDY)
+        try:
+            settings = EncoderSettings(**content["encoder_settings"])
+            encoder = make_encoder(settings.backbone, settings.options)
+            encoder.load_state_dict(content["encoder"])
+            return cls(
+                encoder=encoder.eval(),
+                encoder_settings=settings,
+                gpc=GPC.from_state(content["gpc"]),
+                icp=ICPSettings(**content["icp"]),
+                policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
+                **{name: content[name] for name in ("points", "title", "stand_in")},
+            )
+        except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
+            raise InputError(path, f"is a model with something missing or damaged ({fault})", REMEDY) from fault
+
+
+def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path:
+    """Return the model that is meant: the given one, that of the environment, or one that the workflow made.
+
+    Of those in `results`, that of the run ``real`` comes first, then ``embedded``, then the newest of any other, and
+    ``smoke`` last.
+
+    Raises:
+        InputError: there is none.
+    """
+    if given is not None:
+        return Path(given)
+    if named := os.environ.get(VARIABLE):
+        if not Path(named).is_file():
+            raise InputError(f"{VARIABLE}={named}", "no such model", f"correct it, or {REMEDY}")
+        return Path(named)
+
+    def rank(path: Path) -> tuple:
+        run = path.parent.name
+        preferred = BEST_FIRST.index(run) if run in BEST_FIRST else len(BEST_FIRST)
+        return run == "smoke", preferred, -path.stat().st_mtime
+
+    found = sorted(results.glob("*/model.pt"), key=rank)
+    if not found:
+        raise InputError("no model", f"none in {results}", f"{REMEDY}, or name one with --model or {VARIABLE}")
+    return found[0]

@@ -1,0 +1,63 @@
+"""A file of points or of a mesh as a user has it, read for one explanation: PLY, PCD, OBJ, STL, OFF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gpca.alignment.canonical_frame import CanonicalFrame
+from gpca.alignment.rigid import require_rigid
+from gpca.errors import InputError
+from gpca.objects import mesh_folder, pcd
+from gpca.objects.canonical import bounding_centre, canonical_cloud
+
+SAMPLED_POINTS = 16384  # on a mesh, as on the objects of the training
+SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd")
+
+
+def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
+    """Return the points (N, 3) of a cloud, or drawn on a mesh, in the file's unit, and the frame that they span.
+
+    Args:
+        unit: of the file: ``m``, ``cm`` or ``mm``.
+
+    Raises:
+        InputError: no such file, another format, unreadable, too few points, NaN, a mesh without area, or a diameter
+            that this unit does not give.
+    """
+    scale = mesh_folder.metres_per(unit)
+    if not path.is_file():
+        raise InputError(path, "no such file", f"give one of {', '.join(SUFFIXES)}")
+    if (suffix := path.suffix.lower()) not in SUFFIXES:
+        raise InputError(path, "is of another format", f"give one of {', '.join(SUFFIXES)}")
+    if suffix == ".pcd":
+        points = pcd.parse(path.read_bytes(), path)
+    else:
+        surface = mesh_folder.read_surface(path, scale)
+        if surface.faces is not None:
+            points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS)
+            frame = CanonicalFrame(bounding_centre(surface) / scale, diameter_m / scale)
+            return points_m.astype(np.float64) / scale + frame.centre_3, frame
+        points = surface.vertices_m / scale
+    return points, CanonicalFrame.of(points, unit, path)
+
+
+def read_pose(path: Path) -> np.ndarray:
+    """Return the pose (4, 4) of a text file of 16 numbers, row by row.
+
+    Raises:
+        InputError: no such file, other than 16 numbers, or no rigid transform.
+    """
+    remedy = "give 4×4 numbers, row by row"
+    try:
+        numbers = [float(word) for word in path.read_text(encoding="utf-8").replace(",", " ").split()]
+    except FileNotFoundError as fault:
+        raise InputError(path, "no such file", remedy) from fault
+    except ValueError as fault:
+        raise InputError(path, f"holds something that is no number ({fault})", remedy) from fault
+    if len(numbers) != 16:
+        raise InputError(path, f"holds {len(numbers)} numbers", remedy)
+    T_target_source = np.array(numbers).reshape(4, 4)
+    require_rigid(T_target_source, path)
+    return T_target_source

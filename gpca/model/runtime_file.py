@@ -1,0 +1,40 @@
+"""The file of runtimes: a row per component and device, as the step ``runtime`` measures them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gpca.errors import InputError
+from gpca.files import numbers, read_csv
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RUNTIME_COLUMNS = ("component", "device", "hardware", "threads", "repeats", "mean_s", "deviation_s", "median_s")
+COMPONENTS = {  # in the order of the table
+    "icp": "ICP alignment",
+    "icp_open3d": "ICP alignment by Open3D",
+    "features": "Feature extraction",
+    "sampling": "GPC posterior sampling",
+    "scores": "GP-CA score computation",
+    "bald": "BALD selection (optional)",
+    "retraining": "GPC retraining (optional)",
+    "explanation": "One explanation",
+    "explanation_512": "One explanation, 512 points",
+}
+OF_ONE_EXPLANATION = ("icp", "features", "sampling", "scores")
+
+
+def read_runtime(path: str | Path) -> pd.DataFrame:
+    """Read the rows.
+
+    Raises:
+        InputError: missing or unreadable file, missing column, unknown component, seconds that are no numbers.
+    """
+    rows = read_csv(path, RUNTIME_COLUMNS)
+    if unknown := set(rows["component"]) - set(COMPONENTS):
+        raise InputError(path, f"unknown component '{sorted(unknown)[0]}'", f"known are {', '.join(COMPONENTS)}")
+    for column in ("threads", "repeats", "mean_s", "deviation_s", "median_s"):
+        rows[column] = numbers(path, rows, column)
+    return rows

@@ -1,0 +1,1 @@
+"""Perturbed pairs of clouds, aligned and labelled."""

@@ -1,0 +1,149 @@
+"""Registrations: perturbed pairs, aligned by ICP, labelled with their concept, and the file that holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpca.alignment.rigid import scale_translation
+from gpca.errors import InputError
+from gpca.files import load_arrays, save_arrays
+from gpca.pairs.perturbation import CONCEPTS
+
+SPLITS = ("train", "test")
+
+
+@dataclass(frozen=True)
+class Registrations:
+    """S registrations. Lengths are relative to the object's diameter unless the name ends in ``_m``.
+
+    Attributes:
+        sample: (S,) number of the sample within its split.
+        split: (S,) ``train`` or ``test``.
+        concept: (S,) what was perturbed: ``noise``, ``pose`` or ``overlap``.
+        object_index, object_name, diameter_m: (S,) the object registered.
+        points: (ΣP, 3) float32, the ICP-aligned source clouds in the target's frame; cloud i is
+            ``points[offsets[i]:offsets[i + 1]]``.
+        target_points, target_offsets: the clean target clouds (ΣQ, 3) float32, in the same frame and kept the same way.
+        severity_noise, severity_rotation_rad, severity_translation, severity_crop: (S,) as drawn, 0 where not applied.
+        T_target_source_true, T_target_source_init, T_target_source_icp: (S, 4, 4), translations in metres.
+        fitness, inlier_rmse: (S,) of ICP.
+        attached: arrays (S, …) from other files, for explainers that read them: ``embedding``, ``head_logits``, …
+    """
+
+    sample: np.ndarray
+    split: np.ndarray
+    concept: np.ndarray
+    object_index: np.ndarray
+    object_name: np.ndarray
+    diameter_m: np.ndarray
+    points: np.ndarray
+    offsets: np.ndarray
+    target_points: np.ndarray
+    target_offsets: np.ndarray
+    severity_noise: np.ndarray
+    severity_rotation_rad: np.ndarray
+    severity_translation: np.ndarray
+    severity_crop: np.ndarray
+    T_target_source_true: np.ndarray
+    T_target_source_init: np.ndarray
+    T_target_source_icp: np.ndarray
+    fitness: np.ndarray
+    inlier_rmse: np.ndarray
+    attached: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.sample)
+
+    def cloud(self, i: int) -> np.ndarray:
+        """Return the aligned source cloud (P, 3) of row i."""
+        return self.points[self.offsets[i] : self.offsets[i + 1]]
+
+    def target(self, i: int) -> np.ndarray:
+        """Return the target cloud (Q, 3) of row i."""
+        return self.target_points[self.target_offsets[i] : self.target_offsets[i + 1]]
+
+    def T_target_source(self, which: str, i: int) -> np.ndarray:
+        """Return the pose ``init``, ``icp`` or ``true`` of row i in the unit of the clouds, the object's diameter."""
+        return scale_translation(getattr(self, f"T_target_source_{which}")[i], 1 / self.diameter_m[i])
+
+    @property
+    def embedding(self) -> np.ndarray:
+        """(S, d) of the encoder; only where it is attached."""
+        return self.attached["embedding"]
+
+    def rows(self, split: str) -> np.ndarray:
+        """Return the row numbers of a split."""
+        return np.flatnonzero(self.split == split)
+
+    def subset(self, rows: np.ndarray) -> Registrations:
+        """Return the given rows, in the given order."""
+        columns = {name: getattr(self, name)[rows] for name in REGISTRATION_COLUMNS}
+        attached = {name: array[rows] for name, array in self.attached.items()}
+        clouds = ragged([self.cloud(i) for i in rows], [self.target(i) for i in rows])
+        return replace(self, **columns, **clouds, attached=attached)
+
+    def without_labels(self) -> Registrations:
+        """Return the same registrations as an explainer may see them: nothing that tells what was perturbed."""
+        nan_S = np.full(len(self), np.nan)
+        unknown: dict[str, Any] = dict.fromkeys(
+            (name for name in REGISTRATION_COLUMNS if name.startswith("severity_")), nan_S
+        )
+        unknown["T_target_source_true"] = np.full_like(self.T_target_source_true, np.nan)
+        return replace(self, concept=np.full(len(self), ""), **unknown)
+
+    def save(self, path: str | Path) -> None:
+        """Write the npz described in results/README.md."""
+        save_arrays(path, {name: getattr(self, name) for name in (*REGISTRATION_COLUMNS, *CLOUDS)})
+
+    @classmethod
+    def load(cls, path: str | Path) -> Registrations:
+        """Read the npz.
+
+        Raises:
+            InputError: the file is missing, damaged, holds pickled objects, wrong shapes, NaN or unknown labels.
+        """
+        shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(REGISTRATION_COLUMNS, ("S",))
+        shapes |= {name: ("S", 4, 4) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
+        shapes |= {"points": ("P", 3), "offsets": ("O",), "target_points": ("Q", 3), "target_offsets": ("R",)}
+        arrays = load_arrays(path, shapes, made_by="python -m gpca registrations")
+        remedy = "make it anew with 'python -m gpca registrations'"
+        for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):
+            offsets = arrays[ends]
+            if len(offsets) != len(arrays["sample"]) + 1 or offsets[0] != 0 or offsets[-1] != len(arrays[points]):
+                raise InputError(path, f"'{ends}' do not match '{points}' and 'sample'", remedy)
+            if len(offsets) == 1 or (np.diff(offsets) < 3).any():
+                raise InputError(path, "holds no samples, or a cloud of fewer than 3 points", remedy)
+        for name, known in (("split", SPLITS), ("concept", CONCEPTS)):
+            if unknown := set(arrays[name].tolist()) - set(known):
+                raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
+        columns: dict[str, Any] = {name: arrays[name] for name in shapes}
+        return cls(**columns)
+
+
+def load_embeddings(
+    path: str | Path, registrations: Registrations, shapes: Mapping[str, tuple[int | str, ...]], made_by: str
+) -> dict[str, np.ndarray]:
+    """Read arrays of the registrations from a file of embeddings; see :func:`gpca.files.load_arrays`.
+
+    Raises:
+        InputError: also where the file is of other samples.
+    """
+    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by)
+    if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
+        raise InputError(path, "holds other samples than the registrations", f"make it anew with '{made_by}'")
+    return arrays
+
+
+CLOUDS = ("points", "offsets", "target_points", "target_offsets")
+REGISTRATION_COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in (*CLOUDS, "attached"))
+
+
+def ragged(clouds: list[np.ndarray], targets: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the four arrays of `CLOUDS` for the clouds and targets of all rows."""
+    ends = [np.cumsum([0, *(len(cloud) for cloud in of_kind)], dtype=np.int64) for of_kind in (clouds, targets)]
+    return dict(zip(CLOUDS, (np.concatenate(clouds), ends[0], np.concatenate(targets), ends[1]), strict=True))

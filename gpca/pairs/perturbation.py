@@ -1,0 +1,88 @@
+"""Controlled perturbations, one concept at a time (paper Sec. IV-A): noise, pose, overlap.
+
+A perturbation makes the observed **source** cloud out of clean points of the object. All lengths are relative to the
+object's diameter. Severities are drawn uniformly from the ranges of :class:`Severities`, the same for every source.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from gpca.alignment.rigid import inverse, random_direction, transform
+from gpca.errors import InputError
+
+CONCEPTS = ("noise", "pose", "overlap")
+
+
+@dataclass(frozen=True)
+class Severities:
+    """Ranges (low, high) of the severities.
+
+    Attributes:
+        noise: standard deviation of the Gaussian jitter, relative to the diameter.
+        rotation_deg: angle of the pose error about a random axis.
+        translation: length of the pose error in a random direction, relative to the diameter.
+        crop: share of the points cut off by a half-space in a random direction.
+    """
+
+    noise: tuple[float, float] = (0.01, 0.03)
+    rotation_deg: tuple[float, float] = (15.0, 60.0)
+    translation: tuple[float, float] = (0.05, 0.30)
+    crop: tuple[float, float] = (0.20, 0.60)
+
+    def __post_init__(self) -> None:
+        for severity in fields(self):
+            low, high = getattr(self, severity.name)
+            if low > high:
+                raise InputError(f"severity {severity.name}", f"[{low}, {high}] runs downwards", "swap the two")
+
+
+@dataclass(frozen=True)
+class Perturbed:
+    """A source cloud and how it was made.
+
+    Attributes:
+        points: (P, 3) in the source frame, relative to the diameter.
+        T_target_source_true: 4×4, takes the source back onto the target; identity unless the pose was perturbed.
+        severity: ``noise``, ``rotation_rad``, ``translation``, ``crop``; only those that were applied.
+    """
+
+    points: np.ndarray
+    T_target_source_true: np.ndarray = field(default_factory=lambda: np.eye(4))
+    severity: dict[str, float] = field(default_factory=dict)
+
+
+def add_noise(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
+    """Add Gaussian jitter to every point."""
+    sigma = random.uniform(*severities.noise)
+    return Perturbed(points + random.normal(scale=sigma, size=points.shape), severity={"noise": sigma})
+
+
+def move(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
+    """Rotate about a random axis through the object's centre and shift in a random direction."""
+    angle_rad = np.deg2rad(random.uniform(*severities.rotation_deg))
+    distance = random.uniform(*severities.translation)
+    T_source_target = np.eye(4)
+    T_source_target[:3, :3] = Rotation.from_rotvec(angle_rad * random_direction(random)).as_matrix()
+    T_source_target[:3, 3] = distance * random_direction(random)
+    return Perturbed(
+        transform(T_source_target, points),
+        inverse(T_source_target),
+        {"rotation_rad": angle_rad, "translation": distance},
+    )
+
+
+def crop(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
+    """Cut off the points beyond a plane with a random normal, placed so that the drawn share is lost."""
+    share = random.uniform(*severities.crop)
+    along = points @ random_direction(random)
+    kept = np.argsort(along, kind="stable")[: max(1, round(len(points) * (1 - share)))]
+    return Perturbed(points[np.sort(kept)], severity={"crop": share})
+
+
+Perturbation = Callable[[np.ndarray, Severities, np.random.Generator], Perturbed]
+PERTURBATIONS: dict[str, Perturbation] = {"noise": add_noise, "pose": move, "overlap": crop}

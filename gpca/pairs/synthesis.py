@@ -1,0 +1,120 @@
+"""Making the registrations of one source and seed: perturb clean clouds, align them by ICP, label them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from gpca.alignment.icp import ICP, ICPSettings
+from gpca.alignment.rigid import scale_translation, transform
+from gpca.environment import require_open3d
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import REGISTRATION_COLUMNS, SPLITS, Registrations, ragged
+from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed, Severities
+from gpca.progress import progress
+from gpca.seeds import generator
+
+
+@dataclass(frozen=True)
+class RegistrationSettings:
+    """How many registrations are made and how (docs/protocol.md).
+
+    Attributes:
+        train, test: samples of each split, balanced over concepts and objects.
+        points: points of source and target (fewer where the object has fewer than twice as many).
+        severities: ranges of the perturbations.
+        icp: how ICP runs.
+    """
+
+    train: int = 800
+    test: int = 200
+    points: int = 2048
+    severities: Severities = field(default_factory=Severities)
+    icp: ICPSettings = field(default_factory=ICPSettings)
+
+    @classmethod
+    def from_dict(cls, settings: dict) -> RegistrationSettings:
+        """Build from the config's section ``registrations``."""
+        settings = dict(settings)
+        severities = {name: tuple(limits) for name, limits in settings.pop("severities", {}).items()}
+        return cls(severities=Severities(**severities), icp=ICPSettings(**settings.pop("icp", {})), **settings)
+
+
+def make_registrations(
+    objects: ObjectClouds, source: str, seed: int, settings: RegistrationSettings
+) -> tuple[Registrations, np.ndarray]:
+    """Perturb, align by ICP and label: the data set of one source and seed.
+
+    Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order. Everything
+    random in a sample comes from generators named by source, seed, split and number, so that it does not depend on
+    how many samples there are.
+
+    Returns:
+        the registrations, and the seconds (S,) that ICP took for each.
+    """
+    require_open3d()  # loaded here, or the first sample's seconds would hold its import
+    samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
+    records = []
+    for split, n in progress(samples, f"registrations of {source}, seed {seed}"):
+        deal, place = divmod(n, len(CONCEPTS))
+        concept = generator(source, seed, "concepts", split, deal).permutation(CONCEPTS)[place]
+        object_index = deal % len(objects)
+        random = generator(source, seed, "registration", split, n)
+        record = _register_one(objects, object_index, concept, settings, random)
+        records.append(record | {"sample": n, "split": split})
+    return as_registrations(records)
+
+
+def _register_one(
+    objects: ObjectClouds, object_index: int, concept: str, settings: RegistrationSettings, random: np.random.Generator
+) -> dict:
+    points = objects.points(object_index) / float(objects.diameters_m[object_index])
+    n_points = min(settings.points, len(points) // 2)
+    # Disjoint draws: a point seen in both clouds would have distance zero, and that gives the concept away.
+    order = random.permutation(len(points))
+    source_rows, target_rows = order[:n_points], order[n_points : 2 * n_points]
+    perturbed = PERTURBATIONS[concept](points[source_rows], settings.severities, random)
+    return align_pair(perturbed, objects, object_index, target_rows, settings.icp) | {"concept": concept}
+
+
+def align_pair(
+    perturbed: Perturbed, objects: ObjectClouds, object_index: int, target_rows: np.ndarray, icp_settings: ICPSettings
+) -> dict:
+    """Align a perturbed cloud to points of its object's model, from the identity, and return it as a row's columns.
+
+    Args:
+        perturbed: in diameters, in the frame of the initial pose.
+        target_rows: of the object's canonical cloud.
+    """
+    diameter_m = float(objects.diameters_m[object_index])
+    target = objects.points(object_index)[target_rows] / diameter_m
+    T_init = np.eye(4)
+    started = perf_counter()
+    icp = ICP(target, objects.normals(object_index)[target_rows], icp_settings)
+    registration = icp.register(perturbed.points, T_init)
+    icp_seconds = perf_counter() - started
+    severity = {name: perturbed.severity.get(name, 0.0) for name in ("noise", "rotation_rad", "translation", "crop")}
+    return {
+        "object_index": object_index,
+        "object_name": str(objects.names[object_index]),
+        "diameter_m": diameter_m,
+        "cloud": transform(registration.T_target_source, perturbed.points).astype(np.float32),
+        "target": target.astype(np.float32),
+        "T_target_source_true": scale_translation(perturbed.T_target_source_true, diameter_m),
+        "T_target_source_init": T_init,
+        "T_target_source_icp": scale_translation(registration.T_target_source, diameter_m),
+        "icp_seconds": icp_seconds,
+        "fitness": registration.fitness,
+        "inlier_rmse": registration.inlier_rmse,
+        **{f"severity_{name}": value for name, value in severity.items()},
+    }
+
+
+def as_registrations(records: list[dict]) -> tuple[Registrations, np.ndarray]:
+    """Return rows that :func:`align_pair` made as registrations, and the seconds (S,) that ICP took for each."""
+    columns: dict[str, Any] = {name: np.array([record[name] for record in records]) for name in REGISTRATION_COLUMNS}
+    columns |= ragged([record["cloud"] for record in records], [record["target"] for record in records])
+    return Registrations(**columns), np.array([record["icp_seconds"] for record in records])

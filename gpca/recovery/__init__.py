@@ -1,0 +1,1 @@
+"""What to do about an uncertain registration, and a closed loop that measures it."""

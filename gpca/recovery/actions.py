@@ -1,0 +1,158 @@
+"""What a robot can do about a registration that failed, by name: search more broadly, look again, measure better.
+
+An action takes what the robot has (:class:`Holding`) and what it can do with its camera, and
+returns what it has then; the registration is made anew from that. No action is told the true pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse, scale_translation
+from gpca.errors import InputError
+from gpca.frames.shots import Shot, agreement, fuse
+
+LOOSER = 2.0  # the correspondence distance of the broader search, in that of ICP
+JUDGED = 8  # results of the search that the shots are compared with
+MODEL_POINTS, CLOUD_POINTS = 512, 256
+BEHIND = (0.1, 0.25)  # diameters from the middle of the measured side to the object's centre, in turn
+
+
+class Robot(Protocol):
+    """What an action may use: the camera, and what is known of the object."""
+
+    points_m: np.ndarray
+    normals: np.ndarray
+    vertices_m: np.ndarray
+    faces: np.ndarray
+    diameter_m: float
+
+    def shoot(self, T_world_camera: np.ndarray, frames: int) -> Shot:
+        """Measure from a viewpoint."""
+
+    def estimate(self, shot: Shot, filtered: bool) -> np.ndarray | None:
+        """Estimate the pose from one shot; None where it shows too little."""
+
+
+@dataclass(frozen=True)
+class Holding:
+    """What a robot has of a case.
+
+    Attributes:
+        shots: by viewpoint.
+        T_world_object_init: the pose that ICP starts from. T_world_object: what it ended at.
+        frames: that are taken at a viewpoint.
+        filtered: statistical outliers are removed.
+    """
+
+    shots: tuple[Shot, ...]
+    T_world_object_init: np.ndarray
+    T_world_object: np.ndarray
+    frames: int = 1
+    filtered: bool = False
+
+
+Action = Callable[..., Holding]
+
+
+def reinitialise(holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64) -> Holding:
+    """Search all orientations by ICP with a larger reach, and start from the pose that explains the shots best.
+
+    The results of least cost are judged, see :func:`best_start`.
+    """
+    from scipy.spatial.transform import Rotation
+
+    from gpca.alignment.batched_icp import BatchedICP
+    from gpca.alignment.icp import ICPSettings
+
+    d = robot.diameter_m
+    cloud_m = fuse(holding.shots, d, holding.filtered)
+    if len(cloud_m) < 3:
+        return holding
+    thinned_m = cloud_m[random.permutation(len(cloud_m))[:CLOUD_POINTS]]
+    rows = random.permutation(len(robot.points_m))[:MODEL_POINTS]
+    model_m = robot.points_m[rows].astype(np.float64)
+    settings = ICPSettings()
+    icp = BatchedICP(model_m / d, replace(settings, correspondence_distance=LOOSER * settings.correspondence_distance))
+    away = cloud_m.mean(axis=0) - holding.shots[0].T_world_camera[:3, 3]
+    away /= np.linalg.norm(away)
+    T_world_object_n = np.tile(np.eye(4), (starts, 1, 1))
+    T_world_object_n[:, :3, :3] = Rotation.random(starts, random_state=random).as_matrix()
+    T_world_object_n[:, :3, 3] = cloud_m.mean(axis=0) + np.resize(BEHIND, starts)[:, None] * d * away
+    T_world_object_n[0] = holding.T_world_object
+    starts_n = np.array([scale_translation(inverse(T), 1 / d) for T in T_world_object_n])
+    poses_n, fitness_n, rmse_n = icp.register(thinned_m / d, starts_n)
+    reach = LOOSER * settings.correspondence_distance
+    cost_n = fitness_n * rmse_n**2 + (1 - fitness_n) * reach**2
+    found = [inverse(scale_translation(poses_n[n], d)) for n in np.argsort(cost_n, kind="stable")[:JUDGED]]
+    return best_start(holding, robot, found)
+
+
+def new_view(
+    holding: Holding,
+    robot: Robot,
+    random: np.random.Generator,
+    azimuths: int = 8,
+    elevations_deg: tuple[float, ...] = (20.0, 45.0, 70.0),
+) -> Holding:
+    """Move to the viewpoint that should show most of the surface not seen yet, and fuse what it shows."""
+    from gpca.frames.situations import coarse
+    from gpca.frames.viewpoint import best_viewpoint, candidates, expected_surface
+
+    # About what was measured, not the estimated centre, which may be anywhere.
+    centre_m, first = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0), holding.shots[0]
+    distance_m = float(np.linalg.norm(centre_m - first.T_world_camera[:3, 3]))
+    poses_n = candidates(centre_m, distance_m, azimuths, elevations_deg)
+    points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
+    mesh = (robot.vertices_m, robot.faces)
+    expected = expected_surface(
+        holding.shots, *mesh, points_m, holding.T_world_object, robot.diameter_m, poses_n, coarse(first.camera)
+    )
+    shot = robot.shoot(poses_n[best_viewpoint(*expected)], holding.frames)
+    looked = replace(holding, shots=(*holding.shots, shot))
+    return best_start(looked, robot, [robot.estimate(shot, looked.filtered)])
+
+
+def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames: int = 10) -> Holding:
+    """Take several frames at every viewpoint and average them, and remove statistical outliers, from now on."""
+    frames += holding.frames * holding.filtered
+    shots = tuple(robot.shoot(shot.T_world_camera, frames) for shot in holding.shots)
+    measured = replace(holding, shots=shots, frames=frames, filtered=True)
+    return best_start(measured, robot, [robot.estimate(shot, True) for shot in shots])
+
+
+def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None]) -> Holding:
+    """Start from the pose that explains the shots best: one of these, or the estimate so far.
+
+    Poses are compared by :func:`gpca.frames.shots.agreement`, which needs no truth.
+    """
+    d, step = robot.diameter_m, max(1, len(robot.points_m) // MODEL_POINTS)
+    cloud_m = fuse(holding.shots, d, holding.filtered)
+    cloud_m = cloud_m[:: max(1, len(cloud_m) // CLOUD_POINTS)]
+    if not len(cloud_m):
+        return holding
+    model = (robot.points_m[::step].astype(np.float64), robot.normals[::step])
+    known = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
+    shares = [agreement(holding.shots, cloud_m, *model, T, d) for T in known]
+    return replace(holding, T_world_object_init=known[int(np.argmax(shares))])
+
+
+ACTIONS: dict[str, Action] = {"reinitialise": reinitialise, "new_view": new_view, "denoise": denoise}
+
+
+def action_of(name: str, settings: Mapping[str, object]) -> Action:
+    """Return the action of that name with its settings; InputError for an unknown name or setting."""
+    from functools import partial
+    from inspect import signature
+
+    if name not in ACTIONS:
+        raise InputError(f"recovery action '{name}'", "unknown", f"known are {', '.join(ACTIONS)}")
+    try:
+        signature(ACTIONS[name]).bind(None, None, None, **settings)
+    except TypeError as fault:
+        raise InputError(f"recovery action '{name}'", str(fault), "correct its settings") from fault
+    return partial(ACTIONS[name], **settings)

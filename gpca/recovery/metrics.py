@@ -1,0 +1,126 @@
+"""From what policies did about failures to numbers: of every policy, cause and seed, as one tidy table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import sqrt
+from pathlib import Path
+from statistics import NormalDist
+from typing import TYPE_CHECKING
+
+from gpca.attribution.metrics import ALL, tidy
+from gpca.errors import InputError
+from gpca.files import numbers, read_csv
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policy import QUEUE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE = "recovery"  # what `table` and `source` of the tidy rows read
+RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "recovered", "tries")
+SECONDS = ("explanation_seconds", "action_seconds")
+FIRST = "first_"  # metrics of the confusion: first_<action or queue>
+
+
+def collect_recovery(files: Iterable[str | Path], treatments: Mapping[str, str], budget: int) -> pd.DataFrame:
+    """Return the tidy metrics of files named `…/seed{seed}.csv`; results/README.md lists them.
+
+    Args:
+        treatments: concept -> the action of its own.
+        budget: actions per failure.
+
+    Raises:
+        InputError: no files, a name of another form, a missing column, no rows, an unknown cause.
+    """
+    records = []
+    for path in files:
+        seed, rows = seed_of_file(path), read_recovery(path)
+        for policy, of_policy in rows.groupby("policy", sort=False):
+            for cause in (ALL, *CONCEPTS):
+                of_cause = of_policy if cause == ALL else of_policy[of_policy["cause"] == cause]
+                if of_cause.empty:
+                    continue
+                values = policy_metrics(of_cause, treatments, budget)
+                records += [(TABLE, TABLE, policy, metric, cause, seed, float(v)) for metric, v in values.items()]
+    return tidy(records, "recovery")
+
+
+def policy_metrics(rows: pd.DataFrame, treatments: Mapping[str, str], budget: int) -> dict[str, float]:
+    """Return the metrics of one policy on the failures that the rows are of."""
+    first = rows[rows["step"] == 1]
+    acted = first[first["action"] != QUEUE]
+    episodes = first["episode"].nunique()
+    values = {
+        f"recovered_within_{k}": rows[rows["recovered"] & (rows["step"] <= k)]["episode"].nunique() / episodes
+        for k in range(1, budget + 1)
+    }
+    values |= {"episodes": episodes, "acted_first": len(acted), "tries": first.groupby("cause")["tries"].first().sum()}
+    if len(acted):
+        values["wrong_first"] = float((acted["action"] != acted["cause"].map(dict(treatments))).mean())
+    values["queued"] = rows[rows["action"] == QUEUE]["episode"].nunique() / episodes
+    values["actions"] = float((rows["action"] != QUEUE).sum() / episodes)
+    counts = first["action"].value_counts()
+    return values | {FIRST + action: counts.get(action, 0) for action in (*treatments.values(), QUEUE)}
+
+
+def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
+    """Return policy -> mean seconds of a failure, of explaining and acting, over all files of seconds."""
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        rows = read_csv(path, ("episode", "policy", *SECONDS))
+        rows["seconds"] = sum(numbers(path, rows, name) for name in SECONDS)
+        parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
+    if not parts:
+        raise InputError("recovery", "no files of seconds were given", "run the step recover")
+    return pd.concat(parts).groupby(level="policy").mean().to_dict()
+
+
+def read_recovery(path: str | Path) -> pd.DataFrame:
+    """Read a file of the step ``recover``: `recovered` as booleans, numbers as numbers, the rest as text."""
+    rows = read_csv(path, RECOVERY_COLUMNS)
+    for name in ("episode", "step", "tries"):
+        rows[name] = numbers(path, rows, name).astype(int)
+    if not (rows["cause"].isin(CONCEPTS) & rows["recovered"].isin(("True", "False"))).all():
+        raise InputError(path, "holds an unknown cause, or a row neither recovered nor not", "make it anew")
+    rows["recovered"] = rows["recovered"] == "True"
+    return rows
+
+
+def wilson_interval(successes: float, trials: int, level: float = 0.95) -> tuple[float, float]:
+    """Return the bounds in [0, 1] of a share's score interval (Wilson 1927).
+
+    Raises:
+        ValueError: no trials.
+    """
+    if trials < 1:
+        raise ValueError("interval of no trials")
+    z, share = NormalDist().inv_cdf((1 + level) / 2), successes / trials
+    centre = share + z**2 / (2 * trials)
+    half_width = z * sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
+    low, high = ((centre + sign * half_width) / (1 + z**2 / trials) for sign in (-1, 1))
+    return max(0.0, low), min(1.0, high)
+
+
+def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
+    """Return a share over the failures of all seeds, and their number; None where the metrics hold none.
+
+    A wrong first action is a share of the failures that were acted on at all.
+    """
+    weight = "acted_first" if metric == "wrong_first" else "episodes"
+    of_policy = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
+    share_R, count_R = (of_policy[of_policy["metric"] == m].set_index("seed")["value"] for m in (metric, weight))
+    if share_R.empty:
+        return None
+    weight_R = count_R[share_R.index]
+    return float((share_R * weight_R).sum() / weight_R.sum()), int(weight_R.sum())
+
+
+def seed_of_file(path: str | Path) -> int:
+    """Return the seed that a file's name tells."""
+    number = Path(path).stem.removeprefix("seed")
+    if not number.isdecimal():
+        raise InputError(path, "is not named …/seed{number}.csv", "rename it")
+    return int(number)

@@ -1,0 +1,137 @@
+"""Policies of recovery by name: which action they take next about a failed registration.
+
+A policy sees what a robot has: what an explainer says of the case after every action, and what was done before. It
+never sees the truth; ``oracle``, which is told the cause, is there as a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policy import Decision, RecoveryPolicy, Thresholds, Treated
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a policy knows when it decides.
+
+    Attributes:
+        actions: those that were taken, in order.
+        scores_T_C, bald_T: of its explainer, at the start and after each action; None for a policy that reads none.
+        cause: the truth, for the oracle alone; empty for all others.
+        random: the case's own numbers for policies, from their start: the same at every decision.
+    """
+
+    actions: tuple[str, ...]
+    scores_T_C: np.ndarray | None
+    bald_T: np.ndarray | None
+    cause: str
+    random: np.random.Generator
+
+
+Decide = Callable[[Case], Decision]
+
+
+@dataclass(frozen=True)
+class PolicyEntry:
+    """A policy by name.
+
+    Attributes:
+        title: as tables show it.
+        make: called with the robot's policy (thresholds, treatments) and the names of the actions.
+        explainer: that it reads (:mod:`gpca.explainers.interface`), empty for none.
+        oracle: it is told the cause.
+    """
+
+    title: str
+    make: Callable[[RecoveryPolicy, Sequence[str]], Decide]
+    explainer: str = ""
+    oracle: bool = False
+
+
+def follow_scores(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+    """Follow the scores of an explainer, and queue what is uncertain (:class:`gpca.recovery.policy.RecoveryPolicy`)."""
+    concept_of = {action: concept for concept, action in policy.treatments.items()}
+
+    def decide(case: Case) -> Decision:
+        scores_T_C, bald_T = case.scores_T_C, case.bald_T
+        assert scores_T_C is not None and bald_T is not None  # given to whoever reads an explainer
+        bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
+        before = []
+        for step, action in enumerate(case.actions):
+            column = CONCEPTS.index(concept_of[action])
+            fall = scores_T_C[step, column] - scores_T_C[step + 1, column]
+            before.append(Treated(concept_of[action], float(fall)))
+        return policy.decide(scores_T_C[-1], float(bald_T[-1]), before)
+
+    return decide
+
+
+def never_queue(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+    """Follow the scores, however uncertain they are, so that explainers are compared by their actions alone."""
+    limits = policy.thresholds
+    sure = Thresholds(uncertain=np.inf, dominant=0.0, improvement=limits.improvement, attempts=1_000_000)
+    return follow_scores(replace(policy, thresholds=sure), actions)
+
+
+def act_at_random(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+    """Take any action, the same one again too."""
+
+    def decide(case: Case) -> Decision:
+        # The case's numbers start anew at every decision, so the draws before are drawn again.
+        drawn = case.random.integers(len(actions), size=len(case.actions) + 1)[-1]
+        return Decision(actions[int(drawn)], "", "at random")
+
+    return decide
+
+
+def act_in_turn(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+    """Take all actions in turn, in an order drawn for each case."""
+
+    def decide(case: Case) -> Decision:
+        order = case.random.permutation(len(actions))
+        return Decision(actions[order[len(case.actions) % len(actions)]], "", "in turn")
+
+    return decide
+
+
+def follow_truth(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+    """Take the action that treats the true cause, again and again."""
+    return lambda case: Decision(policy.treatments[case.cause], case.cause, "told the cause")
+
+
+def always_act(action: str) -> Callable[[RecoveryPolicy, Sequence[str]], Decide]:
+    """Return what makes the policy of one and the same action."""
+    return lambda policy, actions: lambda case: Decision(action, "", "always")
+
+
+ALWAYS = "always_"  # before an action's name: the policy that takes it always
+POLICIES = {
+    "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca"),
+    "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
+    "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
+    "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
+    "random": PolicyEntry("Random action", act_at_random),
+    "round_robin": PolicyEntry("Round robin", act_in_turn),
+    "oracle": PolicyEntry("Oracle cause", follow_truth, oracle=True),
+}
+
+
+def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:
+    """Return the policy of that name.
+
+    Raises:
+        InputError: unknown policy, or one that always takes an unknown action.
+    """
+    if name in POLICIES:
+        return POLICIES[name]
+    action = name.removeprefix(ALWAYS)
+    if name != action and action in actions:
+        return PolicyEntry(f"Always: {action.replace('_', ' ')}", always_act(action))
+    known = ", ".join((*POLICIES, *(ALWAYS + known for known in actions)))
+    raise InputError(f"recovery policy '{name}'", "unknown", f"known are {known}")

@@ -1,0 +1,153 @@
+"""What every explainer takes each concept for: confusion matrix and predicted classes, explainers by sources."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, read_metrics
+from gpca.errors import InputError
+from gpca.reporting.figures.style import (
+    CONCEPT_COLOURS,
+    GREY,
+    LIGHT_GREY,
+    SMALL_PT,
+    TEXT_WIDTH_IN,
+    blues,
+    save_figure,
+    use_style,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LABEL_IN = 1.45  # of the explainers' titles
+HEAD_IN, ROW_IN, PANEL_IN, FOOT_IN = 0.62, 0.53, 0.43, 0.04
+LEAST_SOURCE_IN, LARGEST_SOURCE_IN = 1.4, 1.9
+LETTERS_IN, GAP_IN = 0.14, 0.2  # left of a matrix; between matrix and bars, and after the bars
+
+
+def draw_confusions_figure(
+    metrics_csv: str | Path,
+    sources: Mapping[str, str],
+    explainers: Mapping[str, str],
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw two panels for each explainer (rows) and source (columns), pooled over the seeds.
+
+    The matrix is the share in % of each true concept that is taken for each concept; what is missing to 100 is
+    abstained. The bars are the predicted classes' shares of all test samples, with a dash at the true share.
+
+    Args:
+        metrics_csv: as :func:`gpca.attribution.metrics.collect` makes it.
+        sources, explainers: name -> title, in order; those without metrics are left out.
+        pdf_path, png_path: the two files to write.
+
+    Raises:
+        InputError: an unusable file, or one without metrics of these explainers and sources.
+    """
+    confusions = pooled_confusions(read_metrics(metrics_csv))
+    rows = [name for name in explainers if any((source, name) in confusions for source in sources)]
+    columns = [name for name in sources if any((name, explainer) in confusions for explainer in explainers)]
+    if not rows:
+        raise InputError(metrics_csv, "holds no confusion of these explainers and sources", "make it anew")
+    use_style()
+    import matplotlib.pyplot as plt
+
+    source_in = float(np.clip((TEXT_WIDTH_IN - LABEL_IN) / len(columns), LEAST_SOURCE_IN, LARGEST_SOURCE_IN))
+    panel_in = (source_in - LETTERS_IN - 2 * GAP_IN) / 2
+    width_in, height_in = LABEL_IN + len(columns) * source_in, HEAD_IN + len(rows) * ROW_IN + FOOT_IN
+    figure = plt.figure(figsize=(width_in, height_in))
+
+    def text(x_in, y_in, words, **style):
+        figure.text(x_in / width_in, 1 - y_in / height_in, words, **style)
+
+    def panel(left_in, top_in):
+        bounds = (left_in / width_in, 1 - (top_in + PANEL_IN) / height_in, panel_in / width_in, PANEL_IN / height_in)
+        return figure.add_axes(bounds)
+
+    top = {source: next(name for name in rows if (source, name) in confusions) for source in columns}
+    for number, explainer in enumerate(rows):
+        top_in = HEAD_IN + number * ROW_IN
+        title = _wrapped(explainers[explainer], LABEL_IN, 7)
+        text(LABEL_IN - 0.04, top_in + PANEL_IN / 2, title, ha="right", va="center", fontsize=SMALL_PT, linespacing=1.1)
+        for place, source in enumerate(columns):
+            if (source, explainer) in confusions:
+                left_in = LABEL_IN + place * source_in + LETTERS_IN
+                confusion = confusions[source, explainer]
+                draw_matrix(panel(left_in, top_in), confusion, head=explainer == top[source])
+                draw_bars(panel(left_in + panel_in + GAP_IN, top_in), confusion, head=explainer == top[source])
+    for place, source in enumerate(columns):
+        left_in = LABEL_IN + place * source_in + LETTERS_IN
+        title = _wrapped(sources[source], source_in, 8)
+        text(left_in + panel_in + GAP_IN / 2, 0.03, title, ha="center", va="top", linespacing=1.1)
+        text(left_in + panel_in / 2, 0.42, "of each true (%)", ha="center", va="center", fontsize=SMALL_PT)
+        text(left_in + 1.5 * panel_in + GAP_IN, 0.42, "of all (%)", ha="center", va="center", fontsize=SMALL_PT)
+    text(0.04, 0.03, _key(next(iter(confusions.values()))), ha="left", va="top", fontsize=SMALL_PT)
+    save_figure(figure, pdf_path, png_path)
+
+
+def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
+    """Return (source, explainer) -> counts over all seeds: rows true concepts; columns predicted, abstained last."""
+    counts = metrics[metrics["metric"].str.startswith(PREDICTED_AS)]
+    counts = counts.assign(predicted=counts["metric"].str.removeprefix(PREDICTED_AS))
+    pooled = {}
+    for key, rows in counts.groupby(["source", "method"], sort=False):
+        table = rows.pivot_table("value", "concept", "predicted", aggfunc="sum", fill_value=0, sort=False)
+        pooled[key] = table[[name for name in table.columns if name != ABSTAINED] + [ABSTAINED]]
+    return pooled
+
+
+def _wrapped(title: str, width_in: float, size_pt: float) -> str:
+    letter_in = 0.48 * size_pt / 72  # about half as wide as high
+    return "\n".join(textwrap.wrap(title, int(width_in / letter_in), break_on_hyphens=False))
+
+
+def _key(confusion: pd.DataFrame) -> str:
+    concepts = list(confusion.columns[:-1])
+    named = [f"{letter} {concept}" for letter, concept in zip(letters(concepts), concepts, strict=True)]
+    return f"{', '.join(named)}\n– abstained\nmatrix: true (rows), predicted\nbars: predicted (dash: true)"
+
+
+def letters(concepts: list[str]) -> list[str]:
+    """Return the shortest capitalised beginnings that tell the concepts apart."""
+    length = next(n for n in range(1, 99) if len({concept[:n] for concept in concepts}) == len(set(concepts)))
+    return [concept[:length].capitalize() for concept in concepts]
+
+
+def draw_matrix(axes, confusion: pd.DataFrame, head: bool) -> None:
+    """Draw the rows' shares; a concept without samples has none. Predicted concepts are named only at the `head`."""
+    concepts = list(confusion.columns[:-1])
+    counts_C_C1 = confusion.reindex(concepts).to_numpy(float)
+    shares_C_C = counts_C_C1[:, :-1] / counts_C_C1.sum(axis=1, keepdims=True)
+    axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues(), vmin=0, vmax=1, aspect="auto")
+    for (row, column), share in np.ndenumerate(shares_C_C):
+        if np.isfinite(share):
+            style = {"fontsize": SMALL_PT, "color": "white" if share > 0.65 else "black"}
+            axes.text(column, row, f"{100 * share:.0f}", ha="center", va="center_baseline", **style)
+    names = letters(concepts)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_xticks(range(len(names)), names if head else [])
+    axes.spines[:].set(visible=True, linewidth=0.4)
+    axes.tick_params(length=0, pad=1.5, labelsize=SMALL_PT, labeltop=True, labelbottom=False)
+
+
+def draw_bars(axes, confusion: pd.DataFrame, head: bool) -> None:
+    """Draw the predicted classes' shares of all samples; a dash stands at the share that truly is of a concept."""
+    concepts = list(confusion.columns[:-1])
+    total = confusion.to_numpy().sum()
+    shares, truth = confusion.sum() / total, confusion.sum(axis=1) / total
+    colours = [*(CONCEPT_COLOURS.get(concept, GREY) for concept in concepts), LIGHT_GREY]  # the last abstained
+    axes.bar(range(len(shares)), shares, color=colours, width=0.7)
+    places = np.array([concepts.index(concept) for concept in truth.index])
+    axes.hlines(truth, places - 0.45, places + 0.45, color="black", linewidth=0.6)
+    axes.set(xlim=(-0.6, len(shares) - 0.4), ylim=(0, 1))
+    axes.set_yticks([0, 0.5, 1], ["0", "50", "100"] if head else [])
+    axes.set_xticks(range(len(shares)), [*letters(concepts), "–"] if head else [])
+    axes.tick_params(length=0, pad=1.5, labelsize=SMALL_PT, labeltop=True, labelbottom=False)
+    axes.tick_params(axis="y", length=1.5, labelsize=SMALL_PT)

@@ -1,0 +1,201 @@
+"""A contact sheet: every object of one source drawn as a shaded solid, so that the eye can check the data."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from pathlib import Path
+
+import numpy as np
+
+from gpca.files import load_arrays
+from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
+
+VIEW = (math.radians(-55), math.radians(32))  # azimuth and elevation of the eye, z up: front, right and top are seen
+BASE_COLOUR = np.array([0.62, 0.70, 0.80])
+LIGHT = np.array([-0.42, 0.55, 0.72])  # in the view frame (right, up, towards the eye): over the left shoulder
+SUPERSAMPLING = 2  # the picture is drawn finer and averaged, which smooths outlines
+FILL = 0.9  # share of a tile that the larger side of the object's outline takes
+DISC_COVER = 12.0  # mean number of points under a disc: exp(-12) of the surface stays bare
+LARGEST_DISC = 0.03  # of the picture: no disc leaves it, and a sparse cloud looks sparse
+OUTLINE = 0.6  # share of solid pixels around one that makes it solid; above 1/2 the outline is drawn in
+AWAY = 0.7  # discs that face away are this much smaller, lest the far wall stand out over a rim
+BLEND = 1.5  # discs within this many radii of the nearest are one surface: their normals are averaged
+CROWN = 1.5  # a disc's rim lies this many radii below its middle: at an edge the face's own discs win
+LEAST_TILT = 0.12  # discs seen edge on are kept this wide
+
+
+def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, float], pixels: int) -> np.ndarray:
+    """Draw an oriented point cloud as an opaque, shaded solid in orthographic projection, filling the picture.
+
+    Every point is a disc in its tangent plane (surface splatting: Zwicker et al., SIGGRAPH 2001). A first pass keeps
+    the nearest depth of each pixel, a second averages the normals of the discs at that depth, and the shading is
+    done once per pixel: Lambert with a soft terminator, darkened where the depth buffer dips behind its
+    surroundings (Luft et al., "Image enhancement by unsharp masking the depth buffer", SIGGRAPH 2006).
+
+    Args:
+        points: (P, 3), any unit of length.
+        normals: (P, 3) unit, outward; those that face away are turned towards the eye and count as the back of a wall.
+        view: azimuth and elevation of the eye in radians, z up.
+        pixels: width and height of the picture.
+
+    Returns:
+        (pixels, pixels, 3) float64 in [0, 1], row 0 on top, white where nothing is.
+    """
+    size = pixels * SUPERSAMPLING
+    axes = _view_axes(*view)
+    positions, facing = points @ axes.T, normals @ axes.T
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    scale = FILL * size / (float((high - low)[:2].max()) or 1.0)
+    positions = (positions - (low + high) / 2) * scale
+    positions[:, :2] += size / 2
+    radius = min(_disc_radius(positions), LARGEST_DISC * size)
+    depth, normal = _splat(positions, facing, radius, size)
+    image = _shade(depth, normal, relief=size / 40, radius=radius)
+    return image.reshape(pixels, SUPERSAMPLING, pixels, SUPERSAMPLING, 3).mean(axis=(1, 3))[::-1]
+
+
+def _view_axes(azimuth: float, elevation: float) -> np.ndarray:
+    """Return the rows right, up and towards-the-eye of an eye that looks at the origin."""
+    towards = np.array(
+        [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
+    )
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    return np.stack([right, np.cross(towards, right), towards])
+
+
+def _disc_radius(positions: np.ndarray) -> float:
+    """Radius of a disc that covers DISC_COVER points, from the distance to the 8th neighbour."""
+    from scipy.spatial import cKDTree
+
+    neighbours = min(8, len(positions) - 1)
+    if neighbours < 1:
+        return 1.0
+    distance, _ = cKDTree(positions).query(positions, k=[neighbours + 1])
+    return max(1.0, float(np.median(distance)) * math.sqrt(DISC_COVER / neighbours))
+
+
+def _splat(positions, facing, radius, size) -> tuple[np.ndarray, np.ndarray]:
+    """Return the depth (size, size), NaN where bare, and the summed normals (size, size, 3) of what is seen."""
+    from scipy.ndimage import minimum_filter
+
+    nearest = np.full(size * size, -np.inf)
+    for pixel, height, crown, _, _ in _discs(positions, facing, radius, size):
+        np.maximum.at(nearest, pixel, height - crown)
+    # A disc that lies behind everything around it adds to no pixel and is left out.
+    behind = minimum_filter(nearest.reshape(size, size), 2 * math.ceil(radius) + 1)
+    column, row = np.floor(positions[:, :2].T).astype(np.int64)
+    kept = positions[:, 2] + (1 + BLEND) * radius > behind[row, column]
+    facing = facing[kept]
+    towards_eye = facing * np.where(facing[:, 2:] < 0, -1.0, 1.0)
+    weights, heights, normal = np.zeros(size * size), np.zeros(size * size), np.zeros((3, size * size))
+    for pixel, height, crown, point, weight in _discs(positions[kept], facing, radius, size):
+        seen = height - crown > nearest[pixel] - BLEND * radius
+        pixel, point, weight = pixel[seen], point[seen], weight[seen]
+        np.add.at(weights, pixel, weight)
+        np.add.at(heights, pixel, weight * height[seen])
+        for axis in range(3):
+            np.add.at(normal[axis], pixel, weight * towards_eye[point, axis])
+    depth = np.divide(heights, weights, out=np.full(size * size, np.nan), where=weights > 0)
+    return depth.reshape(size, size), normal.T.reshape(size, size, 3)
+
+
+def _discs(positions, facing, radius, size):
+    """Yield, for every pixel offset within the radius, what is hit there: pixel, depth, crown, point, weight."""
+    column, row = np.floor(positions[:, :2].T).astype(np.int64)
+    centre, height = row * size + column, positions[:, 2]
+    slant = np.maximum(np.abs(facing[:, 2]), LEAST_TILT) * np.where(facing[:, 2] < 0, -1.0, 1.0)
+    tilt_right, tilt_up = -facing[:, 0] / slant, -facing[:, 1] / slant
+    away = facing[:, 2] < 0
+    reach = math.floor(radius)
+    for right in range(-reach, reach + 1):
+        for up in range(-reach, reach + 1):
+            rise = tilt_right * right + tilt_up * up
+            distance2 = (right * right + up * up + rise * rise) / radius**2
+            point = np.flatnonzero(distance2 <= np.where(away, AWAY**2, 1.0))
+            distance2, behind = distance2[point], away[point]
+            pixel = centre[point] + (up * size + right)
+            crown = radius * (CROWN * distance2 + behind)
+            weight = np.exp(-3 * distance2) * np.where(behind, 0.01, 1.0)
+            yield pixel, height[point] + rise[point], crown, point, weight
+
+
+def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) -> np.ndarray:
+    """Return the colours (size, size, 3) of a depth buffer with normals; `relief` is the scale of the depth cue."""
+    from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+    covered = np.isfinite(depth)
+    # Discs on the rim stand out over the true outline, each a little differently: smooth the outline and pull it in.
+    solid = gaussian_filter(covered.astype(float), 0.5 * radius) > OUTLINE
+    nearest = tuple(distance_transform_edt(~covered, return_distances=False, return_indices=True))
+    depth, normal = depth[nearest], normal[nearest]  # pinholes inside the outline take the pixel beside them
+    lambert = _unit(normal) @ (LIGHT / np.linalg.norm(LIGHT))
+    soft = (0.5 + 0.5 * lambert) ** 1.6
+    # Only solid pixels take part in the mean depth: the background is nowhere, not far away.
+    heights = np.where(solid, depth, 0.0)
+    share = np.maximum(gaussian_filter(solid.astype(float), relief), 1e-6)
+    dip = (heights - gaussian_filter(heights, relief) / share) / relief
+    brightness = (0.22 + 0.92 * soft) * (1 + 0.28 * np.clip(dip, -1.0, 0.25))
+    return np.where(solid[..., None], np.clip(BASE_COLOUR * 1.15 * brightness[..., None], 0, 1), 1.0)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
+def draw_contact_sheet(objects_npz: str | Path, title: str, pdf: str | Path, png: str | Path) -> None:
+    """Draw all objects of one source in a grid, each filling its tile, with its name and diameter below.
+
+    Args:
+        objects_npz: the clouds as `gpca objects` writes them.
+        title: the line on top; it says so when the objects are stand-ins.
+        pdf, png: the two files to write.
+
+    Raises:
+        InputError: the npz is missing, unreadable or not of that format.
+    """
+    shapes = {
+        "names": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("B",), "diameters_m": ("O",)
+    }  # fmt: skip
+    objects = load_arrays(objects_npz, shapes, made_by="python -m gpca objects")
+    use_style()
+    import matplotlib.pyplot as plt
+
+    count = len(objects["names"])
+    columns = _columns(count)
+    rows = math.ceil(count / columns)
+    tile = TEXT_WIDTH_IN / columns
+    size_pt = min(7.0, max(4.5, 7.0 * tile))
+    captions = [_caption(name, tile * 72, size_pt) for name in objects["names"]]
+    line = size_pt * 1.2 / 72
+    caption_height = line * (max(caption.count("\n") for caption in captions) + 2) + 0.08
+    title_height = 0.28
+    height = title_height + rows * (tile + caption_height)
+    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height))
+    write_title(figure, title)
+    for index, (name_lines, diameter_m) in enumerate(zip(captions, objects["diameters_m"], strict=True)):
+        row, column = divmod(index, columns)
+        in_row = min(columns, count - row * columns)
+        left = (column + (columns - in_row) / 2) * tile  # a short last row stands in the middle
+        bottom = height - title_height - row * (tile + caption_height) - tile
+        cloud = slice(objects["offsets"][index], objects["offsets"][index + 1])
+        image = render_cloud(objects["points_m"][cloud], objects["normals"][cloud], VIEW, round(tile * 300))
+        axes = figure.add_axes((left / TEXT_WIDTH_IN, bottom / height, tile / TEXT_WIDTH_IN, tile / height))
+        axes.imshow(image, interpolation="antialiased")
+        axes.set_axis_off()
+        text_x, text_y = (left + tile / 2) / TEXT_WIDTH_IN, (bottom - 0.02) / height
+        text = f"{name_lines}\n{diameter_m * 1000:.0f} mm"
+        figure.text(text_x, text_y, text, ha="center", va="top", fontsize=size_pt, linespacing=1.15)
+    save_figure(figure, pdf, png)
+
+
+def _columns(count: int) -> int:
+    """Between √n and 1.7 √n columns (4 at least), the number that leaves the fewest tiles empty, wider first."""
+    widest = max(4, math.floor(1.7 * math.sqrt(count)))
+    return min(range(widest, max(4, math.ceil(math.sqrt(count))) - 1, -1), key=lambda columns: -count % columns)
+
+
+def _caption(name: str, width_pt: float, size_pt: float) -> str:
+    """Break a name at its underscores into lines that fit the tile; letters are about half as wide as high."""
+    letters = max(4, int(0.96 * width_pt / (0.5 * size_pt)))
+    return "\n".join(textwrap.wrap(str(name).replace("_", " "), letters))

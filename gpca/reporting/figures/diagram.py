@@ -1,0 +1,82 @@
+"""Diagrams whose parts are panels of data: a canvas measured in inches, with boxes and arrows of one look."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gpca.reporting.figures.style import GREY, SMALL_PT, use_style
+
+
+class Canvas:
+    """A figure on which everything is placed in inches from the lower left corner.
+
+    Attributes:
+        figure: of matplotlib, in the suite's style.
+        axes: fills the figure, without frame; its data coordinates are inches.
+    """
+
+    def __init__(self, width_in: float, height_in: float) -> None:
+        use_style()
+        import matplotlib.pyplot as plt
+
+        self.width_in, self.height_in = width_in, height_in
+        self.figure = plt.figure(figsize=(width_in, height_in))
+        self.axes = self.figure.add_axes((0, 0, 1, 1))
+        self.axes.set(xlim=(0, width_in), ylim=(0, height_in))
+        self.axes.set_axis_off()
+
+    def panel(self, left_in: float, bottom_in: float, width_in: float, height_in: float):
+        """Return new axes at this place, through which boxes are seen."""
+        w, h = self.width_in, self.height_in
+        axes = self.figure.add_axes((left_in / w, bottom_in / h, width_in / w, height_in / h))
+        axes.patch.set_visible(False)
+        return axes
+
+    def text(self, x_in: float, y_in: float, words: str, **style) -> None:
+        """Write at this place, centred unless the style says otherwise."""
+        look: dict[str, Any] = {"ha": "center", "fontsize": SMALL_PT, "linespacing": 1.15} | style
+        self.axes.text(x_in, y_in, words, **look)
+
+    def box(
+        self,
+        left_in: float,
+        bottom_in: float,
+        width_in: float,
+        height_in: float,
+        words: str = "",
+        colour: str = GREY,
+        dashed: bool = False,
+    ) -> None:
+        """Draw a rounded box, tinted by its colour, with words in the middle; a dashed one is white."""
+        from matplotlib.patches import FancyBboxPatch
+
+        look: dict[str, Any] = {"facecolor": "white", "linestyle": "--"} if dashed else {"facecolor": colour + "22"}
+        style = f"round,pad=0,rounding_size={min(0.06, height_in / 3)}"
+        corner = (left_in, bottom_in)
+        self.axes.add_patch(
+            FancyBboxPatch(corner, width_in, height_in, boxstyle=style, edgecolor=colour, linewidth=0.9, **look)
+        )
+        self.text(left_in + width_in / 2, bottom_in + height_in / 2, words, va="center")
+
+    def arrow(self, *points_in: tuple[float, float], colour: str = GREY, words: str = "", over: bool = True) -> None:
+        """Draw a line through the points with a head at the last; words stand over (or under) the middle of its start.
+
+        Args:
+            points_in: two or more (x, y).
+            colour: of line and head.
+            words: at the first stretch.
+            over: words above that stretch, else below.
+        """
+        if len(points_in) > 2:
+            self.axes.plot(
+                *zip(*points_in[:-1], strict=True),
+                color=colour,
+                linewidth=0.9,
+                solid_capstyle="butt",
+                solid_joinstyle="miter",
+            )
+        look = {"arrowstyle": "-|>", "color": colour, "lw": 0.9, "mutation_scale": 7, "shrinkA": 0, "shrinkB": 0}
+        self.axes.annotate("", points_in[-1], points_in[-2], arrowprops=look)
+        if words:
+            (x, y), (x_end, _) = points_in[:2]
+            self.text((x + x_end) / 2, y + (0.035 if over else -0.035), words, va="bottom" if over else "top")

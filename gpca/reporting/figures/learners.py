@@ -1,0 +1,221 @@
+"""What the uncertainty of learners is worth: risk over coverage, reliability, uncertainty over distance.
+
+All take the same arguments and raise the same error:
+
+    learned: as :func:`gpca.shift.metrics.read_learner_predictions` returns it.
+    sources, learners: name -> title, in order; those without predictions are left out.
+    pdf_path, png_path: where the figure is written.
+    InputError: no predictions of these sources and learners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from gpca.attribution.diagnostics import BINS, rank_correlation, risk_coverage
+from gpca.errors import InputError
+from gpca.reporting.figures.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    LIGHT_GREY,
+    ORANGE,
+    PURPLE,
+    SKY_BLUE,
+    SMALL_PT,
+    TEXT_WIDTH_IN,
+    VERMILION,
+    save_figure,
+    use_style,
+    write_title,
+)
+from gpca.shift.metrics import sets_of, wrong
+from gpca.shift.sets import DISTANCES
+
+STYLES = {  # of the learners that are known: colour, line, width; GPC thick, the paper's rivals thinner
+    "gpca_paper": (BLUE, (0, (4, 2)), 1.8),
+    "gpca": (BLUE, "-", 1.8),
+    "learner_forest": (VERMILION, "-", 1.2),
+    "learner_linear_svm": (ORANGE, "-", 1.2),
+    "learner_rbf_svm": (ORANGE, ":", 0.9),
+    "learner_logistic": (BLACK, "-", 0.9),
+    "learner_nearest": (BLACK, ":", 0.9),
+    "learner_ensemble": (GREEN, "-", 0.9),
+    "learner_dropout": (GREEN, "--", 0.9),
+    "learner_laplace_head": (GREEN, ":", 0.9),
+    "learner_laplace_gpc": (SKY_BLUE, "-", 0.9),
+    "learner_dirichlet_gp": (PURPLE, "-", 0.9),
+}
+_OTHER = (GREY, "-", 0.9)
+SET_STYLES = {  # set -> title, colour
+    "in_distribution": ("like the training", GREY),
+    "severity": ("severities beyond", ORANGE),
+    "source": ("unseen source", BLUE),
+    "objects": ("unseen objects", GREEN),
+}
+Titles = Mapping[str, str]
+PANELS_PER_ROW = 4  # panels side by side
+FEWEST = 5  # samples of a bin whose accuracy is drawn
+COVERAGES = np.linspace(0.02, 1, 99)
+
+
+def draw_coverage_risk(
+    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw the mean over the seeds of the risk, by the largest score, on the test samples like the training's."""
+    shown, columns = _known(learned, sources, learners)
+    use_style()
+    import matplotlib.pyplot as plt
+
+    height_in = 2.75
+    figure, axes = plt.subplots(
+        1, len(columns), figsize=(TEXT_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
+    )
+    for panel, source in zip(axes[0], columns, strict=True):
+        for learner in reversed(shown):
+            risks = []
+            for rows in _of(learned, source, learner, "in_distribution"):
+                coverage, risk = risk_coverage(-rows["max_score"].to_numpy(), wrong(rows))
+                risks.append(np.interp(COVERAGES, coverage, risk))
+            if risks:
+                colour, line, width = STYLES.get(learner, _OTHER)
+                style = {"color": colour, "linestyle": line, "linewidth": width, "label": learners[learner]}
+                panel.plot(100 * COVERAGES, 100 * np.mean(risks, axis=0), **style)
+        panel.set_title(sources[source])
+        panel.set_xlabel("coverage (%)")
+        panel.set_xlim(0, 100)
+    axes[0, 0].set_ylim(bottom=0)
+    axes[0, 0].set_ylabel("risk: errors among the covered (%)")
+    handles = {line.get_label(): line for panel in axes[0] for line in panel.get_lines()}
+    titles = [learners[name] for name in shown]
+    figure.legend([handles[title] for title in titles], titles, ncol=4, loc="lower center", columnspacing=1.2)
+    figure.tight_layout(rect=(0, 0.62 / height_in, 1, 1), pad=0.4)
+    save_figure(figure, pdf_path, png_path)
+
+
+def draw_reliability(
+    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw accuracy over confidence, in the bins of the calibration error, and the share of samples in each bin.
+
+    Samples of all sources and seeds together, those like the training's; bins of fewer than `FEWEST` of them have no
+    point. The number in a title is the calibration error of them all.
+    """
+    shown, columns = _known(learned, sources, learners)
+    figure, panels = _panels(len(shown), panel_height_in=1.55)
+    for panel, learner in zip(panels, shown, strict=False):
+        parts = [rows for source in columns for rows in _of(learned, source, learner, "in_distribution")]
+        confidence_S = np.concatenate([1 - rows["max_score"].to_numpy() for rows in parts])
+        hit_S = np.concatenate([~wrong(rows) for rows in parts])
+        bin_S = np.minimum((confidence_S * BINS).astype(int), BINS - 1)
+        counts_B = np.bincount(bin_S, minlength=BINS)
+        drawn = counts_B >= FEWEST
+        accuracy_B = np.bincount(bin_S, weights=hit_S, minlength=BINS)[drawn] / counts_B[drawn]
+        mean_B = np.bincount(bin_S, weights=confidence_S, minlength=BINS)[drawn] / counts_B[drawn]
+        centres_B = (np.arange(BINS) + 0.5) / BINS
+        panel.bar(centres_B, counts_B / counts_B.sum(), width=1 / BINS, color=LIGHT_GREY, label="share of samples")
+        panel.plot([0, 1], [0, 1], color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
+        panel.plot(mean_B, accuracy_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, label="accuracy")
+        gap = np.abs(np.bincount(bin_S, weights=confidence_S - hit_S, minlength=BINS)).sum() / len(hit_S)
+        panel.set_title(f"{learners[learner]}\nECE {gap:.3f}", fontsize=SMALL_PT)
+        panel.set_xlim(1 / 3 - 0.03, 1.02)
+        panel.set_ylim(0, 1.02)
+        panel.set_xticks([0.4, 0.6, 0.8, 1.0])
+    handles, labels = panels[0].get_legend_handles_labels()
+    title = ", ".join(sources[name] for name in columns)
+    _finish(figure, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
+
+
+def draw_uncertainty_vs_distance(
+    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
+) -> None:
+    """Draw 1 - largest score over the distance to the training samples, of the first seed of every source.
+
+    ρ is the mean over sources, seeds and the three kinds of shift, each with the samples like the training's.
+    """
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    shown, columns = _known(learned, sources, learners)
+    figure, panels = _panels(len(shown), panel_height_in=1.4)
+    distance = DISTANCES[0]
+    first_seed = min(seed for _, _, seed in learned)
+    for panel, learner in zip(panels, shown, strict=False):
+        correlations = []
+        for (source, name, seed), rows in learned.items():
+            if name != learner or source not in columns:
+                continue
+            parts = sets_of(rows)
+            correlations += [rank_correlation(p["max_score"], p[distance]) for key, p in parts.items() if "+" in key]
+            if seed == first_seed:
+                for key, (_, colour) in SET_STYLES.items():
+                    if key in parts:
+                        points = {"color": colour, "alpha": 0.45, "s": 2.2, "linewidths": 0, "rasterized": True}
+                        panel.scatter(parts[key][distance], parts[key]["max_score"], **points)
+        panel.text(
+            0.97, 0.92, f"ρ = {np.mean(correlations):.2f}", transform=panel.transAxes, ha="right", fontsize=SMALL_PT
+        )
+        panel.set_title(learners[learner], fontsize=SMALL_PT)
+        panel.set_xscale("log")
+        panel.xaxis.set_major_locator(LogLocator(base=2))
+        panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        panel.xaxis.set_minor_locator(NullLocator())
+        panel.set_ylim(-0.02, 0.82)
+    handles = [Line2D([], [], color=c, marker="o", linestyle="") for _, c in SET_STYLES.values()]
+    labels = [title for title, _ in SET_STYLES.values()]
+    title = ", ".join(sources[name] for name in columns)
+    _finish(figure, title, handles, labels, "distance", "1 - largest score", pdf_path, png_path)
+
+
+LEARNER_FIGURES = {
+    "coverage_risk": draw_coverage_risk,
+    "reliability": draw_reliability,
+    "uncertainty_vs_distance": draw_uncertainty_vs_distance,
+}
+
+
+def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[str], list[str]]:
+    shown = [name for name in learners if any(learner == name for _, learner, _ in learned)]
+    columns = [name for name in sources if any(source == name for source, _, _ in learned)]
+    if not shown or not columns:
+        raise InputError("learners", "hold no predictions of these sources and learners", "run them first")
+    return shown, columns
+
+
+def _of(learned: Mapping, source: str, learner: str, of_set: str) -> list:
+    """Return the rows of a set, seed by seed."""
+    found = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
+    return [rows for rows in found if len(rows)]
+
+
+def _panels(count: int, panel_height_in: float):
+    """Return a figure with that many panels, their axes shared, and the panels."""
+    use_style()
+    import matplotlib.pyplot as plt
+
+    lines = -(-count // PANELS_PER_ROW)
+    size = (TEXT_WIDTH_IN, 0.75 + panel_height_in * lines)
+    figure, axes = plt.subplots(lines, PANELS_PER_ROW, figsize=size, sharex=True, sharey=True, squeeze=False)
+    for spare in axes.flat[count:]:
+        spare.set_visible(False)
+    return figure, list(axes.flat[:count])
+
+
+def _finish(figure, title: str, handles: list, labels: list[str], across: str, up: str, pdf_path, png_path) -> None:
+    """Label the outer panels, set a title above all and a legend below, and write the figure."""
+    height_in = figure.get_size_inches()[1]
+    shown = [panel for panel in figure.axes if panel.get_visible()]
+    for i, panel in enumerate(shown):
+        if i % PANELS_PER_ROW == 0:
+            panel.set_ylabel(up)
+        if i + PANELS_PER_ROW >= len(shown):
+            panel.set_xlabel(across)
+            panel.tick_params(labelbottom=True)
+    figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
+    write_title(figure, title)
+    figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
+    save_figure(figure, pdf_path, png_path)

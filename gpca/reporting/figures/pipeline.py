@@ -1,0 +1,232 @@
+"""Fig. 4 of the paper: online inference (top) and active learning (bottom), drawn from what a run wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gpca.active_learning.acquisition import EXPANSION, Pool, bald_kmeans, top
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.active_learning import STYLES, mean_curves
+from gpca.reporting.figures.cloud_views import draw_clouds
+from gpca.reporting.figures.diagram import Canvas
+from gpca.reporting.figures.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
+from gpca.reporting.figures.style import (
+    BLACK,
+    BLUE,
+    CONCEPT_COLOURS,
+    CONCEPT_MARKERS,
+    GREY,
+    LIGHT_GREY,
+    SMALL_PT,
+    SOURCE_COLOUR,
+    TARGET_COLOUR,
+    TEXT_WIDTH_IN,
+    blues,
+    save_figure,
+    write_title,
+)
+from gpca.seeds import generator
+
+CONCEPT = "overlap"  # of the sample shown
+SETTING = "pretrained"  # of the learning curves: the encoder knows all concepts, the classifier all but one
+TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # of their strategies
+THUMBNAILS = 6  # clouds of the pool that are shown
+
+
+@dataclass(frozen=True)
+class Round:
+    """The next round of labels, with the N test samples as the pool.
+
+    Attributes:
+        rows_N: their rows.
+        map_S_2: principal components of all embeddings, fitted on the standardised ones of the training samples.
+        candidates, chosen: places in `rows_N` of the B·K largest BALD and of those B that k-means keeps.
+    """
+
+    rows_N: np.ndarray
+    map_S_2: np.ndarray
+    candidates: np.ndarray
+    chosen: np.ndarray
+
+
+def draw_pipeline(
+    registrations_npz: str | Path,
+    embeddings_npz: str | Path,
+    predictions_csv: str | Path,
+    curve_files: Iterable[str | Path],
+    title: str,
+    encoder: str,
+    batch: int,
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
+
+    Args:
+        registrations_npz, embeddings_npz, predictions_csv: of one source and seed; the sample shown is
+            :meth:`gpca.reporting.figures.shown_sample.Stages.choose`'s of the concept `CONCEPT`.
+        curve_files: of that source, as for :func:`gpca.reporting.figures.active_learning.draw_learning_curves`.
+        title: of the source.
+        encoder: as the figure names it.
+        batch: B, labels per round.
+        pdf_path, png_path: the two files to write.
+
+    Raises:
+        InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
+    """
+    stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv)
+    row = stages.choose(CONCEPT, registrations_npz)
+    curves = {name: curve for (_, name, setting), curve in mean_curves(curve_files).items() if setting == SETTING}
+    if not any(name in curves for name in TITLES):
+        raise InputError("active learning", f"holds no curve of {' or '.join(TITLES)}", "run one of these strategies")
+    asked = next_round(stages, batch)
+    canvas = Canvas(TEXT_WIDTH_IN, 3.5)
+    canvas.box(0.03, 1.9, 7.1, 1.4, colour=LIGHT_GREY)
+    canvas.box(0.03, 0.03, 7.1, 1.6, colour=LIGHT_GREY)
+    _draw_inference(canvas, stages, row, encoder, asked)
+    _draw_active_learning(canvas, stages, asked, curves, batch)
+    canvas.arrow((6.4, 1.97), (6.4, 1.63))
+    canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
+    canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
+    canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
+    write_title(canvas.figure, f"{title}: {stages.predictions['object'][row].replace('_', ' ')}")
+    for x_in, colour, words in (
+        (6.2, TARGET_COLOUR, r"target $\mathcal{Q}$"),
+        (6.68, SOURCE_COLOUR, r"source $\mathcal{P}$"),
+    ):
+        canvas.axes.plot(x_in - 0.05, 3.405, "o", color=colour, markersize=3)
+        canvas.text(x_in, 3.4, words, ha="left", va="center")
+    save_figure(canvas.figure, pdf_path, png_path)
+
+
+def next_round(stages: Stages, batch: int) -> Round:
+    """Let the paper's strategy choose what a person would be asked about next among the test samples."""
+    from sklearn.decomposition import PCA
+    from sklearn.preprocessing import StandardScaler
+
+    train, rows_N = stages.registrations.rows("train"), stages.registrations.rows("test")
+    if not len(train):
+        raise InputError("registrations", "hold no training samples", "raise registrations.train")
+    scaler = StandardScaler().fit(stages.h_S_d[train])  # as the classifier does it
+    h_S_d = scaler.transform(stages.h_S_d)
+    map_S_2 = PCA(2, svd_solver="full").fit(h_S_d[train]).transform(h_S_d)
+    of_pool = stages.predictions.iloc[rows_N]
+    scores_N_C = of_pool[[f"score_{concept}" for concept in CONCEPTS]].to_numpy()
+    bald_N = of_pool["bald"].to_numpy()
+    pool = Pool(h_S_d[rows_N], scores_N_C, bald_N, h_S_d[train], of_pool["concept_true"].to_numpy())
+    chosen = bald_kmeans(pool, min(batch, len(rows_N)), generator("fig4_pipeline"))
+    return Round(rows_N, map_S_2, top(bald_N, batch * EXPANSION), chosen)
+
+
+def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, asked: Round) -> None:
+    sample, middle_in, captions_in = stages.predictions.iloc[row], 2.66, 2.1
+    canvas.text(0.1, 3.27, "Online inference", ha="left", va="top", fontweight="bold")
+    seen = stages.seen(row)
+    corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
+    captions = {"init": "initial pose $T_0$: ", "icp": r"aligned $\hat{T}\mathcal{P}$: "}
+    for left_in, (which, pair) in zip((0.12, 1.56), seen.items(), strict=True):
+        draw_clouds(canvas.panel(left_in, 2.16, 1.06, 0.98), *pair, 1.0, (corners.min(axis=0), corners.max(axis=0)))
+        canvas.text(left_in + 0.53, captions_in, captions[which] + stages.words(row, which), va="top")
+    canvas.arrow((1.2, middle_in), (1.54, middle_in), words="ICP")
+    canvas.arrow((2.66, middle_in), (2.8, middle_in))
+    corners_in = [(2.8, 3.02), (3.3, 2.86), (3.3, 2.46), (2.8, 2.3)]
+    canvas.axes.fill(*zip(*corners_in, strict=True), facecolor=GREY + "22", edgecolor=GREY, linewidth=0.9)
+    canvas.text(3.05, middle_in, f"{encoder}\n$f_\\theta$", va="center")
+    canvas.text(3.05, captions_in, "frozen", va="top")
+    canvas.arrow((3.3, middle_in), (3.46, middle_in))
+    draw_embedding(canvas.panel(3.48, 2.3, 0.36, 0.72), stages.h_S_d[row])
+    canvas.text(3.66, captions_in, rf"$\mathbf{{h}} \in \mathbb{{R}}^{{{stages.h_S_d.shape[1]}}}$", va="top")
+    canvas.arrow((3.86, middle_in), (4.02, middle_in))
+    canvas.box(4.02, 2.0, 1.2, 1.22, colour=BLUE)
+    canvas.text(4.62, 3.19, "multi-class GP classifier", va="top")
+    _draw_labelled(canvas.panel(4.07, 2.17, 1.1, 0.88), stages, row, asked)
+    canvas.text(4.62, 2.03, "★ this sample", va="bottom")
+    canvas.arrow((5.22, middle_in), (5.58, middle_in))
+    draw_scores_with_numbers(canvas.panel(5.96, 2.42, 0.62, 0.62), sample)
+    canvas.text(
+        6.36, captions_in, rf"$\hat{{s}}_c \pm \sqrt{{v_c}}$;  $\hat{{c}}$ = {sample['concept_predicted']}", va="top"
+    )
+
+
+def _draw_labelled(axes, stages: Stages, row: int, asked: Round) -> None:
+    """Scatter the training samples by concept, and the sample that is shown."""
+    of = stages.registrations
+    for concept in CONCEPTS:
+        rows = of.rows("train")[of.concept[of.rows("train")] == concept]
+        look = {"marker": CONCEPT_MARKERS[concept], "color": CONCEPT_COLOURS[concept], "alpha": 0.6, "linewidths": 0}
+        axes.scatter(*asked.map_S_2[rows].T, s=5, **look)
+    axes.scatter(*asked.map_S_2[row], s=45, marker="*", color=BLACK, zorder=5)
+    axes.set_axis_off()
+
+
+def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: Mapping, batch: int) -> None:
+    """Draw pool, score, diversify, annotate, retrain from right to left: the way back of the loop."""
+    heads_in, captions_in, middle_in = 1.58, 0.08, 0.86
+    canvas.text(0.1, heads_in, "Active learning", ha="left", va="top", fontweight="bold")
+
+    canvas.text(6.4, heads_in, r"Unlabelled pool $\mathcal{D}_U$", va="top")
+    canvas.text(6.4, captions_in, f"{len(asked.rows_N)} test samples", va="bottom")
+    thumbnails = np.linspace(0, len(asked.rows_N) - 1, min(THUMBNAILS, len(asked.rows_N))).astype(int)
+    for place, i in enumerate(thumbnails):
+        corner = (5.9 + 0.36 * (place % 3), 0.86 - 0.56 * (place // 3))
+        _draw_thumbnail(canvas.panel(*corner, 0.34, 0.5), stages, asked.rows_N[i])
+    canvas.arrow((5.84, middle_in), (5.62, middle_in))
+
+    canvas.text(5.04, heads_in, "Score: BALD", va="top")
+    panel = canvas.panel(4.5, 0.36, 1.08, 1.02)
+    bald_N = stages.predictions["bald"].to_numpy()[asked.rows_N]
+    points_N_2 = asked.map_S_2[asked.rows_N]
+    order = np.argsort(bald_N, kind="stable")
+    panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GREY, linewidths=0.3)
+    panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
+    panel.set_axis_off()
+    canvas.text(
+        5.04,
+        captions_in,
+        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats;\n$B K$ = {len(asked.candidates)} ringed",
+        va="bottom",
+    )
+    canvas.arrow((4.46, middle_in), (4.24, middle_in))
+
+    canvas.text(3.66, heads_in, "Diversify: $k$-means", va="top")
+    panel = canvas.panel(3.12, 0.36, 1.08, 1.02)
+    panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="white", edgecolors=BLACK, linewidths=0.7)
+    panel.scatter(*points_N_2[asked.chosen].T, s=26, facecolors=BLUE, edgecolors=BLACK, linewidths=0.7)
+    panel.margins(0.12)
+    panel.set_axis_off()
+    canvas.text(3.66, captions_in, f"$B$ = {len(asked.chosen)} kept,\none of each cluster", va="bottom")
+    canvas.arrow((3.08, middle_in), (2.88, middle_in))
+
+    canvas.text(2.4, heads_in, "Annotate", va="top")
+    for place, i in enumerate(asked.chosen[:4]):
+        corner = (1.98 + 0.44 * (place % 2), 0.94 - 0.6 * (place // 2))
+        _draw_thumbnail(canvas.panel(*corner, 0.4, 0.46), stages, asked.rows_N[i])
+        concept = stages.predictions["concept_true"][asked.rows_N[i]]
+        canvas.text(corner[0] + 0.2, corner[1] - 0.01, concept, va="top")
+    canvas.arrow((1.92, middle_in), (1.72, middle_in))
+
+    canvas.text(1.4, heads_in, "Retrain", va="top")
+    panel = canvas.panel(0.5, 0.38, 1.18, 1.0)
+    for name in reversed(TITLES):
+        if name in curves:
+            colour, line, width = STYLES[name]
+            panel.plot(
+                curves[name]["labels"], curves[name]["mean"], line, color=colour, linewidth=width, label=TITLES[name]
+            )
+    low, high = panel.get_ylim()
+    panel.set_ylim(bottom=low - 0.5 * (high - low))  # room for the legend
+    panel.locator_params(axis="x", nbins=4, integer=True)
+    panel.set_ylabel("accuracy (%)", fontsize=SMALL_PT, labelpad=1)
+    panel.set_xlabel("labels", fontsize=SMALL_PT, labelpad=0)
+    panel.tick_params(pad=1.5, length=2)
+    panel.legend(loc="lower right", borderaxespad=0, handlelength=1.2, borderpad=0.1, labelspacing=0.2)
+
+
+def _draw_thumbnail(axes, stages: Stages, row: int) -> None:
+    target_Q_3, source_P_3 = stages.seen(row)["icp"]
+    draw_clouds(axes, target_Q_3[::3], source_P_3[::3], size=0.4)

@@ -1,0 +1,79 @@
+"""Fig. 6 of the paper: from concept scores and their uncertainty to one of four branches, with the policy's numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.reporting.figures.diagram import Canvas
+from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, save_figure, write_title
+
+WORDS = {
+    "reinitialise": "Reinitialise ICP\nbroader search over orientations",
+    "new_view": "Change the viewpoint\nmore of the surface in sight",
+    "denoise": "Filter, check the sensor\nseveral frames, outliers removed",
+}
+ASKED = {
+    "noise": "noise dominates",
+    "pose": "pose dominates",
+    "overlap": "overlap dominates",
+}
+
+
+def read_policy(path: str | Path) -> dict:
+    """Read the JSON of the step ``recover``; InputError where it is missing or lacks a threshold."""
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        content["thresholds"] = {
+            name: float(content["thresholds"][name]) for name in ("uncertain", "dominant", "improvement", "attempts")
+        }
+        content["treatments"] = dict(content["treatments"])
+    except FileNotFoundError as fault:
+        raise InputError(path, "no such file", "make it with 'python -m gpca recover'") from fault
+    except (ValueError, KeyError, TypeError) as fault:
+        raise InputError(path, "is no policy with its thresholds", "make it with 'python -m gpca recover'") from fault
+    return content
+
+
+def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
+    """Draw the mapping of one policy: what it reads, the four branches in the order of asking, and the way back."""
+    policy = read_policy(policy_json)
+    limits, treatments = policy["thresholds"], policy["treatments"]
+    canvas = Canvas(TEXT_WIDTH_IN, 2.45)
+    write_title(canvas.figure, "Thresholds of this run, on virtual tables (procedural stand-in)")
+    words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"
+    canvas.box(0.04, 0.86, 1.3, 0.66, words)
+    branches = [(_queue_condition(limits), "Abstain\nqueue for labelling, retrain", GREY)]
+    branches += [
+        (ASKED.get(concept, concept), WORDS.get(action, action.replace("_", " ")), CONCEPT_COLOURS[concept])
+        for concept, action in sorted(treatments.items(), key=lambda item: ("pose", "overlap", "noise").index(item[0]))
+    ]
+    middles_in = [1.99 - 0.53 * place for place in range(len(branches))]
+    for middle_in, (condition, branch, colour) in zip(middles_in, branches, strict=True):
+        canvas.box(1.95, middle_in - 0.2, 1.6, 0.4, condition, colour, dashed=True)
+        canvas.box(3.95, middle_in - 0.2, 1.85, 0.4, branch, colour)
+        canvas.arrow((1.34, 1.19), (1.62, 1.19), (1.62, middle_in), (1.95, middle_in))
+        canvas.arrow((3.55, middle_in), (3.95, middle_in), colour=colour)
+        if colour != GREY:
+            canvas.arrow((5.8, middle_in), (6.05, middle_in))
+    back = (
+        "Register and\nscore anew\n\n"
+        r"$\hat{s}_c$ falls by less" + f"\nthan {limits['improvement']:.2f}: next\nconcept; after\n"
+        f"{limits['attempts']:.0f} such attempts:\nqueue"
+    )
+    canvas.box(6.05, middles_in[-1] - 0.2, 1.06, middles_in[1] - middles_in[-1] + 0.4, back)
+    canvas.arrow((6.58, middles_in[-1] - 0.2), (6.58, 0.06), (0.69, 0.06), (0.69, 0.86))
+    save_figure(canvas.figure, pdf_path, png_path)
+
+
+def short_action(action: str) -> str:
+    """Return the words for an action of recovery, its purpose left out."""
+    return WORDS.get(action, action.replace("_", " ")).splitlines()[0].rstrip(",")
+
+
+def _queue_condition(limits: Mapping[str, float]) -> str:
+    return (
+        f"BALD > {limits['uncertain']:.3f} nats\nor " + rf"$\mathrm{{max}}_c\,\hat{{s}}_c$ < {limits['dominant']:.2f}"
+    )

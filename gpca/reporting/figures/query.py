@@ -1,0 +1,44 @@
+"""The registration that a person is asked about: the aligned cloud over its reference, from three sides."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gpca.reporting.figures.style import SOURCE_COLOUR, TARGET_COLOUR, TEXT_WIDTH_IN, save_png, use_style, write_title
+
+_POINTS = 1500  # of each cloud; more hide one another
+
+
+def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:
+    """Draw source over target along each axis, at one scale, into a PNG."""
+    use_style()
+    import matplotlib.pyplot as plt
+
+    clouds = [
+        (_thinned(target_Q_3), TARGET_COLOUR, "reference"),
+        (_thinned(cloud_P_3), SOURCE_COLOUR, "aligned source"),
+    ]
+    everything = np.concatenate([cloud for cloud, *_ in clouds])
+    centre = (everything.min(axis=0) + everything.max(axis=0)) / 2
+    reach = 0.52 * float(np.ptp(everything, axis=0).max())
+    figure, panels = plt.subplots(1, 3, figsize=(TEXT_WIDTH_IN, TEXT_WIDTH_IN / 3 + 0.35))
+    for panel, (across, up, name) in zip(
+        panels, ((0, 1, "along z"), (0, 2, "along y"), (1, 2, "along x")), strict=True
+    ):
+        for cloud, colour, label in clouds:
+            panel.scatter(cloud[:, across], cloud[:, up], s=1.2, color=colour, alpha=0.5, linewidths=0, label=label)
+        panel.set(
+            xlim=centre[across] + np.array([-reach, reach]), ylim=centre[up] + np.array([-reach, reach]), aspect="equal"
+        )
+        panel.set_axis_off()
+        panel.set_title(name)
+    write_title(figure, title)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncol=2, markerscale=5)
+    save_png(figure, png_path)
+
+
+def _thinned(cloud_P_3: np.ndarray) -> np.ndarray:
+    return cloud_P_3[np.linspace(0, len(cloud_P_3) - 1, min(_POINTS, len(cloud_P_3))).astype(int)]

@@ -1,0 +1,109 @@
+"""One registration of a run with all that the stages made of it: what the figures of the method are drawn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse, transform
+from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.errors import InputError
+from gpca.files import numbers
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.cloud_views import widest_views
+from gpca.reporting.figures.concepts import severity_text
+from gpca.reporting.figures.frame_views import draw_scores
+from gpca.reporting.figures.style import GREY, SMALL_PT, blues
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Stages:
+    """S registrations of one source and seed, their embeddings h (S, d) and what GP-CA said of them, row by row."""
+
+    registrations: Registrations
+    h_S_d: np.ndarray
+    predictions: pd.DataFrame
+
+    @classmethod
+    def load(cls, registrations_npz: str | Path, embeddings_npz: str | Path, predictions_csv: str | Path) -> Stages:
+        """Read what the stages wrote.
+
+        Raises:
+            InputError: an unusable file, or files of different samples; predictions without variances or BALD.
+        """
+        registrations = Registrations.load(registrations_npz)
+        arrays = load_embeddings(embeddings_npz, registrations, {"h": ("S", "d")}, "python -m gpca embed")
+        predictions = read_predictions(predictions_csv)
+        named = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
+        if named != list(zip(predictions["split"], predictions["sample"], strict=True)):
+            raise InputError(predictions_csv, f"holds other samples than {registrations_npz}", "make both anew")
+        if set(concepts_of(predictions)) != set(CONCEPTS):
+            raise InputError(predictions_csv, f"does not score the concepts {', '.join(CONCEPTS)}", "make it anew")
+        for column in ("bald", *(f"variance_{concept}" for concept in CONCEPTS)):
+            if column not in predictions:
+                raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
+            predictions[column] = numbers(predictions_csv, predictions, column)
+        return cls(registrations, arrays["h"], predictions)
+
+    def choose(self, concept: str, path: str | Path) -> int:
+        """Return the row that is shown, a test sample of the concept that is named right after a poor fit.
+
+        Of those named right (of all, where none is), the half that ICP fits worst is kept, since an explanation is
+        asked for when a registration looks bad; of these the one with the median score of the concept. InputError,
+        naming `path`, where there is no test sample of it.
+        """
+        test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
+        if test.empty:
+            raise InputError(path, f"holds no test sample of '{concept}'", "raise registrations.test")
+        right = test[test["concept_predicted"] == concept]
+        kept = test if right.empty else right
+        worst = kept.assign(fit=self.registrations.fitness[kept.index]).nsmallest((len(kept) + 1) // 2, "fit")
+        ranked = worst.sort_values([f"score_{concept}", "sample"], kind="stable")
+        return int(ranked.index[(len(ranked) - 1) // 2])
+
+    def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return target and source (·, 3) of a row, the source where the pose ``init`` or ``icp`` puts it."""
+        registrations = self.registrations
+        moved = registrations.T_target_source(which, row) @ inverse(registrations.T_target_source("icp", row))
+        return registrations.target(row), transform(moved, registrations.cloud(row))
+
+    def seen(self, row: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return the clouds before (``init``) and after ICP (``icp``) in the axes of the view that shows most.
+
+        Of the views that show the target widest, the one in which the clouds before ICP differ most from those after.
+        """
+        pairs = {which: self.clouds(row, which) for which in ("init", "icp")}
+        target, source = pairs["icp"]
+        moved = pairs["init"][1] - source
+        view = max(widest_views(target), key=lambda view: float(np.linalg.norm(moved @ view[:2].T)))
+        return {which: (target @ view.T, source @ view.T) for which, (target, source) in pairs.items()}
+
+    def words(self, row: int, which: str) -> str:
+        """Return what the registrations say of a pose: of ``init`` what was perturbed, of ``icp`` how well it fits."""
+        if which == "init":
+            return severity_text(self.registrations, row, str(self.registrations.concept[row]))
+        return f"fitness {self.registrations.fitness[row]:.2f}"
+
+
+def draw_embedding(axes, h_d: np.ndarray) -> None:
+    """Draw an embedding as a strip of cells, row by row; the darker, the larger the value within it."""
+    columns = next(width for width in range(round(np.sqrt(len(h_d) / 2)) or 1, 0, -1) if len(h_d) % width == 0)
+    axes.imshow(h_d.reshape(-1, columns), cmap=blues(), aspect="auto", interpolation="nearest")
+    axes.set(xticks=[], yticks=[])
+    axes.spines[:].set(visible=True, linewidth=0.6, color=GREY)
+
+
+def draw_scores_with_numbers(axes, sample: pd.Series) -> None:
+    """Draw a sample's concept scores as bars ± one standard deviation, and write score ± deviation beside them."""
+    draw_scores(axes, sample)
+    for place, concept in enumerate(CONCEPTS):
+        deviation = np.sqrt(sample[f"variance_{concept}"])
+        words = f"{sample[f'score_{concept}']:.2f}±{deviation:.2f}"
+        axes.text(1.06, place, words, ha="left", va="center", fontsize=SMALL_PT)

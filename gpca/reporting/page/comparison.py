@@ -1,0 +1,74 @@
+"""The comparison as the page shows it: numbers with the digits that the paper prints, verdicts with a tone."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+
+from gpca.comparison.verdicts import CLOSE, NOT_REPRODUCED, REPRODUCED
+from gpca.errors import InputError
+from gpca.files import read_csv
+
+TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # other verdicts judge nothing
+_COLUMNS = (
+    *("table", "row", "column", "unit", "published", "decimals", "reproduced", "ci_low", "ci_high", "n"),
+    *("difference", "verdict", "reason"),
+)
+_NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
+
+
+def page_comparison(path: str | Path) -> dict | None:
+    """Return the rows of ``comparison.csv`` in words, its tables, and verdicts with tone and number; None without it.
+
+    Raises:
+        InputError: an unreadable file, a missing column, no rows, a number that is none.
+    """
+    if not Path(path).is_file():
+        return None
+    rows = read_csv(path, _COLUMNS)
+    counts = Counter(rows["verdict"])
+    order = [*TONES, *sorted(set(counts) - set(TONES))]
+    return {
+        "rows": [_words(path, row) for row in rows.to_dict("records")],
+        "tables": list(dict.fromkeys(rows["table"])),
+        "verdicts": [(verdict, TONES.get(verdict, ""), counts[verdict]) for verdict in order if counts[verdict]],
+    }
+
+
+def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
+    """Return the entries of a row as they are printed; the texts stay as they are."""
+    printed = {name: _rounded(path, row, name) for name in _NUMBERS}
+    upper, deviation = (printed[name] for name in ("upper", "deviation"))
+    at_least = row.get("at_least", "").lower() == "true"
+    return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict", "reason")} | {
+        "tone": TONES.get(row["verdict"], ""),
+        "objects": ", ".join(filter(None, (row.get("objects", ""), row.get("hardware", "")))),
+        "published": printed["published"]
+        + (f" to {upper}" if upper else "")
+        + (f" ± {deviation}" if deviation else ""),
+        "reproduced": "> " * at_least + printed["reproduced"],
+        "interval": f"[{printed['ci_low']}, {printed['ci_high']}]" if printed["ci_low"] and printed["ci_high"] else "",
+        "difference": printed["difference"],
+        "factor": f"× {_number(path, row, 'factor'):.2g}" if row.get("factor") else "",
+    }
+
+
+def _rounded(path: str | Path, row: Mapping[str, str], name: str) -> str:
+    """Return a number with as many digits as the printed one, or one of its own where that would be 0; or nothing."""
+    if row.get(name, "") in ("", "nan"):
+        return ""
+    value = _number(path, row, name)
+    decimals = max(0, _number(path, row, "decimals", int))  # below 0 for what is printed in round tens
+    return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"
+
+
+def _number(path: str | Path, row: Mapping[str, str], name: str, kind: type = float):
+    try:
+        value = kind(row[name])
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(path, f"'{name}' holds something that is not a number: '{row[name]}'", "make it anew")
+    return value

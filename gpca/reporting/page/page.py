@@ -1,0 +1,180 @@
+"""A run as one plain web page: the comparison, every table and figure, registrations in 3-D; it works from disk."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.files import whole_file
+from gpca.reporting.page.comparison import page_comparison
+from gpca.reporting.page.markdown_table import read_markdown_table
+from gpca.reporting.page.samples import POINTS, RULE, page_samples
+from gpca.reporting.sections import by_section, listed_as, title_of_result
+
+TEMPLATES = Path(__file__).parent / "templates"
+_CSS_PIXELS = 130 / 300  # of a pixel of a figure, which has 300 in an inch: a little larger than in print
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the page says of a run besides its results.
+
+    Attributes:
+        name: of the run.
+        seeds: of its repeats.
+        sources: name -> ``{"title": str, "stand_in": bool}``.
+        tables, figures: names of the files in ``tables/`` and ``figures/``.
+        samples: source -> files of registrations and of GP-CA's predictions on them.
+        config: the whole configuration.
+        command: that makes what is missing.
+    """
+
+    name: str
+    seeds: Sequence[int]
+    sources: Mapping[str, Mapping]
+    tables: Sequence[str]
+    figures: Sequence[str]
+    samples: Mapping[str, tuple[str, str]]
+    config: Mapping
+    command: str
+
+
+def write_page(folder: str | Path, captions: str | Path, run: Run) -> None:
+    """Write ``index.html`` of a finished run into its folder, and ``page/plotly.min.js`` beside it.
+
+    The comparison is shown where the folder has a ``comparison.csv``.
+
+    Args:
+        folder: ``results/{run}``.
+        captions: a folder with a reStructuredText file for each table and figure.
+        run: what is shown.
+
+    Raises:
+        InputError: a file is missing (the line names all that are, and how to make them) or unusable.
+    """
+    from plotly.offline import get_plotlyjs
+
+    folder = Path(folder)
+    require_complete(folder, run)
+    shown = {
+        section: [_shown(folder, Path(captions), run, name) for name in names]
+        for section, names in by_section([*run.tables, *run.figures]).items()
+    }
+    text = render(
+        run=run,
+        sections=shown,
+        comparison=page_comparison(folder / "comparison.csv"),
+        samples=[
+            sample for source, files in run.samples.items() for sample in page_samples(*files, run.sources[source])
+        ],
+        provenance=read_provenance(_provenance_files(folder, run)),
+    )
+    for path, content in ((folder / "page/plotly.min.js", get_plotlyjs()), (folder / "index.html", text)):
+        with whole_file(path) as partial:
+            partial.write_text(content, encoding="utf-8")
+
+
+def render(**content) -> str:
+    """Return the page's HTML; everything that comes from files is escaped."""
+    import yaml
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["anchor"] = lambda title: re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+    environment.filters["yaml"] = lambda value: yaml.safe_dump(value, sort_keys=False, allow_unicode=True, width=100)
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "sort_keys": True}
+    words = {"samples_rule": RULE, "samples_points": POINTS}
+    return environment.get_template("index.html.jinja").render(**content, **words)
+
+
+def require_complete(folder: Path, run: Run) -> None:
+    """Raise an InputError that names every result of the run that is not there, and the command that makes it."""
+    needed = [f"tables/{name}.{suffix}" for name in run.tables for suffix in ("md", "csv", "tex")]
+    needed += [f"figures/{name}.{suffix}" for name in run.figures for suffix in ("png", "pdf")]
+    missing = [name for name in needed if not (folder / name).is_file()]
+    missing += [str(path) for files in run.samples.values() for path in files if not Path(path).is_file()]
+    if missing:
+        raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
+
+
+def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
+    """Return what the records beside files say: kind of fact -> its values, and of how many files each holds."""
+    facts: dict[str, Counter] = {}
+    for path in files:
+        record_path = path.with_name(path.name + ".provenance.json")
+        try:
+            record = json.loads(record_path.read_text(encoding="utf-8"))
+            code, libraries = record["code"], record["libraries"]
+            values = {
+                "Code": (code["commit"] or "outside a git checkout")
+                + " with uncommitted changes" * bool(code["dirty"]),
+                "Config (SHA-256)": record["config_sha256"] or "none",
+                "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],
+                "Device": record["device"],
+                "Python": record["python"],
+            } | {name: libraries[name] for name in sorted(libraries)}
+        except FileNotFoundError:
+            values = {"Code": "not recorded"}
+        except (ValueError, KeyError, TypeError) as fault:
+            raise InputError(record_path, "is not a record of provenance", "make its result anew") from fault
+        for fact, value in values.items():
+            facts.setdefault(fact, Counter())[value] += 1
+    return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
+
+
+def _provenance_files(folder: Path, run: Run) -> list[Path]:
+    files = [folder / f"tables/{name}.csv" for name in run.tables]
+    files += [folder / f"figures/{name}.pdf" for name in run.figures]
+    return files + [Path(path) for of_source in run.samples.values() for path in of_source]
+
+
+def _shown(folder: Path, captions: Path, run: Run, name: str) -> dict:
+    """Return one table or figure as the template takes it."""
+    caption = rendered_caption(captions / f"{listed_as(name)}.rst")
+    common = {"name": name, "title": title_of_result(name), "caption": caption}
+    if name in run.tables:
+        return common | {"table": read_markdown_table(folder / f"tables/{name}.md")}
+    width, height = _size(folder / f"figures/{name}.png")
+    return common | {"table": None, "width": round(width * _CSS_PIXELS), "height": round(height * _CSS_PIXELS)}
+
+
+def rendered_caption(path: Path):
+    """Return a caption, reStructuredText, as safe HTML.
+
+    Raises:
+        InputError: no such file, or a fault in it.
+    """
+    from docutils.core import publish_parts
+    from docutils.utils import SystemMessage
+    from markupsafe import Markup
+
+    # Nothing of its own gets into the page, neither files nor raw HTML; a fault stops instead of being printed.
+    settings = {"raw_enabled": False, "file_insertion_enabled": False, "halt_level": 2, "report_level": 5}
+    try:
+        text = path.read_text(encoding="utf-8")
+        return Markup(publish_parts(text, writer="html5", settings_overrides=settings)["body"])
+    except FileNotFoundError as fault:
+        raise InputError(path, "no such caption", "write it: what is shown, of which table or figure") from fault
+    except SystemMessage as fault:
+        raise InputError(path, f"is no reStructuredText ({fault})", "correct it") from fault
+
+
+def _size(path: Path) -> tuple[int, int]:
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            return image.size
+    except OSError as fault:
+        raise InputError(path, "is no readable image", "make it anew with snakemake") from fault

@@ -1,0 +1,111 @@
+"""The registrations that the page shows in 3-D: which ones, how their clouds lie, and what GP-CA says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse
+from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.errors import InputError
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+OF_EACH_CONCEPT = 2  # samples of a source
+POINTS = 600  # of a cloud
+RULE = (
+    f"Of every source, the first {OF_EACH_CONCEPT} test samples of each concept in the run's first seed, in the order "
+    "of their numbers, right or wrong."
+)
+_STEPS_PER_DIAMETER = 1000  # coordinates are whole thousandths of the diameter
+
+
+def page_samples(registrations_npz: str | Path, predictions_csv: str | Path, source: Mapping) -> list[dict]:
+    """Return what the page's 3-D view needs of the samples of one source that `RULE` names, as plain JSON values.
+
+    Each holds the target and the ICP-aligned source as flat lists x, y, z of at most `POINTS` points each, in
+    thousandths of the object's diameter, and the 4×4 transforms (row by row, in diameters) that take the aligned source
+    to its initial and to its true pose; object, concept, severity, scores, standard deviations, fitness.
+
+    Args:
+        registrations_npz, predictions_csv: of one source and seed.
+        source: its ``title`` and ``stand_in``.
+
+    Raises:
+        InputError: an unusable file, or a sample that was not predicted.
+    """
+    registrations = Registrations.load(registrations_npz)
+    predictions = read_predictions(predictions_csv)
+    test = predictions[predictions["split"] == "test"].set_index("sample")
+    samples = []
+    for row in first_of_each_concept(registrations):
+        number = str(registrations.sample[row])
+        if number not in test.index:
+            raise InputError(predictions_csv, f"lacks test sample {number} of {registrations_npz}", "make both anew")
+        samples.append(
+            _sample(registrations, row, test.loc[number], concepts_of(predictions)) | {"source": dict(source)}
+        )
+    return samples
+
+
+def first_of_each_concept(registrations: Registrations) -> list[int]:
+    """Return the rows that `RULE` names, concept by concept."""
+    test = registrations.rows("test")
+    in_order = test[np.argsort(registrations.sample[test], kind="stable")]
+    return [int(row) for c in CONCEPTS for row in in_order[registrations.concept[in_order] == c][:OF_EACH_CONCEPT]]
+
+
+def severity_words(registrations: Registrations, row: int) -> str:
+    """Return what was done to a sample; lengths are in % of the object's diameter."""
+    concept = str(registrations.concept[row])
+    if concept == "noise":
+        return f"σ = {100 * registrations.severity_noise[row]:.1f} % of the diameter"
+    if concept == "pose":
+        angle_deg = np.degrees(registrations.severity_rotation_rad[row])
+        return f"turned by {angle_deg:.0f}°, moved by {100 * registrations.severity_translation[row]:.0f} %"
+    return f"{100 * registrations.severity_crop[row]:.0f} % of the points cut off"
+
+
+def _sample(registrations: Registrations, row: int, prediction: pd.Series, concepts: list[str]) -> dict:
+    T_icp_target = inverse(registrations.T_target_source("icp", row))
+    return {
+        "object": str(registrations.object_name[row]),
+        "sample": int(registrations.sample[row]),
+        "concept": str(registrations.concept[row]),
+        "severity": severity_words(registrations, row),
+        "fitness": _number(registrations.fitness[row]),
+        "predicted": str(prediction["concept_predicted"]),
+        "scores": [
+            {
+                "concept": concept,
+                "mean": _number(prediction[f"score_{concept}"]),
+                "deviation": _number(np.sqrt(prediction[f"variance_{concept}"])),
+            }
+            for concept in concepts
+        ],
+        "target_points": _flat(registrations.target(row)),
+        "points": _flat(registrations.cloud(row)),
+        "initial": _transform(registrations.T_target_source("init", row) @ T_icp_target),
+        "truth": _transform(registrations.T_target_source("true", row) @ T_icp_target),
+    }
+
+
+def _number(value: float) -> float | None:
+    """JSON knows no NaN, which is the score of an explainer that abstains."""
+    return round(float(value), 3) if np.isfinite(value) else None
+
+
+def _flat(points: np.ndarray) -> list[int]:
+    """Thin a cloud (P, 3) evenly over its order, which is random or a scan's."""
+    kept = np.unique(np.linspace(0, len(points) - 1, min(POINTS, len(points))).astype(int))
+    return np.rint(points[kept] * _STEPS_PER_DIAMETER).astype(int).ravel().tolist()
+
+
+def _transform(T: np.ndarray) -> list[float]:
+    return [round(float(value), 5) for value in T.ravel()]

@@ -1,0 +1,138 @@
+"""Making samples unlike those of the training: severities beyond it, another source, objects never seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gpca.encoders.training import Classifier, EncoderSettings, embed, train_encoder
+from gpca.explainers.analytical_features import analytical_features
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations
+from gpca.seeds import generator
+from gpca.shift.distance import knn_distance, mahalanobis_distance, principal_components
+from gpca.shift.sets import SPACES, ShiftedSets
+
+
+@dataclass(frozen=True)
+class ShiftSettings:
+    """How many samples are made, how unlike they are and how far is measured.
+
+    Attributes:
+        beyond: how the registrations with larger severities are made; their number is `beyond.test`.
+        encoder: how the encoder that never sees some objects is trained.
+        samples: at most so many of another source, and of objects that an encoder never saw.
+        held_out_share: of the objects, at least one, that this encoder and the learners on it never see.
+        train: training samples of that encoder, at most.
+        neighbours: of the mean distance to the nearest training samples.
+        points: at which the local shape of a cloud is measured for the distances.
+    """
+
+    beyond: RegistrationSettings
+    encoder: EncoderSettings
+    samples: int = 90
+    held_out_share: float = 0.2
+    train: int = 300
+    neighbours: int = 10
+    points: int = 128
+
+
+def make_sets(
+    objects: ObjectClouds,
+    registrations: Registrations,
+    other: Registrations | None,
+    encoder: Classifier,
+    encoder_settings: EncoderSettings,
+    source: str,
+    seed: int,
+    settings: ShiftSettings,
+) -> ShiftedSets:
+    """Make, embed and measure all sets of one source and seed.
+
+    Args:
+        objects: of the source.
+        registrations: of the source, with the encoder's embeddings attached.
+        other: registrations of another source, whose test samples are the set `source`; without them it is left out,
+            as the sets of unseen objects are where the source has a single one.
+        encoder, encoder_settings: the source's encoder.
+    """
+    beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
+    parts = {"in_distribution": registrations, "severity": beyond}
+    if other is not None:
+        parts["source"] = other.subset(other.rows("test")[: settings.samples])
+    for name in [name for name in parts if name != "in_distribution"]:
+        h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
+        parts[name] = replace(parts[name], attached={"embedding": h_S_d})
+    measured = [_measured(parts, source, seed, settings)]
+    held_out = held_out_objects(registrations.object_name, settings.held_out_share, source, seed)
+    if len(held_out):
+        parts = _of_unseen_objects(registrations, held_out, source, seed, settings)
+        measured.append(_measured(parts, source, seed, settings))
+    return ShiftedSets.joined(measured)
+
+
+def held_out_objects(names: np.ndarray, share: float, source: str, seed: int) -> np.ndarray:
+    """Return the objects to be held out: a share of them, rounded, at least one; none where there is only one."""
+    names = np.unique(names)
+    count = min(max(1, round(share * len(names))), len(names) - 1)
+    return np.sort(generator(source, seed, "held-out objects").permutation(names)[:count])
+
+
+def _of_unseen_objects(
+    registrations: Registrations, held_out: np.ndarray, source: str, seed: int, settings: ShiftSettings
+) -> dict[str, Registrations]:
+    """Train an encoder that never sees some objects; return what it saw with its kind, and what it never saw."""
+    held_out_S = np.isin(registrations.object_name, held_out)
+    is_train_S = registrations.split == "train"
+    train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
+    seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))
+    # Training samples of objects that were held out are as unseen as test samples, which are few.
+    rows = np.concatenate([np.flatnonzero(held_out_S & ~is_train_S), np.flatnonzero(held_out_S & is_train_S)])
+    unseen = registrations.subset(rows[: settings.samples])
+    name = f"{source} without objects"
+    model, _ = train_encoder(seen, name, seed, settings.encoder)
+    embedded = [replace(part, attached={"embedding": embed(model, part, name, seed, settings.encoder)[0]})
+                for part in (seen, unseen)]  # fmt: skip
+    # Numbered anew: samples of two splits of the registrations are test samples here.
+    renamed: dict[str, Any] = {"split": np.full(len(unseen), "test"), "sample": np.arange(len(unseen))}
+    return {"seen_objects": embedded[0], "objects": replace(embedded[1], **renamed)}
+
+
+def _measured(parts: dict[str, Registrations], source: str, seed: int, settings: ShiftSettings) -> ShiftedSets:
+    """Join sets of one encoder, the one with its training samples first, and measure the distances to these."""
+    spaces = {
+        "analytical": {
+            name: analytical_features(part, source, seed, "distance", name, points=settings.points)
+            for name, part in parts.items()
+        },
+        "embedding": {name: part.embedding for name, part in parts.items()},
+    }
+    home = next(iter(parts))
+    train = parts[home].rows("train")
+    joined = []
+    for name, part in parts.items():
+        test = np.flatnonzero(part.split == "test")
+        distance_S_K = np.zeros((len(part), 2 * len(SPACES)))
+        for i, space in enumerate(SPACES):
+            features_N_F, query_S_F = spaces[space][home][train], spaces[space][name][test]
+            if space == "embedding":
+                features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
+            distance_S_K[test, 2 * i] = knn_distance(features_N_F, query_S_F, settings.neighbours)
+            distance_S_K[test, 2 * i + 1] = mahalanobis_distance(features_N_F, query_S_F)
+        columns = {column: getattr(part, column) for column in ("split", "sample", "concept", "object_name")}
+        named = np.full(len(part), name)
+        joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
+    return ShiftedSets.joined(joined)
+
+
+def settings_from(shift: dict, registrations: dict, encoder: dict) -> ShiftSettings:
+    """Build from the config's section ``shift``, and what it shares with the registrations and the encoder."""
+    shift = dict(shift)
+    samples = shift.get("samples", ShiftSettings.samples)
+    severities = shift.pop("severities", {})
+    beyond = RegistrationSettings.from_dict(registrations | {"severities": severities, "train": 0, "test": samples})
+    trained = EncoderSettings(**encoder | shift.pop("encoder", {}))
+    return ShiftSettings(beyond=beyond, encoder=trained, **shift)

@@ -1,0 +1,1 @@
+"""Monte-Carlo ICP under the conditions that SHAP and sensitivity analysis ask for."""

@@ -1,0 +1,164 @@
+"""Which conditions of a pair are run for which question, and the file that holds their outcomes.
+
+A design is a fixed list of K conditions for every registration. Condition `reference` is the clean run against which
+the uncertainty of the others is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse, transform
+from gpca.pairs.dataset import SPLITS, Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.seeds import seed_of
+from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
+from gpca.uncertainty.remedies import Remedies, RemedyRuns
+from gpca.uncertainty.spread import Outcome, UncertaintySettings
+
+STEP = 0.1  # of a local derivative, in the knob's range
+LATIN = 24  # settings of the knobs in a Latin hypercube
+SALTELLI = 8  # base samples of Saltelli's scheme, which makes five settings of each
+
+# The corners of the cube of three switches; corner b has switch i on where bit i of b is set.
+CORNERS = tuple(tuple(bool(corner >> i & 1) for i in range(3)) for corner in range(8))
+
+
+SEVERITIES = ("noise", "rotation_rad", "translation", "crop")
+KNOB_RANGE = np.subtract(UPPER, UNTOUCHED)
+
+
+# Source and target of a pair, its initial pose and its reference pose.
+Clouds = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Design:
+    """A list of conditions.
+
+    Attributes:
+        evaluate: pair, twists of the starts, settings and random numbers of a sample -> the outcomes of all conditions.
+        conditions: (K,) their names.
+        reference: number of the clean condition.
+        splits: which rows are evaluated.
+        oracle: needs to know what was perturbed.
+    """
+
+    evaluate: Callable[[Pair, np.ndarray, UncertaintySettings, np.random.Generator], list[Outcome]]
+    conditions: tuple[str, ...]
+    reference: int = 0
+    splits: tuple[str, ...] = ("test",)
+    oracle: bool = False
+
+
+class Pair:
+    """The clouds of one registration, in units of the diameter; the target's points come in random order."""
+
+    def __init__(self, registrations: Registrations, row: int) -> None:
+        self.T_init = registrations.T_target_source("init", row)
+        self.T_icp = registrations.T_target_source("icp", row)
+        self.source = transform(inverse(self.T_icp), registrations.cloud(row).astype(np.float64))
+        self.target = registrations.target(row).astype(np.float64)
+        self._severity = {name: getattr(registrations, f"severity_{name}")[row] for name in SEVERITIES}
+
+    def observed(self, points: int, random: np.random.Generator) -> Clouds:
+        """Return source, target, initial pose and reference pose of the pair as it is, thinned to `points` points."""
+        return self.source[random.permutation(len(self.source))[:points]], self.target[:points], self.T_init, self.T_icp
+
+    def clean(self, points: int, part: int = 1) -> Clouds:
+        """Return the same of a clean pair: other points of the target as source, at the true pose.
+
+        `part` chooses which points, so that there are several sources: 1 or 2.
+        """
+        points = min(points, len(self.target) // 3)
+        source = self.target[part * points : (part + 1) * points]
+        return source, self.target[:points], np.eye(4), np.eye(4)
+
+    def true_knobs(self, settings: UncertaintySettings) -> Knobs:
+        """Return the knobs that make what was perturbed; NaN where that is hidden.
+
+        A pose error counts by how many times it is as large as the starts' usual one, by angle or by length.
+        """
+        angle = np.rad2deg(self._severity["rotation_rad"]) / settings.start_rotation_deg
+        length = self._severity["translation"] / settings.start_translation
+        spread = np.max([UNTOUCHED.spread, angle, length])
+        return Knobs(float(self._severity["noise"]), float(spread), float(self._severity["crop"]))
+
+
+def _additive(
+    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Outcome]:
+    runs = KnobRuns(*pair.observed(settings.points, random), xi_n_6, settings, random)
+    corners = [Knobs(*np.where(switches, MIDDLE, UNTOUCHED)) for switches in CORNERS]
+    steps = [Knobs(*np.where(row, UNTOUCHED + STEP * KNOB_RANGE, UNTOUCHED)) for row in np.eye(3, dtype=bool)]
+    return [runs(knobs) for knobs in (*corners, *steps)]
+
+
+def _sweep(
+    kind: str, pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Outcome]:
+    runs = KnobRuns(*pair.observed(settings.points, random), xi_n_6, settings, random)
+    return [runs(Knobs(*knobs)) for knobs in (UNTOUCHED, *sample_knobs(kind))]
+
+
+def _removal(
+    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Outcome]:
+    runs = RemedyRuns(pair.source, pair.target, pair.T_init, pair.T_icp, xi_n_6, settings, random)
+    return [runs(Remedies(*switches)) for switches in CORNERS]
+
+
+def _oracle(
+    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Outcome]:
+    runs = KnobRuns(*pair.clean(settings.points), xi_n_6, settings, random)
+    true = pair.true_knobs(settings)
+    corners = [Knobs(*np.where(switches, true, UNTOUCHED)) for switches in CORNERS]
+    # Two of the three knobs are at rest, so the eight corners are two settings, and each is run once.
+    return [runs(knobs) for knobs in corners]
+
+
+def _causal(
+    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Outcome]:
+    pairs = (pair.clean(settings.points, 1), pair.clean(settings.points, 2), pair.observed(settings.points, random))
+    return [KnobRuns(*clouds, xi_n_6, settings, random)(UNTOUCHED) for clouds in pairs]
+
+
+@cache
+def sample_knobs(kind: str) -> np.ndarray:
+    """Return settings of the knobs (K, 3) up to their upper ends, through SALib, the same for every pair."""
+    from SALib.sample import latin, sobol
+
+    bounds = [list(limits) for limits in zip(UNTOUCHED, UPPER, strict=True)]
+    problem = {"num_vars": len(UPPER), "names": list(Knobs._fields), "bounds": bounds}
+    seed = seed_of("knobs", kind) % 2**32
+    if kind == "latin":
+        return latin.sample(problem, LATIN, seed=seed)
+    return sobol.sample(problem, SALTELLI, calc_second_order=False, seed=seed)
+
+
+def _names(corners: tuple[tuple[bool, ...], ...], switches: tuple[str, ...], none: str) -> tuple[str, ...]:
+    return tuple("+".join(name for name, on in zip(switches, corner, strict=True) if on) or none for corner in corners)
+
+
+_KNOB_CORNERS = _names(CORNERS, CONCEPTS, "untouched")
+
+DESIGNS = {
+    # SHAP and local sensitivity as the paper describes them: fixed knobs on top of the observed pair.
+    "additive": Design(_additive, (*_KNOB_CORNERS, *(f"{concept}_step" for concept in CONCEPTS))),
+    "latin": Design(partial(_sweep, "latin"), ("untouched", *(f"latin_{k}" for k in range(LATIN)))),
+    "saltelli": Design(partial(_sweep, "saltelli"), ("untouched", *(f"saltelli_{k}" for k in range(5 * SALTELLI)))),
+    # The true knobs on a clean pair.
+    "oracle": Design(_oracle, _KNOB_CORNERS, oracle=True),
+    # Remedies applied to the observed pair; the clean run is the one with all of them.
+    "removal": Design(
+        _removal, _names(CORNERS, Remedies._fields, "observed"), reference=len(CORNERS) - 1, splits=SPLITS
+    ),
+    # Whether the pair is uncertain at all, beside a second clean pair.
+    "causal": Design(_causal, ("reference", "clean", "observed")),
+}

@@ -1,0 +1,118 @@
+"""Remedies as switches on an observed pair: denoise, restart more broadly, trim to the overlap.
+
+The counterpart of :mod:`gpca.uncertainty.knobs` for a pair whose cause is to be found: whichever remedy lowers the
+uncertainty points to the cause. Nothing here is told what was perturbed.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.rigid import transform
+from gpca.uncertainty.spread import Outcome, Runs, UncertaintySettings, run_from_starts, summarise_runs
+
+NEIGHBOURS = 24  # of a point, for the plane that it is moved to
+OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbour distance
+BROADER = 3.75  # spread of the restarts, in that of the other starts: the middle of the pose severities
+RESTARTS = 5  # of which the one with the lowest cost counts
+FEWEST_POINTS = 16  # of a trimmed target; with fewer, nothing is trimmed
+
+
+class Remedies(NamedTuple):
+    """What is switched on, in the order of the concepts noise, pose, overlap."""
+
+    denoise: bool = False
+    restart: bool = False
+    trim: bool = False
+
+
+class RemedyRuns:
+    """Runs of one observed pair under every combination of remedies.
+
+    Args:
+        source: (N, 3), in its own frame. target: (Q, 3). Relative to the diameter; ICP sees fewer of their points
+            than denoising and the residual do.
+        T_target_source_init, T_target_source_icp: initial and found pose.
+        xi_n_6: twists of the starts.
+    """
+
+    def __init__(
+        self,
+        source: np.ndarray,
+        target: np.ndarray,
+        T_target_source_init: np.ndarray,
+        T_target_source_icp: np.ndarray,
+        xi_n_6: np.ndarray,
+        settings: UncertaintySettings,
+        random: np.random.Generator,
+    ) -> None:
+        self._xi_n_6 = xi_n_6
+        self._settings = settings
+        self._T_init, self._T_icp = T_target_source_init, T_target_source_icp
+        self._source, self._target = source[random.permutation(len(source))], target
+
+    def __call__(self, remedies: Remedies) -> Outcome:
+        """Evaluate one combination; what several share is worked out, and charged, once."""
+        started = perf_counter()
+        tree, points = self._denoised if remedies.denoise else self._observed
+        icp, target = self._trimmed if remedies.trim else self._whole
+        xi_n_6 = BROADER * self._xi_n_6 if remedies.restart else self._xi_n_6
+        runs = run_from_starts(icp, points[: self._settings.points], self._T_init, xi_n_6)
+        if remedies.restart:
+            runs = best_of_neighbours(runs, self._settings.icp.correspondence_distance)
+        return summarise_runs(runs, tree, target, self._T_icp, self._settings, started)
+
+    @cached_property
+    def _observed(self) -> tuple[cKDTree, np.ndarray]:
+        return cKDTree(self._source), self._source
+
+    @cached_property
+    def _denoised(self) -> tuple[cKDTree, np.ndarray]:
+        points = denoise(self._source)
+        return cKDTree(points), points
+
+    @cached_property
+    def _whole(self) -> tuple[BatchedICP, np.ndarray]:
+        return BatchedICP(self._target[: self._settings.points], self._settings.icp), self._target
+
+    @cached_property
+    def _trimmed(self) -> tuple[BatchedICP, np.ndarray]:
+        aligned = transform(self._T_icp, self._source)
+        points = trim(self._target, aligned, self._settings.icp.correspondence_distance)
+        return BatchedICP(points[: self._settings.points], self._settings.icp), points
+
+
+def denoise(points: np.ndarray) -> np.ndarray:
+    """Remove statistical outliers (Rusu et al. 2008) and move every other point onto the plane of its neighbours.
+
+    The plane is that of least squares, moving least squares of order one (Alexa et al. 2003).
+    """
+    neighbours = min(NEIGHBOURS, len(points))
+    distances, rows = cKDTree(points).query(points, neighbours)
+    mean_N = distances.mean(axis=1)
+    kept = mean_N <= mean_N.mean() + OUTLIER_RATIO * mean_N.std()
+    around_N_k_3 = points[rows[kept]]
+    centre_N_3 = around_N_k_3.mean(axis=1)
+    offset_N_k_3 = around_N_k_3 - centre_N_3[:, None]
+    normal_N_3 = np.linalg.eigh(np.swapaxes(offset_N_k_3, 1, 2) @ offset_N_k_3)[1][:, :, 0]
+    height_N = np.einsum("ni,ni->n", points[kept] - centre_N_3, normal_N_3)
+    return points[kept] - height_N[:, None] * normal_N_3
+
+
+def trim(target: np.ndarray, aligned_source: np.ndarray, distance: float) -> np.ndarray:
+    """Return the target's points within `distance` of the aligned source; all where hardly any are."""
+    kept = cKDTree(aligned_source).query(target, distance_upper_bound=distance)[0] < distance
+    return target[kept] if kept.sum() >= FEWEST_POINTS else target
+
+
+def best_of_neighbours(runs: Runs, distance: float) -> Runs:
+    """Replace every run by the best of itself and the next ones, as if each result had come from `RESTARTS` starts."""
+    cost_n = runs.cost_n(distance)
+    rows_n_k = (np.arange(len(cost_n))[:, None] + np.arange(RESTARTS)) % len(cost_n)
+    return runs.chosen(rows_n_k[np.arange(len(cost_n)), cost_n[rows_n_k].argmin(axis=1)])

@@ -1,0 +1,171 @@
+"""How uncertain a registration is: the spread of ICP's results over initial poses (Qin et al. 2024).
+
+ICP runs from n starts T₀ = exp(ξ) T_init with ξ ~ N(0, diag(σ_rot², σ_t²)). The twists e = log(T T_ref⁻¹) of the
+results have the covariance Σ, and the uncertainty is the divergence from that of a clean run of the same pair,
+u = KL(N(0, Σ_clean + εI) ‖ N(0, Σ + εI)). Lengths are relative to the object's diameter throughout.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICPSettings
+from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.twist import exp, log
+from gpca.errors import InputError
+
+SMALLEST_RESIDUAL = 1e-6  # in diameters: that of a cloud on itself, whose logarithm has to stay finite
+FEWEST_STARTS = 13  # the 2·6 + 1 of an unscented estimate; a 6×6 covariance of 6 samples or fewer is singular
+
+
+@dataclass(frozen=True)
+class UncertaintySettings:
+    """How the spread is measured.
+
+    Attributes:
+        starts: n, initial poses per condition.
+        start_rotation_deg, start_translation: root mean square angle and length of the starts' offsets.
+        points: points of source and of target in these runs (fewer where a cloud has fewer).
+        floor: ε, variance below which a spread is no uncertainty: (1e-3)² is 0.06° and a thousandth of the diameter.
+        icp: how ICP runs.
+    """
+
+    starts: int = 50
+    start_rotation_deg: float = 10.0
+    start_translation: float = 0.05
+    points: int = 512
+    floor: float = 1e-6
+    icp: ICPSettings = field(default_factory=ICPSettings)
+
+    def __post_init__(self) -> None:
+        if self.starts < FEWEST_STARTS:
+            remedy = f"give at least {FEWEST_STARTS}: fewer do not determine a 6×6 covariance"
+            raise InputError("uncertainty setting 'starts'", f"{self.starts}", remedy)
+        if self.floor <= 0:
+            raise InputError("uncertainty setting 'floor'", f"{self.floor}", "give a positive variance")
+
+    def deviation_6(self) -> np.ndarray:
+        """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
+        per_axis = np.array([np.deg2rad(self.start_rotation_deg), self.start_translation]) / np.sqrt(3)
+        return np.repeat(per_axis, 3)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """What ICP made of n starts.
+
+    Attributes:
+        T_target_source_n: (n, 4, 4).
+        fitness_n, inlier_rmse_n: (n,).
+        icp_calls, icp_seconds: runs of ICP, and the time inside them.
+    """
+
+    T_target_source_n: np.ndarray
+    fitness_n: np.ndarray
+    inlier_rmse_n: np.ndarray
+    icp_calls: int
+    icp_seconds: float
+
+    def cost_n(self, distance: float) -> np.ndarray:
+        """Mean over the source of the squared distance to the target, cut off at the correspondence distance."""
+        return self.fitness_n * self.inlier_rmse_n**2 + (1 - self.fitness_n) * distance**2
+
+    def chosen(self, rows_n: np.ndarray) -> Runs:
+        """Return these runs' results at the given rows, which may repeat."""
+        return replace(
+            self,
+            T_target_source_n=self.T_target_source_n[rows_n],
+            fitness_n=self.fitness_n[rows_n],
+            inlier_rmse_n=self.inlier_rmse_n[rows_n],
+        )
+
+    def covariance(self, T_ref: np.ndarray) -> np.ndarray:
+        """Return Σ (6, 6) of e = log(T T_ref⁻¹), radians and diameters."""
+        return np.cov(log(self.T_target_source_n @ inverse(T_ref)), rowvar=False)
+
+    def degenerate(self, floor: float) -> bool:
+        """Whether the covariance says nothing: no run found a correspondence, or all ended at the same pose."""
+        variance_3_4 = self.T_target_source_n[:, :3].var(axis=0)
+        # To first order a rotation's entries vary twice as much as its vector.
+        spread = variance_3_4[:, :3].sum() / 2 + variance_3_4[:, 3].sum()
+        return not self.fitness_n.any() or bool(spread < 6 * floor)
+
+
+def run_from_starts(icp: BatchedICP, source: np.ndarray, T_target_source_init: np.ndarray, xi_n_6: np.ndarray) -> Runs:
+    """Run ICP from the starts exp(ξ) T_init."""
+    starts_n = exp(xi_n_6) @ T_target_source_init
+    started = perf_counter()
+    poses_n, fitness_n, rmse_n = icp.register(source, starts_n)
+    return Runs(poses_n, fitness_n, rmse_n, len(poses_n), perf_counter() - started)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What is kept of one condition, e.g. one setting of the knobs.
+
+    Attributes:
+        covariance: Σ (6, 6).
+        residual: log of the root mean square distance from the target's points to the source at the best run's pose.
+        degenerate: the covariance says nothing (:meth:`Runs.degenerate`).
+        icp_calls, icp_seconds, seconds: what the condition cost.
+    """
+
+    covariance: np.ndarray
+    residual: float
+    degenerate: bool
+    icp_calls: int
+    icp_seconds: float
+    seconds: float
+
+
+def summarise_runs(
+    runs: Runs,
+    source_tree: cKDTree,
+    target: np.ndarray,
+    T_ref: np.ndarray,
+    settings: UncertaintySettings,
+    started: float,
+) -> Outcome:
+    """Summarise the runs of one condition.
+
+    Args:
+        source_tree: of the source's points, in its own frame. target: (Q, 3) points whose residual counts.
+        T_ref: pose from which the spread is measured.
+        started: the ``perf_counter`` at which the condition's work began.
+    """
+    best = runs.T_target_source_n[runs.cost_n(settings.icp.correspondence_distance).argmin()]
+    return Outcome(
+        covariance=runs.covariance(T_ref),
+        residual=log_residual(transform(inverse(best), target), source_tree),
+        degenerate=runs.degenerate(settings.floor),
+        icp_calls=runs.icp_calls,
+        icp_seconds=runs.icp_seconds,
+        seconds=perf_counter() - started,
+    )
+
+
+def log_residual(points: np.ndarray, tree: cKDTree) -> float:
+    """Return the log of the root mean square distance from each point (N, 3) to the nearest of the tree's."""
+    distances_N, _ = tree.query(points)
+    return float(np.log(max(np.sqrt(np.mean(distances_N**2)), SMALLEST_RESIDUAL)))
+
+
+def divergence(covariance_clean: np.ndarray, covariance: np.ndarray, floor: float) -> np.ndarray:
+    """Return u = KL(N(0, Σ_clean + εI) ‖ N(0, Σ + εI)) in nats over the last two axes (…, 6, 6).
+
+    u = ½ [tr(Σ⁻¹ Σ_clean) + ln(|Σ| / |Σ_clean|) − 6]; zero where the two are equal, finite whatever they are.
+    """
+    clean, other = covariance_clean + floor * np.eye(6), covariance + floor * np.eye(6)
+    trace = np.trace(np.linalg.solve(other, np.broadcast_to(clean, other.shape)), axis1=-2, axis2=-1)
+    log_ratio = np.linalg.slogdet(other)[1] - np.linalg.slogdet(clean)[1]
+    return np.maximum(0.5 * (trace + log_ratio - 6), 0.0)
+
+
+def log_determinant(covariance: np.ndarray, floor: float) -> np.ndarray:
+    """Return ln |Σ + εI| over the last two axes, an uncertainty that needs no clean run."""
+    return np.linalg.slogdet(covariance + floor * np.eye(6))[1]

@@ -1,0 +1,190 @@
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from gpca.active_learning.acquisition import (
+    EXPANSION,
+    STRATEGIES,
+    Pool,
+    bald_kmeans,
+    bald_stochastic,
+    require_strategy,
+    select,
+    top,
+)
+from gpca.errors import InputError
+
+every_strategy = pytest.mark.parametrize("name", STRATEGIES)
+
+
+def make_pool(n=40, seed=0, **given):
+    """A pool in which everything that is not given is random, as an embedding's float32."""
+    random = np.random.default_rng(seed)
+    columns = {
+        "h_N_d": random.normal(size=(n, 4)).astype(np.float32),
+        "scores_N_C": random.dirichlet(np.ones(3), n),
+        "bald_N": random.uniform(size=n),
+        "h_labelled_L_d": random.normal(size=(5, 4)).astype(np.float32),
+        "truth_N": np.array(["noise", "pose", "overlap"])[np.arange(n) % 3],
+    }
+    return Pool(**columns | given)
+
+
+def selected(name, pool, batch, seed=1):
+    return select(name, pool, batch, np.random.default_rng(seed)).tolist()
+
+
+def around(centres, each, seed=0):
+    """Tight clusters of `each` points, the points of a centre together."""
+    centres = np.repeat(np.asarray(centres, float), each, axis=0)
+    return centres + 0.01 * np.random.default_rng(seed).normal(size=centres.shape)
+
+
+@every_strategy
+@pytest.mark.parametrize("batch", [1, 4, 39])
+def test_a_strategy_returns_as_many_different_rows_as_asked_for(name, batch):
+    rows = selected(name, make_pool(), batch)
+    assert len(set(rows)) == len(rows) == batch
+    assert set(rows) <= set(range(40))
+
+
+@every_strategy
+def test_the_same_generator_gives_the_same_rows(name):
+    assert selected(name, make_pool(), 4) == selected(name, make_pool(), 4)
+
+
+@pytest.mark.parametrize("name", ["random", "random_stratified", "bald_stochastic"])
+def test_another_generator_gives_other_rows(name):
+    assert selected(name, make_pool(), 4, seed=1) != selected(name, make_pool(), 4, seed=2)
+
+
+@every_strategy
+@pytest.mark.parametrize("n", [1, 4])
+def test_a_pool_no_larger_than_the_batch_is_taken_whole(name, n):
+    assert sorted(selected(name, make_pool(n), 4)) == list(range(n))
+
+
+def identical_samples(labelled):
+    return make_pool(
+        h_N_d=np.ones((40, 4)),
+        scores_N_C=np.full((40, 3), 1 / 3),
+        bald_N=np.zeros(40),
+        h_labelled_L_d=np.full((5, 4), labelled),
+    )
+
+
+@every_strategy
+@pytest.mark.parametrize("labelled", [0.0, 1.0], ids=["labelled elsewhere", "labelled the same"])
+@pytest.mark.filterwarnings("ignore:Number of distinct clusters")
+def test_identical_samples_still_give_different_rows(name, labelled):
+    assert len(set(selected(name, identical_samples(labelled), 4))) == 4
+
+
+def test_an_unknown_strategy_is_named_with_the_known():
+    with pytest.raises(InputError, match=r"strategy 'bold': unknown; known are random, random_stratified, entropy,"):
+        selected("bold", make_pool(), 4)
+    with pytest.raises(InputError, match="bald_kmeans"):
+        require_strategy("")
+
+
+@pytest.mark.parametrize("name", [name for name in STRATEGIES if not STRATEGIES[name].needs_scores])
+def test_a_strategy_that_needs_no_scores_reads_none(name):
+    blind = make_pool(scores_N_C=np.empty((40, 0)), bald_N=np.full(40, np.nan))
+    assert selected(name, blind, 4) == selected(name, make_pool(), 4)
+
+
+@pytest.mark.parametrize("name", [name for name in STRATEGIES if not STRATEGIES[name].oracle])
+def test_only_an_oracle_is_told_the_truth(name):
+    assert selected(name, make_pool(truth_N=np.full(40, "")), 4) == selected(name, make_pool(), 4)
+
+
+def test_the_largest_values_come_first_and_of_equals_the_first():
+    assert top(np.array([1.0, 3.0, 2.0, 3.0, 0.0]), 3).tolist() == [1, 3, 2]
+    assert top(np.array([1.0, 2.0]), 5).tolist() == [1, 0]
+
+
+SCORES = [[0.98, 0.01, 0.01], [0.48, 0.48, 0.04], [0.34, 0.33, 0.33], [0.9, 0.1, 0.0], [0.44, 0.28, 0.28]]
+
+
+@pytest.mark.parametrize(
+    "name, best_first", [("entropy", [2, 4, 1, 3]), ("margin", [1, 2, 4, 3]), ("bald", [3, 0, 4, 1])]
+)
+def test_the_most_uncertain_are_taken_most_uncertain_first(name, best_first):
+    pool = make_pool(5, scores_N_C=np.array(SCORES), bald_N=np.array([0.4, 0.2, 0.1, 0.5, 0.3]))
+    assert selected(name, pool, 4) == best_first
+
+
+@pytest.mark.parametrize("batch", [2, 3, 5])
+@pytest.mark.parametrize("seed", range(3))
+def test_bald_kmeans_takes_the_middle_of_each_cluster_of_uncertain_samples(batch, seed):
+    centres = 20 * np.eye(6)[:batch]
+    uncertain, certain = around(centres, EXPANSION, seed), around(-20 * np.eye(6), 5)
+    random = np.random.default_rng(seed)
+    order = random.permutation(len(uncertain) + len(certain))
+    h = np.concatenate([uncertain, certain])[order]
+    high = np.concatenate([np.ones(len(uncertain)), np.zeros(len(certain))])[order]
+    pool = make_pool(len(h), h_N_d=h, bald_N=high + 0.1 * random.uniform(size=len(h)))
+    expected = set()
+    for centre in centres:
+        members = np.flatnonzero(np.linalg.norm(h - centre, axis=1) < 1)
+        expected.add(int(members[np.linalg.norm(h[members] - h[members].mean(axis=0), axis=1).argmin()]))
+    assert set(selected("bald_kmeans", pool, batch, seed)) == expected
+
+
+def test_bald_kmeans_names_the_most_uncertain_of_its_choice_first():
+    pool = make_pool()
+    rows = bald_kmeans(pool, 4, np.random.default_rng(0))
+    assert (np.diff(pool.bald_N[rows]) <= 0).all()
+    assert set(rows) <= set(top(pool.bald_N, 4 * EXPANSION))
+
+
+def test_bald_stochastic_draws_in_proportion_to_bald():
+    pool, random = make_pool(5, bald_N=np.array([0.0, 0.1, 0.2, 0.3, 0.4])), np.random.default_rng(0)
+    draws = [bald_stochastic(pool, 5, random).tolist() for _ in range(2000)]
+    assert {rows[-1] for rows in draws} == {0}
+    first = Counter(rows[0] for rows in draws)
+    assert [first[row] / 2000 for row in range(1, 5)] == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=0.05)
+
+
+@pytest.mark.parametrize("batch", [3, 7, 12])
+def test_random_stratified_takes_as_many_of_each_class(batch):
+    truth = np.array(["noise"] * 30 + ["pose"] * 6 + ["overlap"] * 4)
+    counts = Counter(truth[selected("random_stratified", make_pool(truth_N=truth), batch)])
+    assert sum(counts.values()) == batch
+    assert max(counts.values()) - min(counts.values()) <= 1
+    assert len(counts) == 3
+
+
+def test_random_stratified_takes_more_of_the_others_where_a_class_runs_out():
+    truth = np.array(["noise"] * 30 + ["pose"] * 9 + ["overlap"])
+    counts = Counter(truth[selected("random_stratified", make_pool(truth_N=truth), 9)])
+    assert counts == {"noise": 4, "pose": 4, "overlap": 1}
+
+
+def test_coreset_takes_the_point_farthest_from_all_labelled_then_from_that_too():
+    h = around([[0, 0], [5, 0], [0, 9]], 10)
+    pool = make_pool(30, h_N_d=h, h_labelled_L_d=np.zeros((2, 2)))
+    rows = selected("coreset", pool, 2)
+    assert rows[0] == np.linalg.norm(h, axis=1).argmax()
+    assert rows[1] in range(10, 20)
+
+
+def test_typiclust_takes_typical_samples_of_the_largest_clusters_without_a_label():
+    h = around([[0, 0], [30, 0], [0, 30], [30, 30]], 12)[:42]  # the last cluster is the smallest
+    pool = make_pool(42, h_N_d=h, h_labelled_L_d=around([[0, 0], [30, 0]], 1))
+    chosen = [selected("typiclust", pool, 2, seed) for seed in range(20)]
+    # k-means starts anywhere, so it does not find the four every time.
+    blocks = Counter(row // 12 for rows in chosen for row in rows)
+    assert blocks[2] + blocks[3] >= 30
+    assert blocks[2] >= blocks[3]
+    to_others = np.linalg.norm(h[24:36, None] - h[24:36], axis=2).sum(axis=1)
+    typical = [to_others[row - 24] < np.median(to_others) for rows in chosen for row in rows if row // 12 == 2]
+    assert np.mean(typical) > 0.8
+
+
+def test_badge_prefers_uncertain_samples():
+    certain = np.arange(40) % 2 == 0
+    scores = np.where(certain[:, None], [0.9998, 0.0001, 0.0001], [0.4, 0.3, 0.3])
+    rows = selected("badge", make_pool(scores_N_C=scores), 8)
+    assert not certain[rows].any()

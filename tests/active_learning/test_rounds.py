@@ -1,0 +1,220 @@
+import dataclasses
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import gpca.active_learning.rounds
+from gpca.active_learning.rounds import ActiveLearningSettings, Samples, accuracies, initial_gpc, make_task, run_rounds
+from gpca.classifier.gpc import GPCSettings
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS
+
+QUICK = GPCSettings(learning_rate=0.05, iterations=30, inducing=12, draws=100)
+SETTINGS = ActiveLearningSettings(initial=12, labels=10, batch=4, gpc=QUICK)
+TIMES = ("select_s", "retrain_s")
+
+
+@pytest.fixture(scope="module")
+def embedded(registrations):
+    """The registrations, with an embedding that tells their concepts apart."""
+    random = np.random.default_rng(0)
+    centres = 4 * random.normal(size=(3, 8))
+    concept_S = [CONCEPTS.index(concept) for concept in registrations.concept]
+    embedding = centres[concept_S] + random.normal(size=(len(registrations), 8))
+    return dataclasses.replace(registrations, attached={"embedding": embedding})
+
+
+@pytest.fixture(scope="module")
+def gpc(embedded):
+    return initial_gpc(make_task(embedded, "overlap", SETTINGS, "tiny", 0), SETTINGS, "tiny", 0)
+
+
+@pytest.fixture(scope="module")
+def task(embedded, gpc):
+    return make_task(embedded, "overlap", SETTINGS, "tiny", 0).projected(gpc)
+
+
+def learnt(task, gpc, strategy="bald_kmeans", **changed):
+    """The steps of a run as a column per key, without the times."""
+    steps = run_rounds(task, gpc, strategy, dataclasses.replace(SETTINGS, **changed), "tiny", 0)
+    return {name: [step[name] for step in steps] for name in steps[0] if name not in TIMES}
+
+
+def count(samples):
+    return {concept: int(np.sum(samples.concept_N == concept)) for concept in CONCEPTS}
+
+
+def rows_of(embedded, samples):
+    """The registrations that samples are, found by their embeddings."""
+    row_of = {h.tobytes(): row for row, h in enumerate(embedded.embedding)}
+    return [row_of[h.tobytes()] for h in samples.h]
+
+
+@pytest.mark.parametrize("held_out", CONCEPTS)
+def test_a_task_deals_out_every_sample_once(embedded, held_out):
+    task = make_task(embedded, held_out, SETTINGS, "tiny", 0)
+    initial, pool, test = (rows_of(embedded, part) for part in (task.initial, task.pool, task.test))
+    assert sorted(initial + pool) == embedded.rows("train").tolist()
+    assert test == embedded.rows("test").tolist()
+    for part, rows in ((task.initial, initial), (task.pool, pool), (task.test, test)):
+        assert part.concept_N.tolist() == embedded.concept[rows].tolist()
+    assert count(task.initial) == {concept: 6 * (concept != held_out) for concept in CONCEPTS}
+    assert count(task.pool) == {concept: 12 if concept == held_out else 6 for concept in CONCEPTS}
+
+
+def test_a_task_does_not_depend_on_those_made_before(embedded):
+    first = make_task(embedded, "noise", SETTINGS, "tiny", 0)
+    for other, seed in (("pose", 0), ("noise", 1)):
+        make_task(embedded, other, SETTINGS, "tiny", seed)
+    again = make_task(embedded, "noise", SETTINGS, "tiny", 0)
+    for part in ("initial", "pool", "test"):
+        assert np.array_equal(getattr(first, part).h, getattr(again, part).h)
+
+
+@pytest.mark.parametrize("held_out, seed", [("noise", 1), ("pose", 0)])
+def test_another_seed_or_concept_labels_other_samples(embedded, held_out, seed):
+    one, other = (
+        make_task(embedded, "noise", SETTINGS, "tiny", 0),
+        make_task(embedded, held_out, SETTINGS, "tiny", seed),
+    )
+    assert rows_of(embedded, one.initial) != rows_of(embedded, other.initial)
+
+
+def test_a_rare_concept_has_its_share_of_the_pool_and_the_others_stay(embedded):
+    common = make_task(embedded, "pose", SETTINGS, "tiny", 0)
+    rare = make_task(embedded, "pose", SETTINGS, "tiny", 0, new_share=0.25)
+    assert count(common.pool) == {"noise": 6, "pose": 12, "overlap": 6}
+    assert count(rare.pool) == {"noise": 6, "pose": 4, "overlap": 6}
+    assert set(rows_of(embedded, rare.pool)) <= set(rows_of(embedded, common.pool))
+    assert rows_of(embedded, rare.initial) == rows_of(embedded, common.initial)
+    assert rows_of(embedded, rare.test) == rows_of(embedded, common.test)
+
+
+@pytest.mark.parametrize(("initial", "share", "left"), [(16, 0.2, (8, 2)), (16, 0.8, (8, 12)), (12, 0.1, (12, 1))])
+def test_a_rare_concept_has_its_share_as_far_as_there_are_samples(embedded, initial, share, left):
+    settings = dataclasses.replace(SETTINGS, initial=initial)
+    counted = count(make_task(embedded, "overlap", settings, "tiny", 0, new_share=share).pool)
+    assert (counted["noise"] + counted["pose"], counted["overlap"]) == left
+
+
+def test_a_share_that_leaves_no_sample_of_the_concept_is_named(embedded):
+    with pytest.raises(InputError, match="leaves no pool"):
+        make_task(embedded, "overlap", SETTINGS, "tiny", 0, new_share=0.01)
+
+
+@pytest.mark.parametrize("initial", [24, 26, 200])
+def test_too_few_training_samples_are_named(embedded, initial):
+    with pytest.raises(InputError, match=rf"{initial} labelled samples of noise and pose: leaves no pool of 36 "):
+        make_task(embedded, "overlap", dataclasses.replace(SETTINGS, initial=initial), "tiny", 0)
+
+
+def test_a_concept_without_training_samples_cannot_be_held_out(embedded):
+    without = embedded.subset(np.flatnonzero((embedded.concept != "overlap") | (embedded.split == "test")))
+    with pytest.raises(InputError, match="leaves no pool of 24 training samples"):
+        make_task(without, "overlap", SETTINGS, "tiny", 0)
+
+
+def test_projecting_a_task_changes_nothing_that_the_classifier_says(embedded, gpc, task):
+    plain = make_task(embedded, "overlap", SETTINGS, "tiny", 0)
+    for part in ("initial", "pool", "test"):
+        one, other = getattr(plain, part), getattr(task, part)
+        assert len(one) == len(other)
+        assert one.concept_N.tolist() == other.concept_N.tolist()
+        assert np.array_equal(gpc.attribute(one.h)[0], gpc.attribute(other.h)[0])
+
+
+def test_the_first_classifier_knows_two_concepts_of_three(task, gpc):
+    assert gpc.classes == CONCEPTS
+    assert accuracies(task, gpc) == (pytest.approx(2 / 3), 0.0)
+
+
+@pytest.mark.parametrize(
+    "labels, batch, expected",
+    [
+        (8, 4, [0, 4, 8]),
+        (10, 4, [0, 4, 8, 10]),
+        (3, 5, [0, 3]),
+        (40, 10, [0, 10, 20, 24]),
+        (0, 4, [0]),
+    ],
+)
+def test_labels_are_spent_by_the_batch_up_to_the_budget_or_the_pools_end(task, gpc, labels, batch, expected):
+    assert learnt(task, gpc, "random", labels=labels, batch=batch)["labels"] == expected
+
+
+@pytest.mark.parametrize("strategy", ["random", "bald_kmeans", "coreset"])
+def test_the_concept_held_out_is_learnt(task, gpc, strategy):
+    steps = learnt(task, gpc, strategy)
+    assert (steps["accuracy_new"][0], steps["accuracy_new"][-1]) == (0.0, 1.0)
+    assert steps["accuracy"][-1] > 0.9
+    assert steps["epochs"][0] == 0
+    assert all(0 < epochs <= SETTINGS.iterations for epochs in steps["epochs"][1:])
+
+
+def test_learning_the_whole_pool_does_not_depend_on_its_order(task, gpc):
+    one, other = (
+        learnt(task, gpc, strategy, labels=24, tolerance=1e-8, iterations=500) for strategy in ("random", "bald")
+    )
+    for name in ("labels", "new_labels", "accuracy", "accuracy_new"):
+        assert one[name][-1] == other[name][-1]
+
+
+def test_the_classifier_given_is_left_as_it_was(task, gpc):
+    before = [array.tobytes() for array in gpc.attribute(task.test.h)]
+    learnt(task, gpc)
+    assert [array.tobytes() for array in gpc.attribute(task.test.h)] == before
+
+
+@pytest.mark.parametrize("strategy", ["random", "bald_stochastic", "badge", "typiclust"])
+def test_the_same_axes_give_the_same_curve(task, gpc, strategy):
+    assert learnt(task, gpc, strategy) == learnt(task, gpc, strategy)
+
+
+def recorded_queries(monkeypatch):
+    """What each query of the strategy was shown, and which rows of it were chosen."""
+    queries = []
+
+    def select(name, pool, batch, random, select=gpca.active_learning.rounds.select):
+        rows = select(name, pool, batch, random)
+        queries.append((pool, rows))
+        return rows
+
+    monkeypatch.setattr(gpca.active_learning.rounds, "select", select)
+    return queries
+
+
+def test_new_labels_are_those_of_the_concept_held_out(monkeypatch, task, gpc):
+    queries = recorded_queries(monkeypatch)
+    steps = learnt(task, gpc, "random", labels=24, batch=3)
+    new = [int(np.sum(pool.truth_N[rows] == "overlap")) for pool, rows in queries]
+    assert steps["new_labels"] == [0, *np.cumsum(new)]
+    assert steps["new_labels"][-1] == 12
+
+
+def test_what_was_asked_about_leaves_the_pool_and_joins_the_labelled(monkeypatch, task, gpc):
+    queries = recorded_queries(monkeypatch)
+    learnt(task, gpc, "bald")
+    assert [len(pool.h_N_d) for pool, _ in queries] == [24, 20, 16]
+    assert [len(pool.h_labelled_L_d) for pool, _ in queries] == [12, 16, 20]
+    for (pool, rows), (later, _) in pairwise(queries):
+        assert np.array_equal(later.h_labelled_L_d[-4:], pool.h_N_d[rows])
+        assert np.array_equal(later.h_N_d, np.delete(pool.h_N_d, rows, axis=0))
+        assert np.array_equal(later.truth_N, np.delete(pool.truth_N, rows))
+
+
+def test_a_strategy_is_shown_what_the_classifier_makes_of_the_pool(monkeypatch, task, gpc):
+    queries = recorded_queries(monkeypatch)
+    learnt(task, gpc, "bald", labels=4)
+    scores, _, bald = gpc.attribute(task.pool.h)
+    assert np.array_equal(queries[0][0].scores_N_C, scores)
+    assert np.array_equal(queries[0][0].bald_N, bald)
+    assert queries[0][1].tolist() == np.argsort(-bald, kind="stable")[:4].tolist()
+
+
+def test_the_accuracy_on_a_concept_without_test_samples_is_nan(task, gpc):
+    known = np.flatnonzero(task.test.concept_N != "overlap")
+    test = Samples(task.test.h[known], task.test.concept_N[known])
+    accuracy, accuracy_new = accuracies(dataclasses.replace(task, test=test), gpc)
+    assert accuracy == 1.0
+    assert np.isnan(accuracy_new)

@@ -1,0 +1,144 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gpca.active_learning.rounds import ActiveLearningSettings, Samples, Task, initial_gpc
+from gpca.active_learning.stream import StreamSettings, arrival_order, run_stream
+from gpca.classifier.gpc import GPCSettings
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS
+
+QUICK = GPCSettings(learning_rate=0.05, iterations=30, inducing=12, draws=100)
+SETTINGS = ActiveLearningSettings(gpc=QUICK)
+STREAM = StreamSettings(arrivals=90, quiet=30, budget=0.2, window=20, every=15)
+CENTRES = 4 * np.random.default_rng(0).normal(size=(3, 8))
+
+both = pytest.mark.parametrize("strategy", ["stream_random", "stream_bald"])
+
+
+def blobs(n, seed, concepts=CONCEPTS):
+    concept_N = np.array(concepts)[np.arange(n) % len(concepts)]
+    centres_N_d = CENTRES[[CONCEPTS.index(concept) for concept in concept_N]]
+    return Samples(centres_N_d + np.random.default_rng(seed).normal(size=(n, 8)), concept_N)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """120 samples of known concepts and 60 of the new one to arrive."""
+    return Task("overlap", blobs(40, 1, ("noise", "pose")), blobs(180, 2), blobs(60, 3))
+
+
+@pytest.fixture(scope="module")
+def gpc(plain):
+    return initial_gpc(plain, SETTINGS, "blobs", 0)
+
+
+@pytest.fixture(scope="module")
+def task(plain, gpc):
+    return plain.projected(gpc)
+
+
+def run(task, gpc, strategy, **changed):
+    rows = run_stream(task, gpc, strategy, SETTINGS, dataclasses.replace(STREAM, **changed), "blobs", 0)
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+@pytest.mark.parametrize("arrivals, quiet", [(90, 30), (100, 0), (31, 20), (180, 0)])
+def test_the_new_concept_arrives_after_the_quiet_as_a_third(plain, arrivals, quiet):
+    order = arrival_order(plain, StreamSettings(arrivals=arrivals, quiet=quiet), "blobs", 0)
+    is_new = plain.pool.concept_N[order] == "overlap"
+    assert len(order) == len(set(order)) == arrivals
+    assert not is_new[:quiet].any()
+    assert is_new[quiet:].sum() == round((arrivals - quiet) / 3)
+
+
+def test_the_new_concept_arrives_all_along_after_the_quiet(plain):
+    order = arrival_order(plain, StreamSettings(arrivals=150, quiet=30), "blobs", 0)
+    is_new = plain.pool.concept_N[order][30:] == "overlap"
+    assert [8 <= part.sum() <= 32 for part in np.split(is_new, 2)] == [True, True]
+    assert all(set(plain.pool.concept_N[part]) == {"noise", "pose"} for part in (order[:15], order[15:30]))
+
+
+def test_the_order_is_that_of_the_axes(plain):
+    one, again, other = (arrival_order(plain, STREAM, "blobs", seed).tolist() for seed in (0, 0, 1))
+    assert one == again != other
+
+
+@pytest.mark.parametrize("arrivals, quiet", [(181, 0), (150, 121), (220, 30), (30, 30), (30, 40), (31, 30)])
+def test_a_pool_too_small_for_the_stream_is_named(plain, arrivals, quiet):
+    with pytest.raises(
+        InputError, match=rf"a stream of {arrivals} arrivals: needs more than a pool of 120 known and 60"
+    ):
+        arrival_order(plain, StreamSettings(arrivals=arrivals, quiet=quiet), "blobs", 0)
+
+
+@both
+@pytest.mark.parametrize("every, expected", [(15, [0, 15, 30, 45, 60, 75, 90]), (40, [0, 40, 80])])
+def test_there_is_a_row_every_so_many_arrivals(task, gpc, strategy, every, expected):
+    rows = run(task, gpc, strategy, every=every)
+    assert rows["arrived"] == expected
+    assert rows["present"] == [arrived >= 30 for arrived in expected]
+    assert np.isnan(rows["running"][0])
+    assert not np.isnan(rows["running"][1:]).any()
+
+
+@pytest.mark.parametrize("budget", [0.05, 0.1, 0.3])
+def test_bald_stays_within_the_budget_but_for_the_first_few(task, gpc, budget):
+    rows = run(task, gpc, "stream_bald", budget=budget)
+    assert (np.array(rows["labels"]) <= budget * np.array(rows["arrived"]) + 3).all()
+    assert rows["labels"][-1] >= 0.5 * budget * 90
+
+
+def test_random_asks_about_the_budgets_share(task, gpc):
+    asked = [
+        run_stream(task, gpc, "stream_random", SETTINGS, dataclasses.replace(STREAM, every=90), "blobs", seed)[-1]
+        for seed in range(6)
+    ]
+    assert np.mean([row["labels"] for row in asked]) == pytest.approx(0.2 * 90, abs=5)
+    assert len({row["labels"] for row in asked}) > 1
+
+
+@both
+def test_the_same_axes_give_the_same_rows(task, gpc, strategy):
+    one, again = run(task, gpc, strategy), run(task, gpc, strategy)
+    assert all(np.array_equal(one[name], again[name], equal_nan=True) for name in one)
+
+
+def test_the_new_concept_is_recognised_once_it_was_asked_about(task, gpc):
+    rows = run(task, gpc, "stream_bald")
+    assert rows["new_labels"][:3] == [0, 0, 0]
+    assert 0 < rows["new_labels"][-1] < rows["labels"][-1]
+    assert rows["accuracy"][:3] == pytest.approx([2 / 3] * 3)
+    assert rows["accuracy_new"][0] == 0
+    assert rows["accuracy_new"][-1] > 0.9
+    assert rows["accuracy"][-1] > 0.9
+
+
+def test_the_running_accuracy_falls_as_the_new_concept_arrives_and_rises_as_it_is_learnt(task, gpc):
+    running = run(task, gpc, "stream_bald", every=10)["running"]
+    assert running[3] == 1.0  # at the end of the quiet
+    assert min(running[4:7]) < 0.9
+    assert running[-1] > 0.9
+
+
+def test_the_running_accuracy_is_that_of_the_last_window(task, gpc):
+    rows, of_all = (run(task, gpc, "stream_random", budget=1e-9, every=1, window=w) for w in (20, 90))
+    is_new = task.pool.concept_N[arrival_order(task, STREAM, "blobs", 0)] == "overlap"
+    assert of_all["running"][90] == pytest.approx(1 - is_new.mean())
+    assert [rows["running"][n] for n in (30, 50, 90)] == pytest.approx(
+        [1, 1 - is_new[30:50].mean(), 1 - is_new[70:90].mean()]
+    )
+
+
+def test_where_nothing_is_asked_nothing_is_learnt(task, gpc):
+    rows = run(task, gpc, "stream_random", budget=1e-9)
+    for name, value in (("labels", 0), ("new_labels", 0), ("accuracy_new", 0.0), ("accuracy", rows["accuracy"][0])):
+        assert rows[name] == [value] * 7
+
+
+@both
+def test_the_classifier_given_is_left_as_it_was(task, gpc, strategy):
+    before = [array.tobytes() for array in gpc.attribute(task.test.h)]
+    assert run(task, gpc, strategy)["labels"][-1] > 0
+    assert [array.tobytes() for array in gpc.attribute(task.test.h)] == before

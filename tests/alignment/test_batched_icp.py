@@ -1,0 +1,233 @@
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from gpca.alignment import icp_kernels
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICP, METHODS, ICPSettings
+from gpca.alignment.rigid import transform
+from gpca.alignment.twist import exp
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
+
+DEVIATION = np.array([0.1, 0.1, 0.1, 0.03, 0.03, 0.03])
+
+
+def starts(n, seed=0, spread=1.0):
+    return exp(np.random.default_rng(seed).normal(size=(n, 6)) * DEVIATION * spread)
+
+
+def clouds(objects, index, seed=0, points=250):
+    """Disjoint points of one object, relative to its diameter: source, target and the target's normals."""
+    order = np.random.default_rng(seed).permutation(len(objects.points(index)))
+    all_points, all_normals = objects.points(index).astype(float) / objects.diameters_m[index], objects.normals(index)
+    source, target = order[:points], order[points : 2 * points]
+    return all_points[source], all_points[target], all_normals[target]
+
+
+def by_open3d(source, target, normals, settings, poses_n):
+    icp = ICP(target, normals, settings)
+    runs = [icp.register(source, pose) for pose in poses_n]
+    return [np.array([getattr(run, name) for run in runs]) for name in ("T_target_source", "fitness", "inlier_rmse")]
+
+
+def assert_same(ours, theirs, atol=1e-9):
+    for one, other in zip(ours, theirs, strict=True):
+        assert one.shape == other.shape
+        assert np.abs(one - other).max() <= atol
+
+
+@pytest.mark.parametrize("index", range(3))
+@pytest.mark.parametrize("concept", CONCEPTS)
+def test_many_runs_end_where_open3d_ends(objects, concept, index):
+    source, target, _ = clouds(objects, index)
+    source = PERTURBATIONS[concept](source, Severities(), np.random.default_rng(index)).points
+    poses_n = starts(13, index, spread=2.0)
+    result = BatchedICP(target, ICPSettings()).register(source, poses_n)
+    assert_same(result, by_open3d(source, target, None, ICPSettings(), poses_n))
+    assert np.abs(result[0] - poses_n).max() > 0.01  # they did move
+    assert np.isin(result[1] * len(source), np.arange(len(source) + 1)).all()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ICPSettings(max_iterations=1),
+        ICPSettings(max_iterations=3),
+        ICPSettings(correspondence_distance=0.02),
+        ICPSettings(correspondence_distance=0.5),
+        ICPSettings(correspondence_distance=5.0),
+    ],
+)
+def test_iterations_and_distance_count_as_in_open3d(objects, settings):
+    source, target, _ = clouds(objects, 1)
+    result = BatchedICP(target, settings).register(source, starts(8))
+    assert_same(result, by_open3d(source, target, None, settings, starts(8)))
+
+
+def test_another_unit_of_length_makes_the_same_steps_as_open3d(objects):
+    """Not those of the smaller unit: Open3D's limit on the change of the RMSE is a length."""
+    source, target, _ = clouds(objects, 0)
+    poses_n = starts(5)
+    poses_n[:, :3, 3] *= 1000
+    settings = ICPSettings(correspondence_distance=100.0)
+    T_n, fitness_n, rmse_n = BatchedICP(1000 * target, settings).register(1000 * source, poses_n)
+    assert_same((T_n, fitness_n, rmse_n), by_open3d(1000 * source, 1000 * target, None, settings, poses_n), atol=1e-6)
+    assert (fitness_n > 0.9).all() and (rmse_n > 1).all()
+
+
+def test_without_correspondences_a_run_stays_where_it_began(objects):
+    source, target, _ = clouds(objects, 0)
+    poses_n = starts(6)
+    poses_n[:5, :3, 3] += [[5, 0, 0], [0, -5, 0], [0, 0, 5], [1.2, 1.2, 1.2], [1e6, 0, 0]]
+    poses, fitness, rmse = BatchedICP(target, ICPSettings()).register(source, poses_n)
+    assert np.array_equal(poses[:5], poses_n[:5])
+    assert not fitness[:5].any() and not rmse[:5].any()
+    assert fitness[5] > 0.9  # the failures of the others are not its own
+    assert_same((poses, fitness, rmse), by_open3d(source, target, None, ICPSettings(), poses_n))
+
+
+def test_a_cloud_lies_on_itself(objects):
+    _, target, _ = clouds(objects, 1)
+    poses_n = np.concatenate([np.eye(4)[None], starts(5, spread=0.3)])
+    poses, fitness, rmse = BatchedICP(target, ICPSettings()).register(target, poses_n)
+    assert np.abs(poses[0] - np.eye(4)).max() < 1e-12
+    assert (fitness == 1).all() and rmse[0] < 1e-12
+    assert_same((poses, fitness, rmse), by_open3d(target, target, None, ICPSettings(), poses_n))
+
+
+POOR = {
+    "plane": lambda points: points * [1, 1, 0],
+    "line": lambda points: points * [0, 0, 1],
+    "few": lambda points: points[:3],
+    "small": lambda points: points * 1e-3,
+    "one point many times": lambda points: points[[0] * 20],
+}
+
+
+@pytest.mark.parametrize("poor", POOR)
+def test_poor_targets_give_rigid_poses(objects, poor):
+    """Where least squares leaves the motion open, another one than Open3D's may be chosen, but a rigid one."""
+    source, target, _ = clouds(objects, 0)
+    points = POOR[poor](target)
+    poses, fitness, rmse = BatchedICP(points, ICPSettings()).register(source, starts(13))
+    rotations = poses[:, :3, :3]
+    assert np.allclose(rotations @ np.swapaxes(rotations, 1, 2), np.eye(3), atol=1e-9)
+    assert np.allclose(np.linalg.det(rotations), 1)
+    assert np.isfinite(rmse).all() and (rmse <= 0.1).all() and ((fitness >= 0) & (fitness <= 1)).all()
+
+
+@pytest.mark.parametrize("matched", [1, 2])
+def test_correspondences_with_one_single_point_do_not_turn_the_source(matched):
+    random = np.random.default_rng(0)
+    target = np.array([[0.3, 0.2, 0.1], [9, 9, 9], [-9, 9, 9]])
+    source = np.concatenate([target[0] + random.uniform(-0.04, 0.04, (matched, 3)), random.uniform(50, 60, (5, 3))])
+    poses_n = starts(5, spread=0.1)
+    result = BatchedICP(target, ICPSettings()).register(source, poses_n)
+    assert (result[1] == matched / len(source)).all()
+    assert np.allclose(result[0][:, :3, :3], poses_n[:, :3, :3], atol=1e-9)
+    assert_same(result, by_open3d(source, target, None, ICPSettings(), poses_n))
+
+
+def test_least_squares_never_mirrors():
+    """Correspondences whose best orthogonal map is a reflection: a flat cloud and its mirror image."""
+    random = np.random.default_rng(0)
+    target = random.uniform(-0.5, 0.5, size=(100, 3)) * [1, 1, 0.02]
+    source = target * [1, 1, -1]
+    result = BatchedICP(target, ICPSettings(max_iterations=1)).register(source, np.eye(4)[None])
+    nearest = target[cKDTree(target).query(source)[1]]
+    u, _, vt = np.linalg.svd((nearest - nearest.mean(axis=0)).T @ (source - source.mean(axis=0)))
+    assert np.linalg.det(u @ vt) < 0
+    assert np.linalg.det(result[0][0, :3, :3]) == pytest.approx(1)
+    assert_same(result, by_open3d(source, target, None, ICPSettings(max_iterations=1), np.eye(4)[None]))
+
+
+@pytest.mark.parametrize("method", METHODS[1:])
+def test_the_other_methods_are_open3ds(objects, method):
+    source, target, normals = clouds(objects, 0)
+    settings = ICPSettings(method, max_iterations=10)
+    result = BatchedICP(target, settings, normals).register(source, starts(3))
+    assert_same(result, by_open3d(source, target, normals, settings, starts(3)), atol=0)
+    point_to_point = BatchedICP(target, ICPSettings(max_iterations=10)).register(source, starts(3))
+    assert np.abs(result[0] - point_to_point[0]).max() > 1e-4
+    with pytest.raises(InputError, match="no normals"):
+        BatchedICP(target, settings)
+
+
+def test_a_run_does_not_depend_on_the_others_nor_on_earlier_calls(objects):
+    source, target, _ = clouds(objects, 2)
+    poses_n = starts(13, spread=2.0)
+    icp = BatchedICP(target, ICPSettings())
+    first = icp.register(source, poses_n)
+    assert len(np.unique(first[0].round(6), axis=0)) > 1
+    order = np.random.default_rng(0).permutation(13)
+    for rows, result in (
+        (slice(None), icp.register(source, poses_n)),
+        (order, icp.register(source, poses_n[order])),
+        (order, BatchedICP(target, ICPSettings()).register(source, poses_n[order])),
+        ([4], icp.register(source, poses_n[[4]])),
+        ([4, 4, 0], BatchedICP(target, ICPSettings()).register(source, poses_n[[4, 4, 0]])),
+    ):
+        for array, expected in zip(result, first, strict=True):
+            assert np.array_equal(array, expected[rows])
+
+
+def test_another_source_in_between_changes_nothing(objects):
+    source, target, _ = clouds(objects, 0)
+    icp = BatchedICP(target, ICPSettings())
+    before = icp.register(source, starts(5))
+    icp.register(transform(starts(1, seed=9, spread=3.0)[0], source[:100]), starts(20, seed=5, spread=4.0))
+    for array, expected in zip(icp.register(source, starts(5)), before, strict=True):
+        assert np.array_equal(array, expected)
+
+
+def test_with_few_lists_the_poses_are_the_same(objects, monkeypatch):
+    source, target, _ = clouds(objects, 2)
+    expected = BatchedICP(target, ICPSettings()).register(source, starts(5))
+    monkeypatch.setattr(icp_kernels, "MOST_LISTS", 10)
+    assert_same(BatchedICP(target, ICPSettings()).register(source, starts(5)), expected)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_given_is_not_changed(objects, method):
+    source, target, normals = clouds(objects, 0)
+    given = (source, target, normals, starts(2))
+    before = [array.copy() for array in given]
+    icp = BatchedICP(target, ICPSettings(method, max_iterations=3), normals)
+    poses, _, _ = icp.register(source, given[3])
+    poses += 1  # what is returned is no view of what was given
+    for array, expected in zip(given, before, strict=True):
+        assert np.array_equal(array, expected)
+
+
+def test_single_precision_and_strided_clouds_are_taken(objects):
+    source, target, _ = clouds(objects, 0)
+    expected = BatchedICP(target.astype(np.float32).astype(float), ICPSettings()).register(source[::2], starts(3))
+    result = BatchedICP(target.astype(np.float32), ICPSettings()).register(source[::2], starts(3))
+    for one, other in zip(result, expected, strict=True):
+        assert np.array_equal(one, other)
+    fortran = np.asfortranarray(source[::2])
+    assert_same(BatchedICP(np.asfortranarray(target), ICPSettings()).register(fortran, starts(3)), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "faulty", [np.zeros((0, 3)), np.zeros((2, 3)), np.full((5, 3), np.nan), np.full((5, 3), np.inf)]
+)
+def test_too_few_points_and_nan_are_refused(objects, method, faulty):
+    _, target, normals = clouds(objects, 0)
+    with pytest.raises(InputError, match=r"source cloud: .* at least 3 finite points"):
+        BatchedICP(target, ICPSettings(method), normals).register(faulty, starts(2))
+    with pytest.raises(InputError, match=r"target cloud: .* at least 3 finite points"):
+        BatchedICP(faulty, ICPSettings(method), faulty)
+
+
+def test_three_points_suffice():
+    triangle = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [0.0, 0.3, 0.0]])
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.02, -0.03, 0.05]).as_matrix()
+    T[:3, 3] = [0.01, 0.02, -0.01]
+    poses, fitness, rmse = BatchedICP(transform(T, triangle), ICPSettings()).register(triangle, np.eye(4)[None])
+    assert np.allclose(poses[0], T, atol=1e-9)
+    assert fitness[0] == 1 and rmse[0] < 1e-9

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gpca.alignment.icp import ICP, METHODS, ICPSettings
+from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
+from gpca.errors import InputError
+
+INIT = np.eye(4)
+
+
+@pytest.fixture(scope="module")
+def target(objects):
+    """Points of the brick, relative to its diameter, and their normals."""
+    return objects.points(0).astype(float) / objects.diameters_m[0], objects.normals(0)
+
+
+def motion(angle_deg, shift):
+    T_target_source = np.eye(4)
+    T_target_source[:3, :3] = Rotation.from_rotvec(np.deg2rad(angle_deg) * np.array([0.6, 0.0, 0.8])).as_matrix()
+    T_target_source[:3, 3] = shift
+    return T_target_source
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_small_known_motion_is_recovered(target, method):
+    points, normals = target
+    T_true = motion(4, [0.02, -0.01, 0.015])
+    source = transform(inverse(T_true), points)
+    result = ICP(points, normals, ICPSettings(method, max_iterations=100)).register(source, INIT)
+    error = result.T_target_source @ inverse(T_true)
+    assert rotation_angle_rad(error) < 2e-3
+    assert np.linalg.norm(error[:3, 3]) < 1e-3
+    assert result.fitness == 1.0
+    assert result.inlier_rmse < 1e-3
+
+
+def test_fitness_and_rmse_are_those_of_the_nearest_points(target):
+    from scipy.spatial import cKDTree
+
+    points, normals = target
+    source = points[::2] + np.random.default_rng(0).normal(scale=0.02, size=points[::2].shape)
+    source[:30] += 1.0
+    result = ICP(points, normals, ICPSettings(correspondence_distance=0.05)).register(source, INIT)
+    distance = cKDTree(points).query(transform(result.T_target_source, source))[0]
+    inlier = distance < 0.05
+    assert result.fitness == pytest.approx(inlier.mean())
+    assert result.inlier_rmse == pytest.approx(np.sqrt(np.square(distance[inlier]).mean()), rel=1e-6)
+
+
+def test_the_methods_minimise_different_distances(target):
+    points, normals = target
+    noise = np.random.default_rng(0).normal(scale=0.02, size=points.shape)
+    source = transform(motion(4, [0.02, -0.01, 0.015]), points) + noise
+    poses = [ICP(points, normals, ICPSettings(method)).register(source, INIT).T_target_source for method in METHODS]
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        assert np.abs(poses[one] - poses[other]).max() > 1e-4
+
+
+def test_the_initial_pose_decides_where_icp_starts(target):
+    points, normals = target
+    T_true = motion(120, [0.3, 0.0, -0.2])
+    icp = ICP(points, normals, ICPSettings())
+    source = transform(inverse(T_true), points)
+    assert np.allclose(icp.register(source, T_true).T_target_source, T_true, atol=1e-6)
+    assert not np.allclose(icp.register(source, INIT).T_target_source, T_true, atol=0.1)
+
+
+def test_an_unknown_method_is_named():
+    with pytest.raises(InputError, match=r"'icp2': unknown; choose one of point_to_point, point_to_plane, generalized"):
+        ICPSettings("icp2")
+
+
+@pytest.mark.parametrize("method", ["point_to_plane", "generalized"])
+def test_methods_of_planes_need_normals(target, method):
+    with pytest.raises(InputError, match="no normals"):
+        ICP(target[0], None, ICPSettings(method))
+
+
+@pytest.mark.parametrize(
+    "source", [np.zeros((0, 3)), np.zeros((2, 3)), np.full((5, 3), np.nan), np.full((5, 3), np.inf)]
+)
+def test_too_few_points_and_nan_are_refused(target, source):
+    icp = ICP(target[0], None, ICPSettings())
+    with pytest.raises(InputError, match="at least 3 finite points"):
+        icp.register(source, INIT)

@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gpca.alignment.pose_error import add_error, adds_error, pose_error
+
+
+def pose(angle_deg=0.0, axis="z", shift=(0.0, 0.0, 0.0)):
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler(axis, angle_deg, degrees=True).as_matrix()
+    T[:3, 3] = shift
+    return T
+
+
+@pytest.fixture
+def square():
+    return np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+
+
+def test_add_of_a_shift_is_its_length(square):
+    assert add_error(square, pose(shift=(3.0, 0, 4.0)), pose()) == pytest.approx(5.0)
+
+
+def test_a_symmetric_object_is_judged_by_its_nearest_points(square):
+    assert add_error(square, pose(90), pose()) == pytest.approx(2.0)
+    assert adds_error(square, pose(90), pose()) == pytest.approx(0.0, abs=1e-12)
+    assert pose_error(square, pose(90), pose(), symmetric=True) < 1e-12
+    assert pose_error(square, pose(90), pose(), symmetric=False) == pytest.approx(2.0)
+
+
+def test_adds_is_measured_from_the_estimate_to_the_truth():
+    points = np.array([[0.0, 0, 0], [10, 0, 0]])
+    assert adds_error(points, pose(shift=(1.0, 0, 0)), pose()) == pytest.approx(1.0)
+    assert adds_error(points, pose(shift=(9.0, 0, 0)), pose()) == pytest.approx((1 + 9) / 2)
+
+
+def test_no_error_depends_on_where_the_camera_is(square):
+    camera = pose(37, "y", (0.3, -0.2, 0.9))
+    errors = [add_error(square, camera @ pose(20), camera @ pose(5)), add_error(square, pose(20), pose(5))]
+    assert errors[0] == pytest.approx(errors[1])

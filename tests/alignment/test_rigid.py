@@ -1,0 +1,69 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gpca.alignment.rigid import (
+    inverse,
+    random_direction,
+    require_rigid,
+    rotation_angle_rad,
+    scale_translation,
+    transform,
+)
+from gpca.errors import InputError
+
+
+def pose(seed=0):
+    T_b_a = np.eye(4)
+    T_b_a[:3, :3] = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+    T_b_a[:3, 3] = [0.3, -0.2, 0.1]
+    return T_b_a
+
+
+def test_transform_is_the_product_with_homogeneous_points():
+    points_a = np.random.default_rng(1).normal(size=(20, 3))
+    homogeneous = np.column_stack([points_a, np.ones(20)])
+    assert np.allclose(transform(pose(), points_a), (pose() @ homogeneous.T).T[:, :3])
+
+
+def test_the_inverse_takes_points_back():
+    assert np.allclose(inverse(pose()), np.linalg.inv(pose()))
+    assert np.allclose(inverse(pose()) @ pose(), np.eye(4))
+
+
+def test_another_unit_of_length_scales_points_and_transform_alike():
+    points_m, T_m = np.random.default_rng(1).normal(size=(20, 3)), pose()
+    T_mm = scale_translation(T_m, 1000)
+    assert np.allclose(transform(T_mm, 1000 * points_m), 1000 * transform(T_m, points_m))
+    assert np.array_equal(T_m, pose())
+
+
+@pytest.mark.parametrize("angle_rad", [0.0, 1e-3, 0.5, 3.0, np.pi])
+def test_the_angle_is_that_of_the_rotation(angle_rad):
+    T_b_a = pose()
+    T_b_a[:3, :3] = Rotation.from_rotvec(angle_rad * np.array([0.6, 0.0, 0.8])).as_matrix()
+    assert rotation_angle_rad(T_b_a) == pytest.approx(angle_rad, abs=1e-6)
+
+
+def test_directions_are_unit_and_favour_no_side():
+    random = np.random.default_rng(0)
+    directions = np.array([random_direction(random) for _ in range(4000)])
+    assert np.allclose(np.linalg.norm(directions, axis=1), 1)
+    # Uniform on the sphere: mean 0, covariance I/3 (their standard errors are about 0.01).
+    assert np.abs(directions.mean(axis=0)).max() < 0.04
+    assert np.abs(directions.T @ directions / len(directions) - np.eye(3) / 3).max() < 0.04
+
+
+@pytest.mark.parametrize(
+    ("T_b_a", "message"),
+    [
+        (np.eye(3), r"my pose: the pose is of shape \(3, 3\)"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "my pose: the pose is no rigid transform"),
+        (np.full((4, 4), np.nan), "my pose: the pose is no rigid transform"),
+        (pose().T, "its last row has to be 0 0 0 1"),
+    ],
+)
+def test_what_is_no_rigid_transform_is_refused(T_b_a, message):
+    require_rigid(pose(), "my pose")
+    with pytest.raises(InputError, match=message):
+        require_rigid(T_b_a, "my pose")

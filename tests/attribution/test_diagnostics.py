@@ -1,0 +1,146 @@
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from gpca.attribution import diagnostics as d
+
+RANDOM = np.random.default_rng(0)
+WRONG = RANDOM.uniform(size=4000) < 0.1
+E = WRONG.mean()
+
+
+def confident(p, n_classes=3):
+    """Probabilities with `p` for class 0 and the rest shared."""
+    p = np.asarray(p, float)
+    return np.column_stack([p, *[(1 - p) / (n_classes - 1)] * (n_classes - 1)])
+
+
+def test_perfect_order_has_the_least_area():
+    perfect = -WRONG.astype(float)
+    assert d.aurc(perfect, WRONG) == pytest.approx(E + (1 - E) * np.log(1 - E), abs=1e-3)
+    assert d.excess_aurc(perfect, WRONG) == 0
+    assert d.augrc(perfect, WRONG) == pytest.approx(E**2 / 2, abs=1e-3)
+
+
+def test_random_order_has_the_error_rate_as_its_area():
+    constant = np.zeros(len(WRONG))
+    assert d.aurc(constant, WRONG) == pytest.approx(E)
+    assert d.augrc(constant, WRONG) == pytest.approx(E / 2, abs=1e-3)
+    assert d.aurc(RANDOM.normal(size=len(WRONG)), WRONG) == pytest.approx(E, abs=0.02)
+
+
+def test_worst_order_has_the_largest_area():
+    worst = WRONG.astype(float)
+    assert d.aurc(worst, WRONG) == pytest.approx(d.worst_aurc(E), abs=1e-3)
+    assert d.augrc(worst, WRONG) == pytest.approx(E - E**2 / 2, abs=1e-3)
+
+
+def test_ties_are_the_mean_over_their_orders():
+    wrong = np.array([True, False, False, True, False])
+    confidence = np.array([2, 2, 2, 1, 1])
+    tied = [sorted(range(5), key=lambda i: (-confidence[i], order.index(i))) for order in permutations(range(5))]
+    areas = [np.mean(np.cumsum(wrong[order]) / np.arange(1, 6)) for order in map(np.array, tied)]
+    assert d.aurc(confidence, wrong) == pytest.approx(np.mean(areas))
+
+
+def test_the_curve_ends_at_full_coverage_with_the_error_rate():
+    coverage, risk = d.risk_coverage(RANDOM.normal(size=len(WRONG)), WRONG)
+    assert (coverage[0], coverage[-1], risk[-1]) == (1 / len(WRONG), 1, pytest.approx(E))
+
+
+@pytest.mark.parametrize("all_wrong", [False, True])
+def test_all_right_and_all_wrong_have_defined_areas(all_wrong):
+    wrong = np.full(20, all_wrong)
+    assert d.aurc(np.arange(20), wrong) == float(all_wrong)
+    assert d.excess_aurc(np.arange(20), wrong) == 0
+    assert d.augrc(np.arange(20), wrong) == (pytest.approx(0.525) if all_wrong else 0)
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_calibrated_predictions_have_no_error_and_overconfident_ones_their_excess(adaptive):
+    p = RANDOM.uniform(0.4, 1, size=20000)
+    target = np.where(RANDOM.uniform(size=len(p)) < p, 0, 1)
+    assert d.calibration_error(confident(p), target, adaptive) < 0.015
+    assert d.calibration_error(confident(np.full(1000, 0.95)), np.arange(1000) % 10 // 7, adaptive) == pytest.approx(
+        0.25
+    )
+
+
+def test_a_confidence_of_one_is_in_the_last_bin_and_not_lost():
+    assert d.calibration_error(confident(np.ones(10)), np.arange(10) % 2) == pytest.approx(0.5)
+
+
+def test_equal_width_and_equal_mass_bins_differ_as_they_should():
+    # Within one wide bin, errors of both signs cancel; bins of equal mass tell them apart.
+    p = np.concatenate([np.full(160, 0.94), np.full(140, 0.99)])
+    target = np.concatenate([np.zeros(160), np.arange(140) % 10 == 0]).astype(int)
+    overall = abs(160 * (0.94 - 1) + 140 * (0.99 - 0.9)) / 300
+    assert d.calibration_error(confident(p), target) == pytest.approx(overall)
+    apart = (160 * (1 - 0.94) + 140 * (0.99 - 0.9)) / 300
+    assert d.calibration_error(confident(p), target, adaptive=True) == pytest.approx(apart)
+
+
+def test_classwise_error_looks_at_every_class():
+    p = np.tile([0.5, 0.25, 0.25], (400, 1))
+    target = np.arange(400) % 4 // 2
+    assert d.calibration_error(p, target) == pytest.approx(0)
+    assert d.classwise_calibration_error(p, target) == pytest.approx((0 + 0.25 + 0.25) / 3)
+
+
+def test_proper_scores_of_certain_and_uniform_predictions():
+    target = np.array([0, 1, 2])
+    assert d.negative_log_likelihood(np.eye(3), target) == 0
+    assert d.brier_score(np.eye(3), target) == 0
+    assert d.negative_log_likelihood(np.full((3, 3), 1 / 3), target) == pytest.approx(np.log(3))
+    assert d.brier_score(np.full((3, 3), 1 / 3), target) == pytest.approx(2 / 3)
+    assert d.brier_score(np.eye(3)[[1, 2, 0]], target) == 2
+    assert np.isfinite(d.negative_log_likelihood(np.eye(3)[[1, 2, 0]], target))
+
+
+def test_rank_correlation_is_of_ranks_and_defined_for_constants():
+    x = RANDOM.normal(size=50)
+    assert d.rank_correlation(x, np.exp(x)) == pytest.approx(1)
+    assert d.rank_correlation(x, -x) == pytest.approx(-1)
+    assert d.rank_correlation(x, np.ones(50)) == d.rank_correlation(x[:1], x[:1]) == 0
+
+
+def test_the_bootstrap_interval_of_a_mean_is_that_of_the_normal_theory():
+    values = RANDOM.normal(size=400)
+    low, high = d.bootstrap_interval(np.mean, values, random=np.random.default_rng(1))
+    assert (low, high) == d.bootstrap_interval(np.mean, values, random=np.random.default_rng(1))
+    half_width = 1.96 * values.std() / np.sqrt(400)
+    assert low == pytest.approx(values.mean() - half_width, abs=0.15 * half_width)
+    assert high == pytest.approx(values.mean() + half_width, abs=0.15 * half_width)
+
+
+def test_some_printed_values_cannot_belong_to_the_printed_accuracies():
+    # Table V: the forest's area at 98.0 % is larger than any order allows; the GPC's at 99.3 % than a random one.
+    assert d.worst_aurc(1 - 0.98) < 0.1145
+    assert 1 - 0.993 < 0.0078
+    # ECE 0.223 at 99.3 %: the mean confidence is 0.770 where no bin is over-confident, and at most 0.784, where all
+    # mistakes are made with certainty.
+    right = np.arange(1000) < 993
+    for certain_of_mistakes, mean_confidence in ((False, 0.770), (True, 0.784)):
+        lower = (0.223 - 0.007 * certain_of_mistakes) / (0.993 if certain_of_mistakes else 1)
+        p = np.where(~right & certain_of_mistakes, 1.0, (1 if certain_of_mistakes else 0.993) - lower)
+        assert d.calibration_error(confident(p), np.where(right, 0, 1)) == pytest.approx(0.223)
+        assert p.mean() == pytest.approx(mean_confidence, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [
+        (d.aurc, ([], []), "confidences of"),
+        (d.aurc, ([1, 2], [True]), "confidences of"),
+        (d.augrc, ([np.nan], [True]), "not finite"),
+        (d.brier_score, (np.full((2, 3), 0.2), [0, 1]), "do not sum to one"),
+        (d.brier_score, (np.eye(3), [0, 1]), "for 2 samples"),
+        (d.calibration_error, (np.eye(3), [0, 1, 3]), "no class"),
+        (d.calibration_error, (np.full((1, 3), np.nan), [0]), "not finite"),
+        (d.rank_correlation, ([1, np.nan], [1, 2]), "not finite"),
+    ],
+)
+def test_what_has_no_answer_is_refused(function, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        function(*arguments)

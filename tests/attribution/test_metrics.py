@@ -1,0 +1,265 @@
+from itertools import permutations
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import (
+    accuracy,
+    collect,
+    collect_timings,
+    concept_accuracy,
+    confusion,
+    mean_interval,
+    permuted_accuracy,
+    read_causal,
+    read_metrics,
+    write_metrics,
+)
+from gpca.errors import InputError
+
+CONCEPTS = ("noise", "pose", "overlap")
+TRUE = np.array(["noise", "noise", "pose", "pose", "pose"])
+PREDICTED = np.array(["noise", "pose", "pose", "pose", "noise"])
+SURE = np.zeros(5, dtype=bool)
+
+
+def write_predictions(path, true=TRUE, predicted=PREDICTED, abstained=SURE, **columns):
+    rows = pd.DataFrame(
+        {"sample": range(len(true)), "split": "test", "object": "cat", "concept_true": true}
+        | {"concept_predicted": predicted}
+        | {f"score_{concept}": 0.25 for concept in CONCEPTS}
+        | {"abstained": abstained, "icp_calls": 0}
+        | columns
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows.to_csv(path, index=False)
+    return path
+
+
+def value(metrics, metric, concept="all", seed=0):
+    chosen = metrics[(metrics.metric == metric) & (metrics.concept == concept) & (metrics.seed == seed)]
+    assert len(chosen) == 1
+    return chosen.value.item()
+
+
+def test_accuracy_counts_abstained_samples_as_wrong():
+    assert accuracy(TRUE, PREDICTED, SURE) == 3 / 5
+    assert accuracy(TRUE, PREDICTED, np.array([True, True, False, False, False])) == 2 / 5
+    with pytest.raises(ValueError, match="no samples"):
+        accuracy(TRUE[:0], PREDICTED[:0], SURE[:0])
+
+
+def test_concept_accuracy_is_recall_and_leaves_out_absent_concepts():
+    assert concept_accuracy(TRUE, PREDICTED, SURE, CONCEPTS) == {"noise": 1 / 2, "pose": 2 / 3}
+
+
+def test_mean_interval_against_a_worked_example():
+    # Three repeats 1, 2, 3: s = 1, t_2(0.975) = 4.302653, half-width 4.302653 / sqrt(3).
+    mean, low, high = mean_interval([1, 2, 3])
+    assert mean == 2
+    assert high - mean == pytest.approx(2.484138, abs=1e-6)
+    assert mean - low == pytest.approx(high - mean)
+
+
+def test_mean_interval_covers_the_true_mean_as_often_as_it_says():
+    draws = np.random.default_rng(0).normal(size=(2000, 5))
+    covered = [low <= 0 <= high for _, low, high in map(mean_interval, draws)]
+    assert np.mean(covered) == pytest.approx(0.95, abs=0.02)
+
+
+def test_mean_interval_of_one_none_and_unfinished_repeats():
+    mean, low, high = mean_interval([0.7])
+    assert mean == 0.7
+    assert np.isnan([low, high]).all()
+    assert np.isnan(mean_interval([0.7, np.nan])).all()
+    with pytest.raises(ValueError, match="no repeats"):
+        mean_interval([])
+
+
+def test_collect_is_tidy_and_looks_at_test_rows_only(tmp_path):
+    split = ["test", "test", "test", "test", "train"]
+    abstained = [False, False, True, False, False]
+    first = write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv", split=split, abstained=abstained)
+    second = write_predictions(tmp_path / "ycb" / "gpca" / "seed11.csv", predicted=TRUE)
+    metrics = collect([first, second])
+    assert list(metrics.columns) == ["table", "source", "method", "metric", "concept", "seed", "value"]
+    assert set(metrics.source) == {"ycb"}
+    assert set(metrics.method) == {"gpca"}
+    assert value(metrics, "accuracy") == 2 / 4
+    assert value(metrics, "accuracy", "noise") == 1 / 2
+    assert value(metrics, "accuracy", "pose") == 1 / 2
+    assert value(metrics, "test_samples") == 4
+    assert value(metrics, "test_samples", "pose") == 2
+    assert value(metrics, "abstention_rate") == 1 / 4
+    assert value(metrics, "accuracy", seed=11) == 1
+    assert "overlap" not in set(metrics.concept)
+
+
+def test_what_the_suite_writes_is_collected(tmp_path):
+    # The writer's own frame, so that the two ends of the prediction file cannot drift apart.
+    from gpca.attribution.predictions import write_predictions
+    from gpca.attribution.scores import Attribution
+
+    scores = np.array([[0.7, 0.2, 0.1], [0.1, 0.8, 0.1]])
+    abstained = np.array([False, True])
+    attribution = Attribution.of_scores(CONCEPTS, scores, seconds=0.1, icp_calls=[3, 4], abstained_N=abstained)
+    labels = {"split": ["test"] * 2, "object_name": ["cat"] * 2, "concept": ["noise", "pose"]}
+    path = tmp_path / "ycb" / "gpca" / "seed0.csv"
+    write_predictions(path, SimpleNamespace(sample=np.arange(2), **labels), attribution)
+    metrics = collect([path])
+    assert value(metrics, "accuracy") == 0.5
+    assert value(metrics, "icp_calls") == 3.5
+
+
+def test_a_swapped_predictor_is_right_once_relabelled():
+    true = np.array([*["noise"] * 10, *["pose"] * 12, *["overlap"] * 8])
+    turned = np.select([true == "noise", true == "pose"], ["pose", "overlap"], "noise")
+    for predicted, plain, permuted in ((true, 1, 1), (turned, 0, 1)):
+        sure = np.zeros(30, dtype=bool)
+        assert accuracy(true, predicted, sure) == plain
+        assert permuted_accuracy(confusion(true, predicted, sure, CONCEPTS)) == permuted
+    abstained = true == "overlap"  # stays wrong under every name
+    assert permuted_accuracy(confusion(true, turned, abstained, CONCEPTS)) == 22 / 30
+
+
+def test_no_name_helps_a_constant_predictor():
+    true, constant = np.repeat(CONCEPTS, 7), np.repeat("pose", 21)
+    sure = np.zeros(21, dtype=bool)
+    assert accuracy(true, constant, sure) == pytest.approx(1 / 3)
+    assert permuted_accuracy(confusion(true, constant, sure, CONCEPTS)) == pytest.approx(1 / 3)
+
+
+def test_permuted_accuracy_is_the_best_of_all_permutations():
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        counts = random.integers(0, 30, (4, 5))
+        best = max(sum(counts[true, named] for true, named in enumerate(order)) for order in permutations(range(4)))
+        assert permuted_accuracy(counts) == best / counts.sum()
+
+
+def test_confusion_is_collected_per_true_concept_and_sums_to_its_samples(tmp_path):
+    abstained = [False, False, True, False, False]
+    path = write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv", abstained=abstained, icp_calls=[0, 0, 5, 5, 10])
+    metrics = collect([path])
+    # noise: noise, pose; pose: (abstained), pose, noise.
+    expected = {"noise": (1, 1, 0, 0), "pose": (1, 1, 0, 1)}
+    for concept, counts in expected.items():
+        names = [f"predicted_as_{name}" for name in (*CONCEPTS, "abstained")]
+        assert tuple(value(metrics, name, concept) for name in names) == counts
+        assert sum(counts) == value(metrics, "test_samples", concept)
+    assert value(metrics, "icp_calls") == 4
+    assert value(metrics, "permuted_accuracy") == value(metrics, "accuracy") == 2 / 5
+
+
+def causal_file(path, observed, clean, **columns):
+    rows = {"sample": range(len(observed)), "split": "test", "uncertainty_observed": observed}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pd.DataFrame(rows | {"uncertainty_clean": clean} | columns).to_csv(path, index=False)
+    return path
+
+
+def test_causal_is_above_the_95th_percentile_of_the_clean(tmp_path):
+    clean = np.arange(101.0)  # its 95th percentile is 95
+    observed = np.array([95.0, 95.1, *np.zeros(98), 1000.0])
+    causal = read_causal(causal_file(tmp_path / "seed0.csv", observed, np.random.default_rng(0).permutation(clean)))
+    assert np.flatnonzero(causal).tolist() == [1, 100]
+    assert causal["test", "100"]
+
+
+def test_causal_metrics_are_of_the_causal_samples_of_the_same_source_and_seed(tmp_path):
+    files = [write_predictions(tmp_path / "ycb" / "gpca" / f"seed{seed}.csv") for seed in (0, 1, 2)]
+    files.append(write_predictions(tmp_path / "cat" / "gpca" / "seed0.csv"))
+    place = tmp_path / "uncertainty" / "ycb" / "causal"
+    # PREDICTED is right at 0, 2 and 3.
+    causal = [
+        causal_file(place / "seed0.csv", [9, 9, 9, 0, 0], [0, 0, 0, 1, 1]),
+        causal_file(place / "seed1.csv", [0, 0, 0, 0, 0], [1, 1, 1, 1, 1]),
+    ]
+    metrics = collect(files, causal)
+    assert value(metrics, "causal_samples") == 3
+    assert value(metrics, "causal_accuracy") == 2 / 3
+    assert value(metrics, "causal_samples", seed=1) == 0
+    of_causal = metrics[metrics["metric"].str.startswith("causal")]
+    assert set(zip(of_causal["source"], of_causal["seed"], strict=True)) == {("ycb", 0), ("ycb", 1)}
+    assert "causal_accuracy" not in set(of_causal.loc[of_causal["seed"] == 1, "metric"])
+    assert not collect(files)["metric"].str.startswith("causal").any()
+
+
+def test_an_explainer_of_a_subset_is_judged_on_it(tmp_path):
+    path = write_predictions(tmp_path / "ycb" / "sa" / "seed0.csv", sample=[4, 0, 7, 3, 9])
+    causal = causal_file(tmp_path / "ycb" / "causal" / "seed0.csv", [9, 0, 0, 0, 9, 9, 9, 9, 0, 0], np.arange(10) / 5)
+    metrics = collect([path], [causal])
+    assert value(metrics, "test_samples") == 5
+    assert value(metrics, "causal_samples") == 3  # 4, 0 and 7: right, wrong, right
+    assert value(metrics, "causal_accuracy") == 2 / 3
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        ({"uncertainty_clean": "low"}, "'uncertainty_clean' holds something that is not a finite number"),
+        ({"uncertainty_observed": np.inf}, "'uncertainty_observed' holds something that is not a finite number"),
+        ({"sample": 3}, "holds a sample twice"),
+        ({"split": "tset"}, "'split'"),
+        ({"sample": [0, 1, 2, 3, 5]}, "lacks test sample 4 of .*gpca/seed0.csv"),
+    ],
+)
+def test_a_faulty_causal_file_is_refused_in_one_line(tmp_path, columns, expected):
+    predictions = write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv")
+    causal = causal_file(tmp_path / "ycb" / "causal" / "seed0.csv", np.ones(5), np.ones(5), **columns)
+    with pytest.raises(InputError, match=expected) as caught:
+        collect([predictions], [causal])
+    assert str(caught.value).startswith(str(causal))
+    assert "\n" not in str(caught.value)
+
+
+def test_metrics_survive_the_file_unchanged_and_have_the_same_bytes(tmp_path):
+    metrics = collect([write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv")])
+    write_metrics(metrics, tmp_path / "a.csv")
+    write_metrics(read_metrics(tmp_path / "a.csv"), tmp_path / "b.csv")
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+    pd.testing.assert_frame_equal(read_metrics(tmp_path / "a.csv"), metrics, check_dtype=False)
+
+
+def test_timings_are_means_over_the_test_samples(tmp_path):
+    path = tmp_path / "ycb" / "gpca" / "seed3.csv"
+    path.parent.mkdir(parents=True)
+    path.write_text("sample,split,seconds,icp_seconds\n0,test,0.5,0.25\n1,test,1.5,0.75\n0,train,9,9\n")
+    timings = collect_timings([path])
+    assert value(timings, "seconds_per_sample", seed=3) == 1.0
+    assert value(timings, "icp_seconds_per_sample", seed=3) == 0.5
+    for row, expected in (("0,train,9,9", "no test rows"), ("0,test,nan,9", "'seconds'")):
+        path.write_text(f"sample,split,seconds,icp_seconds\n{row}\n")
+        with pytest.raises(InputError, match=expected):
+            collect_timings([path])
+
+
+def test_predictions_of_training_rows_alone_are_refused(tmp_path):
+    path = write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv", split="train")
+    with pytest.raises(InputError, match="no test rows"):
+        collect([path])
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda rows: rows.drop(columns="method"), "column 'method' is missing"),
+        (lambda rows: rows.assign(value="much"), "'value'"),
+        (lambda rows: rows.assign(seed="zero"), "'seed'"),
+        (lambda rows: rows[:0], "no rows"),
+    ],
+)
+def test_faulty_metrics_are_refused(tmp_path, change, expected):
+    metrics = collect([write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv")])
+    change(metrics).to_csv(tmp_path / "metrics.csv", index=False)
+    with pytest.raises(InputError, match=expected):
+        read_metrics(tmp_path / "metrics.csv")
+
+
+def test_file_names_carry_source_explainer_and_seed(tmp_path):
+    with pytest.raises(InputError, match="is not named"):
+        collect([write_predictions(tmp_path / "ycb" / "gpca" / "zero.csv")])
+    with pytest.raises(InputError, match="no files"):
+        collect([])

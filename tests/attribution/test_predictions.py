@@ -1,0 +1,164 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.attribution.predictions import read_predictions, read_timings, write_predictions, write_timings
+from gpca.attribution.scores import Attribution
+from gpca.errors import InputError
+from gpca.files import read_csv
+from gpca.pairs.perturbation import CONCEPTS
+
+
+def attribution(n, seed=0, **changed):
+    random = np.random.default_rng(seed)
+    variances, bald = random.uniform(size=(n, 3)), random.uniform(size=n)
+    given = {"variances_N_C": variances, "bald_N": bald, "abstained_N": np.zeros(n, bool), "icp_calls_N": np.arange(n)}
+    times = {"seconds_N": np.zeros(n), "icp_seconds_N": np.zeros(n)}
+    return Attribution(CONCEPTS, random.dirichlet([1, 1, 1], n), **(given | times | changed))
+
+
+def prediction_file(path, **columns):
+    """Five predictions by hand, some columns replaced."""
+    rows = {"sample": range(5), "split": "test", "object": "cat", "concept_true": "pose", "concept_predicted": "pose"}
+    rows |= {f"score_{concept}": 0.25 for concept in CONCEPTS} | {"abstained": False, "icp_calls": 0}
+    pd.DataFrame(rows | columns, index=range(5)).to_csv(path, index=False)
+    return path
+
+
+def test_the_prediction_file_has_the_columns_and_values_of_the_schema(tmp_path, registrations):
+    made = attribution(len(registrations), abstained_N=np.arange(len(registrations)) == 4)
+    path = tmp_path / "ycb" / "gpca" / "seed0.csv"
+    write_predictions(path, registrations, made)
+    rows = read_predictions(path)
+    assert list(rows.columns) == [
+        *("sample", "split", "object", "concept_true", "concept_predicted"),
+        *("score_noise", "score_pose", "score_overlap", "variance_noise", "variance_pose", "variance_overlap"),
+        *("bald", "entropy", "abstained", "icp_calls"),
+    ]
+    assert rows["sample"].astype(int).tolist() == registrations.sample.tolist()
+    assert rows["object"].tolist() == registrations.object_name.tolist()
+    assert rows["concept_true"].tolist() == registrations.concept.tolist()
+    assert rows["concept_predicted"].tolist() == made.predicted_N.tolist()
+    assert rows.loc[4, "concept_predicted"] == "" and rows["abstained"].sum() == 1
+    assert np.allclose(rows.filter(like="score_"), made.scores_N_C, atol=5.1e-7)
+    assert np.allclose(rows.filter(like="variance_"), made.variances_N_C, atol=5.1e-7)
+    assert np.allclose(rows["bald"].astype(float), made.bald_N, atol=5.1e-7)
+    assert rows["icp_calls"].tolist() == made.icp_calls_N.tolist()
+
+
+def test_an_explainer_without_variances_and_bald_leaves_them_empty(tmp_path, registrations):
+    n, path = len(registrations), tmp_path / "seed0.csv"
+    nothing = {"variances_N_C": np.full((n, 3), np.nan), "bald_N": np.full(n, np.nan)}
+    write_predictions(path, registrations, attribution(n, **nothing))
+    rows = read_predictions(path)
+    assert rows.filter(like="variance_").isna().all(axis=None)
+    assert set(rows["bald"]) == {""}
+
+
+def test_the_same_predictions_give_the_same_bytes(tmp_path, registrations):
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        write_predictions(tmp_path / name, registrations, attribution(len(registrations), seed))
+    first, second, other = ((tmp_path / name).read_bytes() for name in "abc")
+    assert first == second != other
+
+
+def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path):
+    path = tmp_path / "seed0.csv"
+    sample = SimpleNamespace(sample=np.array([3, 3]), split=np.array(["train", "test"]))
+    with pytest.raises(InputError, match="no such file"):
+        read_timings(path, sample)
+    write_timings(path, sample, np.array([0.5, 0.25]), np.array([0.125, 0.0]))
+    seconds, icp_seconds = read_timings(path, sample)
+    assert (seconds.tolist(), icp_seconds.tolist()) == ([0.5, 0.25], [0.125, 0.0])
+    fewer = SimpleNamespace(sample=sample.sample[:1], split=sample.split[:1])
+    other = SimpleNamespace(sample=sample.sample, split=sample.split[::-1])
+    for wrong in (fewer, other):
+        with pytest.raises(InputError, match="does not hold the seconds of these samples") as caught:
+            read_timings(path, wrong)
+        assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("sample,split,icp_seconds\n3,test,0.5\n", "column 'seconds' is missing"),
+        (
+            "sample,split,seconds,icp_seconds\n3,test,soon,0.5\n",
+            "'seconds' holds something that is not a finite number",
+        ),
+        ("sample,split,seconds,icp_seconds\n3,test,0.5,\n", "'icp_seconds' holds something that is not a finite"),
+    ],
+)
+def test_faulty_timings_are_refused_in_one_line(tmp_path, text, expected):
+    path = tmp_path / "seed0.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=expected) as caught:
+        read_timings(path, SimpleNamespace(sample=np.array([3]), split=np.array(["test"])))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        ({"concept_true": "dust"}, "unknown concept 'dust' in 'concept_true'"),
+        ({"concept_predicted": ""}, "unknown concept ''"),
+        ({"abstained": "perhaps"}, "'abstained'"),
+        ({"split": "validation"}, "'split'"),
+        ({"sample": 7}, "sample twice"),
+        ({"score_pose": "high"}, "'score_pose'"),
+        ({"score_pose": np.nan}, "'score_pose'"),
+        ({"variance_pose": "wide"}, "'variance_pose'"),
+        ({"icp_calls": "many"}, "'icp_calls'"),
+        ({"icp_calls": np.nan}, "'icp_calls'"),
+    ],
+)
+def test_faulty_predictions_are_refused(tmp_path, columns, expected):
+    path = prediction_file(tmp_path / "seed0.csv", **columns)
+    with pytest.raises(InputError, match=expected) as caught:
+        read_predictions(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_variance_may_be_empty_and_an_abstained_sample_needs_neither_concept_nor_scores(tmp_path):
+    path = prediction_file(
+        tmp_path / "seed0.csv",
+        concept_predicted=["", *["pose"] * 4],
+        abstained=["True", "False", "0", "0", "false"],
+        score_noise=["", 0.1, 0.1, 0.1, 0.1],
+        variance_noise=[np.nan, 0.1, 0.1, 0.1, 0.1],
+    )
+    rows = read_predictions(path)
+    assert rows["abstained"].tolist() == [True, False, False, False, False]
+    assert rows["score_noise"].isna().tolist() == rows["variance_noise"].isna().tolist() == rows["abstained"].tolist()
+
+
+@pytest.mark.parametrize(
+    "column", ["sample", "split", "object", "concept_true", "concept_predicted", "abstained", "icp_calls"]
+)
+def test_a_missing_column_is_named(tmp_path, column):
+    path = prediction_file(tmp_path / "seed0.csv")
+    pd.read_csv(path).drop(columns=column).to_csv(path, index=False)
+    with pytest.raises(InputError, match=f"column '{column}' is missing"):
+        read_predictions(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (None, "no such file"),
+        (b"", "is empty"),
+        (b"sample,seconds\n", "no rows"),
+        (b"sample\n1\n", "column 'seconds' is missing"),
+        (b"\xff\xfe\x00", "not a readable CSV"),
+        (b'a,b\n"1,2\n3', "not a readable CSV"),
+    ],
+)
+def test_unreadable_files_are_refused_in_one_line(tmp_path, content, expected):
+    path = tmp_path / "seed0.csv"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=expected) as caught:
+        read_csv(path, ("sample", "seconds"))
+    assert "\n" not in str(caught.value)

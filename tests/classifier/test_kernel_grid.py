@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
+from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.kernel_grid import GRID_COLUMNS, KernelGrid, evaluate_grid, read_grids, write_grid
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS
+
+GRID = KernelGrid(("rbf", "polynomial"), (0.1, 0.01), (2, 6), inducing=6, draws=40)
+
+
+@pytest.fixture(scope="module")
+def embedded(registrations):
+    random = np.random.default_rng(0)
+    target_S = [CONCEPTS.index(concept) for concept in registrations.concept]
+    embedding = 1.5 * random.normal(size=(3, 10))[target_S] + random.normal(size=(len(registrations), 10))
+    return replace(registrations, attached={"embedding": embedding})
+
+
+@pytest.fixture(scope="module")
+def grid(embedded):
+    return evaluate_grid(embedded, GRID, "tiny", 0)
+
+
+def test_there_is_a_row_for_every_kernel_rate_and_count(grid):
+    assert list(grid.columns) == list(GRID_COLUMNS)
+    assert len(grid) == 2 * 2 * 2
+    assert not grid.duplicated(["kernel", "learning_rate", "iterations"]).any()
+    assert np.isfinite(grid[list(GRID_COLUMNS[1:])].to_numpy()).all()
+
+
+@pytest.mark.parametrize("row", range(8))
+def test_every_row_is_that_of_a_fit_of_its_own(embedded, grid, row):
+    kernel, rate, iterations, *measured = grid.iloc[row]
+    gpc = GPC(CONCEPTS, GPCSettings(kernel, rate, int(iterations), inducing=6, draws=40), "tiny", 0)
+    train, test = embedded.rows("train"), embedded.rows("test")
+    gpc.fit(embedded.embedding[train], embedded.concept[train])
+    scores = gpc.attribute(embedded.embedding[test])[0]
+    target = np.array([CONCEPTS.index(concept) for concept in embedded.concept[test]])
+    assert measured == [
+        np.mean(scores.argmax(axis=1) == target),
+        gpc.elbo(),
+        scores.max(axis=1).mean(),
+        calibration_error(scores, target),
+        negative_log_likelihood(scores, target),
+    ]
+
+
+def test_a_larger_rate_raises_the_bound_further(grid):
+    last = grid[grid["iterations"] == 6].set_index(["kernel", "learning_rate"])["elbo"]
+    for kernel in GRID.kernels:
+        assert last[kernel, 0.1] > last[kernel, 0.01]
+
+
+def test_files_are_read_back_with_source_and_seed(grid, tmp_path):
+    paths = [tmp_path / "kernels/tiny" / f"seed{seed}.csv" for seed in (0, 3)]
+    for path in paths:
+        write_grid(path, grid)
+    read = read_grids(paths)
+    assert read["source"].unique().tolist() == ["tiny"]
+    assert read["seed"].tolist() == [0] * 8 + [3] * 8
+    assert read["accuracy"].to_numpy() == pytest.approx(np.tile(grid["accuracy"], 2), abs=1e-6)
+
+
+def test_bad_files_are_named(grid, tmp_path):
+    path = tmp_path / "kernels/tiny/seed0.csv"
+    write_grid(path, grid.assign(nll=np.nan))
+    with pytest.raises(InputError, match="column 'nll' holds something that is not a finite number"):
+        read_grids([path])
+    write_grid(path, grid.drop(columns="ece"))
+    with pytest.raises(InputError, match="column 'ece' is missing"):
+        read_grids([path])
+    with pytest.raises(InputError, match="no files were given"):
+        read_grids([])
+
+
+@pytest.mark.parametrize("split", ["train", "test"])
+def test_a_missing_split_is_a_fault(embedded, split):
+    with pytest.raises(InputError, match="tiny, seed 0: lack a split"):
+        evaluate_grid(embedded.subset(embedded.rows(split)), GRID, "tiny", 0)

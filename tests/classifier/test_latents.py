@@ -1,0 +1,224 @@
+from copy import copy
+
+import numpy as np
+import pytest
+import torch
+from scipy.special import log_softmax, softmax
+from scipy.stats import norm, qmc
+from torch.distributions import MultivariateNormal, kl_divergence
+
+from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
+from gpca.classifier.prior import Prior
+
+from .gpytorch_form import LatentGPs
+
+CLASSES = ("noise", "pose", "overlap")
+QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)
+MANY_POINTS_C = norm.ppf(qmc.Sobol(3, rng=5).random_base2(12))  # for expectations, computed independently
+
+
+def blobs(n, seed):
+    centres = 3 * np.random.default_rng(0).normal(size=(3, 16))
+    blob = np.arange(n) % 3
+    return centres[blob] + np.random.default_rng(seed).normal(size=(n, 16)), blob
+
+
+H, TARGETS = blobs(60, seed=1)
+H_TEST, TARGETS_TEST = blobs(30, seed=2)
+LABELS, LABELS_TEST = np.array(CLASSES)[TARGETS], np.array(CLASSES)[TARGETS_TEST]
+
+
+@pytest.fixture(scope="module")
+def trained():
+    """A GPC as its fit left it, and gpytorch's model with the same parameters."""
+    models = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Prior, "of", lambda model, of=Prior.of: models.append(model) or of(model))
+        gpc = GPC(CLASSES, QUICK, "blobs", 0).fit(H, LABELS)
+    (model,) = models
+    reference = LatentGPs(model.kernel, model.inducing_M_d.detach())
+    reference.strategy.variational_params_initialized.fill_(1)  # or gpytorch would set them to the prior's
+    distribution = reference.strategy._variational_distribution
+    with torch.no_grad():
+        distribution.variational_mean.copy_(model.mean_C_M)
+        distribution.chol_variational_covar.copy_(model.root_C_M_M)
+    return gpc, reference.eval()
+
+
+@pytest.fixture(scope="module")
+def projection(trained):
+    return trained[0].project(H)
+
+
+def refined(projection, targets=TARGETS, sites=None, tolerance=1e-9):
+    sites = Sites.silent(len(targets), 3) if sites is None else sites
+    sites, latents, _ = refine(projection, targets, sites, iterations=500, tolerance=tolerance)
+    return sites, latents
+
+
+@pytest.fixture(scope="module")
+def best(projection):
+    return refined(projection)
+
+
+def expectation(latents, projection, function):
+    mean_N_C, deviation_N_C = latents.marginals(projection)
+    return np.mean(function(mean_N_C + deviation_N_C * MANY_POINTS_C[:, None]), axis=0)
+
+
+def precise_elbo(latents, projection):
+    log_p_N_C = expectation(latents, projection, lambda logits: log_softmax(logits, axis=2))
+    return log_p_N_C[np.arange(len(TARGETS)), TARGETS].sum() - torch_divergence(latents)
+
+
+def torch_divergence(latents):
+    mean, covariance = (torch.from_numpy(array) for array in (latents.mean_C_M, latents.covariance_C_M_M))
+    prior = MultivariateNormal(torch.zeros_like(mean), torch.eye(mean.shape[1], dtype=mean.dtype))
+    return float(kl_divergence(MultivariateNormal(mean, covariance), prior).sum())
+
+
+def assert_equal_posterior(one, other, tolerance):
+    assert np.abs(one.mean_C_M - other.mean_C_M).max() < tolerance
+    assert np.abs(one.covariance_C_M_M - other.covariance_C_M_M).max() < tolerance
+
+
+@pytest.mark.parametrize("n", [1, 3, 7])
+def test_the_marginals_are_those_of_gpytorchs_model(trained, n):
+    gpc, model = trained
+    with torch.no_grad():
+        expected = model(gpc._scaled(H_TEST[:n]))
+    mean, deviation = gpc.posterior(H_TEST[:n])
+    assert mean.shape == (n, 3)
+    assert np.abs(mean - expected.mean.numpy()).max() < 1e-4
+    assert np.abs(deviation - expected.stddev.numpy()).max() < 1e-4
+
+
+def test_far_from_the_inducing_inputs_the_marginals_are_the_prior(trained):
+    gpc, model = trained
+    mean, deviation = gpc.posterior(H_TEST + 1e4)
+    assert np.abs(mean).max() < 1e-6
+    assert deviation == pytest.approx(np.tile(model.covar_module.outputscale.detach().sqrt(), (30, 1)), rel=1e-3)
+
+
+def test_the_elbo_is_not_below_that_which_adam_reached(trained, projection, best):
+    assert elbo(projection, TARGETS, best[1]) >= elbo(projection, TARGETS, trained[0]._latents)
+
+
+def test_the_elbo_is_that_of_many_more_points(projection, best):
+    assert elbo(projection, TARGETS, best[1]) == pytest.approx(precise_elbo(best[1], projection), abs=0.2)
+
+
+def test_the_elbo_never_falls_from_one_iteration_to_the_next(projection):
+    sites = Sites.silent(len(TARGETS), 3)
+    bounds = [elbo(projection, TARGETS, sites.posterior(projection))]
+    for _ in range(30):
+        sites, latents, _ = refine(projection, TARGETS, sites, iterations=1, tolerance=0.0)
+        bounds.append(elbo(projection, TARGETS, latents))
+    assert np.diff(bounds).min() > -1e-5
+    assert bounds[-1] > bounds[0] + 50
+
+
+def test_single_iterations_are_those_of_one_call(projection):
+    sites = Sites.silent(len(TARGETS), 3)
+    together = refine(projection, TARGETS, sites, iterations=4, tolerance=0.0)
+    for _ in range(4):
+        sites, latents, done = refine(projection, TARGETS, sites, iterations=1, tolerance=0.0)
+    assert (together[2], done) == (4, 1)
+    assert_equal_posterior(latents, together[1], 1e-12)
+
+
+@pytest.mark.parametrize("first", [6, 40])
+def test_a_warm_start_ends_where_a_cold_one_does(projection, best, first):
+    early, _ = refined(projection[:first], TARGETS[:first])
+    _, warm = refined(projection, sites=early.extended(len(TARGETS), 3))
+    assert_equal_posterior(warm, best[1], 1e-5)
+
+
+def test_a_warm_start_from_the_best_posterior_ends_at_once(projection, best):
+    sites, latents, done = refine(projection, TARGETS, best[0], iterations=100, tolerance=1e-5)
+    assert done == 1
+    assert_equal_posterior(latents, best[1], 1e-5)
+    assert np.abs(sites.linear_N_C - best[0].linear_N_C).max() < 1e-6
+
+
+def test_a_looser_tolerance_ends_earlier_close_by(projection, best):
+    _, latents, done = refine(projection, TARGETS, Sites.silent(len(TARGETS), 3), iterations=100, tolerance=1e-3)
+    assert done < 30
+    assert elbo(projection, TARGETS, latents) == pytest.approx(elbo(projection, TARGETS, best[1]), abs=0.01)
+
+
+def test_the_order_of_the_labels_does_not_matter(projection, best):
+    order = np.random.default_rng(0).permutation(len(TARGETS))
+    assert_equal_posterior(refined(projection[order], TARGETS[order])[1], best[1], 1e-5)
+
+
+def test_labels_in_two_batches_give_the_posterior_of_one(trained):
+    def after(*batches):
+        gpc = copy(trained[0])
+        for batch in batches:
+            gpc.update(H_TEST[batch], LABELS_TEST[batch], iterations=500, tolerance=1e-9)
+        return gpc._latents
+
+    first, second = slice(11), slice(11, None)
+    at_once = after(slice(None))
+    assert_equal_posterior(after(first, second), at_once, 1e-5)
+    assert_equal_posterior(after(second, first), at_once, 1e-5)
+
+
+def test_silent_sites_give_the_prior(projection):
+    latents = Sites.silent(len(TARGETS), 3).posterior(projection)
+    assert not latents.mean_C_M.any()
+    assert (latents.covariance_C_M_M == np.eye(latents.mean_C_M.shape[1])).all()
+    assert latents.divergence() == 0
+
+
+def test_silent_sites_leave_a_posterior_as_it_was(projection, best):
+    sites, latents = best
+    twice = projection.followed_by(projection[:5])
+    assert_equal_posterior(sites.extended(len(twice), 3).posterior(twice), latents, 1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_divergence_is_torchs(seed):
+    random = np.random.default_rng(seed)
+    factor_C_M_M = random.normal(size=(3, 5, 5))
+    latents = Latents(random.normal(size=(3, 5)), factor_C_M_M @ np.swapaxes(factor_C_M_M, 1, 2) + 0.1 * np.eye(5))
+    assert latents.divergence() == pytest.approx(torch_divergence(latents))
+
+
+def test_the_posterior_of_sites_is_that_of_linear_regression():
+    random = np.random.default_rng(0)
+    weights_N_M, targets_N, variance_N = random.normal(size=(20, 4)), random.normal(size=20), random.uniform(1, 2, 20)
+    sites = Sites((targets_N / variance_N)[:, None], (1 / variance_N)[:, None])
+    latents = sites.posterior(Projection(np.zeros((20, 1)), weights_N_M[None], np.zeros((1, 20))))
+    # The same by conditioning the Gaussian joint of weights and noisy targets.
+    gain_M_N = weights_N_M.T @ np.linalg.inv(weights_N_M @ weights_N_M.T + np.diag(variance_N))
+    assert latents.mean_C_M[0] == pytest.approx(gain_M_N @ targets_N)
+    assert latents.covariance_C_M_M[0] == pytest.approx(np.eye(4) - gain_M_N @ weights_N_M)
+
+
+def test_at_the_end_the_natural_gradient_is_zero(projection, best):
+    sites, latents = best
+    mean_N_C, _ = latents.marginals(projection)
+    p_N_C = expectation(latents, projection, lambda logits: softmax(logits, axis=2))
+    square_N_C = expectation(latents, projection, lambda logits: np.square(softmax(logits, axis=2)))
+    curvature_N_C = p_N_C - square_N_C
+    assert np.abs(sites.precision_N_C - curvature_N_C).max() < 0.01
+    assert np.abs(sites.linear_N_C - (np.eye(3)[TARGETS] - p_N_C + curvature_N_C * mean_N_C)).max() < 0.02
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("size", [-0.3, 0.3])
+def test_any_other_mean_or_covariance_has_a_lower_elbo(projection, best, seed, size):
+    mean_C_M, covariance_C_M_M = best[1].mean_C_M, best[1].covariance_C_M_M
+    random = np.random.default_rng(seed)
+    shift_C_M, turn_C_M_M = random.normal(size=mean_C_M.shape), random.normal(size=covariance_C_M_M.shape)
+    turn_C_M_M = np.eye(mean_C_M.shape[1]) + size * turn_C_M_M / np.linalg.norm(turn_C_M_M, axis=(1, 2))[:, None, None]
+    others = [
+        Latents(mean_C_M + size * shift_C_M / np.linalg.norm(shift_C_M), covariance_C_M_M),
+        Latents(mean_C_M, (1 + size) * covariance_C_M_M),
+        Latents(mean_C_M, turn_C_M_M @ covariance_C_M_M @ np.swapaxes(turn_C_M_M, 1, 2)),
+    ]
+    highest = precise_elbo(best[1], projection)
+    assert [precise_elbo(other, projection) < highest for other in others] == [True] * 3

@@ -1,0 +1,61 @@
+"""The reference run on real objects: its comparison, the reasons, and what the README says of it."""
+
+import pandas as pd
+import pytest
+import yaml
+
+from gpca.code_files import ROOT
+from gpca.comparison.published import read_published
+from gpca.comparison.reasons import NONE_YET, read_reasons
+from gpca.comparison.verdicts import VERDICTS, Tolerance, compare, counts, read_results
+from gpca.reporting.tables.comparison import counts_table
+
+SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
+TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items()}
+
+
+def reference():
+    folder = ROOT / "results/reference/real"
+    real = yaml.safe_load((ROOT / "config/real.yaml").read_text())
+    objects = {name: {"title": name, "stand_in": entry["stand_in"]} for name, entry in real["sources"].items()}
+    objects |= {name: {"title": name, "stand_in": False} for name in ("real_rgbd", "model")}
+    numbers = read_published()
+    named = {number.counterpart.file for number in numbers if number.counterpart}
+    results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named)
+    return compare(numbers, results, objects, TOLERANCES, read_reasons(numbers))
+
+
+@pytest.fixture(scope="module")
+def shown():
+    """The comparison that the reference keeps."""
+    texts = dict.fromkeys(("reason", "objects", "hardware"), "")
+    return pd.read_csv(ROOT / "results/reference/real/comparison.csv").fillna(texts)
+
+
+def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
+    rows = reference()
+    assert len(rows) == len(shown) == 112
+    kept = (rows["verdict"] != "not run").to_numpy()  # the file behind Table V is too large to be kept
+    assert set(rows.loc[~kept, "table"]) <= {"V"}
+    for column in ("table", "row", "column", "published", "verdict", "reason"):
+        assert rows.loc[kept, column].tolist() == shown.loc[kept, column].tolist()
+
+
+def test_every_miss_of_the_reference_has_a_reason(shown):
+    assert shown[shown["reason"] == NONE_YET][["table", "row", "column"]].to_numpy().tolist() == []
+    assert (shown.loc[shown["verdict"] != "reproduced", "reason"] != "").all()
+    assert set(shown["verdict"]) == set(VERDICTS[:4])  # nothing that was not run
+    judged = shown["verdict"].isin(VERDICTS[:3])
+    assert not (shown.loc[judged, "reason"] == "procedural stand-in").any()
+
+
+def test_the_readme_counts_the_verdicts_of_the_reference(shown):
+    readme = (ROOT / "README.md").read_text()
+    assert counts_table(shown) in readme
+    words = " ".join(readme.split())
+    told = [f"{count} {verdict}" for verdict, count in counts(shown).items() if count]
+    assert f"**Of {len(shown)} printed numbers, on real objects: {', '.join(told)}**" in words
+    missed = shown[shown["verdict"] == "not reproduced"]
+    times = missed[missed["unit"].isin(["s", "ms"])]
+    assert (times["factor"] < 1).all()
+    assert f"{len(times)} of the {len(missed)} misses are times, all shorter than printed" in words

@@ -1,0 +1,244 @@
+"""A run against its reference: what agrees, what differs, what is missing, and which reference is of no use."""
+
+import csv
+import json
+import shutil
+
+import pytest
+import yaml
+
+from gpca.__main__ import main
+from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
+from gpca.code_files import ROOT
+from gpca.comparison import reference
+from gpca.comparison.reference import KINDS, check_reference, kind_of, read_means
+from gpca.errors import InputError
+
+SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["reference"]
+HEADS = ("source", "explainer", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
+
+
+def write(path, heads, rows):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([heads, *rows])
+
+
+def tidy_rows(metric, *values, method="gpca"):
+    return [("attribution", "ycb", method, metric, "all", seed, value) for seed, value in enumerate(values)]
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """A run `tiny` and its reference, which are the same: metrics, one table, and times."""
+    there = tmp_path / "results/reference/tiny"
+    rows = (
+        tidy_rows("accuracy", 0.90, 0.90)
+        + tidy_rows("predicted_as_noise", 50, 50)
+        + tidy_rows("accuracy", 0.8, 0.9, method="b")
+    )
+    write(there / "metrics.csv", TIDY, rows)
+    write(there / "timings.csv", TIDY, tidy_rows("seconds_per_sample", 1.0))
+    write(
+        there / "tables/table1.csv",
+        HEADS,
+        [("ycb", "gpca", 90.0, 88.0, 92.0, 5, 100, False), ("ycb", "b", 50.0, "", "", 1, 100, False)],
+    )
+    write(there / "comparison.csv", ("table", "row"), [("I", "YCB")])
+    for file in ("metrics.csv", "tables/table1.csv"):
+        (there / f"{file}.provenance.json").write_text(json.dumps({"config_sha256": "c0ffee"}))
+    here = tmp_path / "results/tiny"
+    shutil.copytree(there, here)
+    return here, there
+
+
+def change(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def outcomes(folders, **more):
+    settings = SETTINGS | more
+    return {o.file: o for o in check_reference(*folders, settings["tolerances"], settings["half_widths"])}
+
+
+def check(folders, *more):
+    return main(["check-reference", str(folders[0]), *more])
+
+
+def test_the_same_numbers_agree(folders, capsys):
+    assert check(folders) == 0
+    out = capsys.readouterr().out
+    assert "metrics.csv        agrees  all 3 values are the same\n" in out
+    assert "tables/table1.csv  agrees  all 2 values are the same\n" in out
+    assert out.endswith(": 2 agree, 0 differ, 0 missing\n")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "verdict"),
+    [
+        ("gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.919\n", "agrees"),  # the mean by 0.0095, 0.01 is allowed
+        ("gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.921\n", "differs"),
+        ("gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.879\n", "differs"),
+        ("noise,all,0,50\n", "noise,all,0,57\n", "agrees"),  # counts may differ by 4
+        ("noise,all,0,50\n", "noise,all,0,59\n", "differs"),
+        ("b,accuracy,all,0,0.8\n", "b,accuracy,all,0,0.5\n", "agrees"),  # the reference's own interval is 0.64 wide
+    ],
+)
+def test_means_may_differ_by_the_tolerance_of_their_kind_or_the_references_interval(folders, capsys, old, new, verdict):
+    change(folders[0] / "metrics.csv", old, new)
+    assert outcomes(folders)["metrics.csv"].verdict == verdict
+    assert check(folders) == (verdict == "differs")
+    assert "largest difference" in capsys.readouterr().out
+
+
+def test_the_largest_difference_is_measured_by_what_is_allowed(folders):
+    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.96\n")
+    change(folders[0] / "metrics.csv", "noise,all,0,50\n", "noise,all,0,60\n")
+    told = outcomes(folders)["metrics.csv"].detail
+    assert (
+        told == "largest difference +0.03 where 0.01 is allowed (share), at attribution / ycb / gpca / accuracy / all"
+    )
+
+
+@pytest.mark.parametrize(("mean", "verdict"), [(91.9, "agrees"), (92.1, "differs")])
+def test_a_table_may_differ_by_its_interval(folders, mean, verdict):
+    change(folders[0] / "tables/table1.csv", "gpca,90.0", f"gpca,{mean}")
+    assert outcomes(folders)["tables/table1.csv"].verdict == verdict
+    assert outcomes(folders, half_widths=0)["tables/table1.csv"].verdict == "differs"
+
+
+def test_times_are_not_compared(folders):
+    change(folders[0] / "timings.csv", "1.0", "99.0")
+    change(folders[0] / "comparison.csv", "YCB", "LINEMOD")
+    row = "attribution,ycb,gpca,seconds_per_sample,all,0,{}\n"
+    for folder, seconds in zip(folders, (1, 99), strict=True):
+        with (folder / "metrics.csv").open("a") as file:
+            file.write(row.format(seconds))
+    assert {o.verdict for o in outcomes(folders).values()} == {"agrees"}
+    assert set(outcomes(folders)) == {"metrics.csv", "tables/table1.csv"}
+
+
+@pytest.mark.parametrize(
+    ("folder", "told"), [(0, "lacks 1 of 2 values, such as ycb / b"), (1, "has beyond the reference 1 of 2")]
+)
+def test_other_rows_differ(folders, folder, told):
+    path = folders[folder] / "tables/table1.csv"
+    path.write_text("".join(line for line in path.read_text().splitlines(keepends=True) if "ycb,b" not in line))
+    outcome = outcomes(folders)["tables/table1.csv"]
+    assert outcome.verdict == "differs"
+    assert told in outcome.detail
+
+
+def test_what_is_missing_comes_with_the_command_that_makes_it(folders, capsys):
+    (folders[0] / "metrics.csv").unlink()
+    assert check(folders) == 1
+    captured = capsys.readouterr()
+    assert "metrics.csv        missing\n" in captured.out
+    assert captured.err == f"1 missing; make them with: snakemake -j2 {folders[0]}/metrics.csv\n"
+
+
+def test_a_run_with_a_config_of_its_own_is_made_with_it(folders, capsys):
+    here = folders[0].rename(folders[0].with_name("real"))
+    (here / "tables/table1.csv").unlink()
+    assert check([here], "--reference", str(folders[1])) == 1
+    assert capsys.readouterr().err.endswith(f"snakemake -j2 {here}/tables/table1.csv --configfile config/real.yaml\n")
+
+
+def one_line(capsys):
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_a_reference_of_another_config_is_refused(folders, capsys):
+    change(folders[1] / "metrics.csv.provenance.json", "c0ffee", "tea")
+    assert check(folders) == 2
+    line = one_line(capsys)
+    assert f"{folders[1]}: metrics.csv was made by another config than {folders[0] / 'metrics.csv'}" in line
+    (folders[0] / "metrics.csv.provenance.json").unlink()
+    assert check(folders) == 0
+
+
+@pytest.mark.parametrize(
+    ("broken", "content", "message"),
+    [
+        ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; make it anew"),
+        ("metrics.csv", "attribution\n", "holds no rows; make it anew"),
+        ("metrics.csv", "", "is empty; make it anew"),
+        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n", "holds 'nan' in place of a number"),
+        (
+            "metrics.csv",
+            ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,0.9,0.8\n",
+            "has rows with more entries than columns",
+        ),
+        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "holds '' in place of a number"),
+        (
+            "tables/table1.csv",
+            ",".join(HEADS) + "\nycb,gpca,many,1,2,5,100,False\n",
+            "holds 'many' in place of a number",
+        ),
+        ("metrics.csv.provenance.json", "{", "is no provenance record; make its result anew"),
+        ("metrics.csv.provenance.json", "[]", "is no provenance record; make its result anew"),
+    ],
+)
+def test_a_broken_file_is_named(folders, capsys, broken, content, message):
+    (folders[0] / broken).write_text(content)
+    assert check(folders) == 2
+    line = one_line(capsys)
+    assert str(folders[0] / broken) in line
+    assert message in line
+
+
+def test_no_run_and_no_reference(folders, capsys):
+    assert main(["check-reference", str(folders[0].with_name("nix"))]) == 2
+    assert "nix: no such folder; make it with 'snakemake -j2 all'" in one_line(capsys)
+    shutil.rmtree(folders[1])
+    assert check(folders) == 2
+    assert "tiny: holds no reference" in one_line(capsys)
+
+
+def test_settings_replace_the_configs(folders, capsys):
+    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.921\n")
+    tolerances = json.dumps({"tolerances": SETTINGS["tolerances"] | {"share": 0.02}})
+    assert check(folders, "--settings", tolerances) == 0
+    assert check(folders, "--settings", '{"tolerances": {"shares": 1}}') == 2
+    assert "setting tolerances.shares: unknown; did you mean share?" in one_line(capsys)
+    assert check(folders, "--settings", '{"tolerances": {}}') == 2
+    assert "config key reference.tolerances: no kind" in one_line(capsys)
+
+
+@pytest.mark.parametrize(
+    ("file", "quantity", "kind"),
+    [
+        ("metrics.csv", "accuracy", "share"),
+        ("metrics.csv", "predicted_as_pose", "count"),
+        ("active_learning.csv", "labels_to_target", "count"),
+        ("diagnostics.csv", "rho_max_score_knn_analytical_low", "correlation"),
+        ("diagnostics.csv", "nll", "nats"),
+        ("kernels.csv", "elbo", "nats"),
+        ("recovery.csv", "recovered_within_3", "share"),
+        ("recovery.csv", "first_queue", "count"),
+        ("tables/table8_recovery.csv", "actions", "count"),
+        ("tables/table4_grid.csv", "ece", "percent"),
+        ("tables/table5_learners.csv", "ece", "share"),
+        ("tables/table5_shift.csv", "ece_severity", "share"),
+        ("tables/table5_learners.csv", "rho", "correlation"),
+        ("tables/table1_single_baselines.csv", "gpca_paper", "percent"),
+    ],
+)
+def test_every_quantity_is_of_a_kind(file, quantity, kind):
+    assert kind_of(file, quantity) == kind
+    assert {of for *_, of in KINDS} == set(SETTINGS["tolerances"])
+
+
+@pytest.mark.parametrize("run", ["real", "embedded"])
+def test_the_kept_references_can_be_read(run):
+    folder = ROOT / "results/reference" / run
+    files = [path for path in folder.rglob("*.csv") if str(path.relative_to(folder)) not in reference.NOT_COMPARED]
+    assert len(files) >= 8
+    for path in files:
+        assert len(read_means(path)) > 5
+    with pytest.raises(InputError, match="neither tidy"):
+        read_means(ROOT / "gpca/comparison/reasons.csv")

@@ -1,0 +1,270 @@
+import copy
+
+import pytest
+import yaml
+
+from gpca.config import check as run_config
+from gpca.errors import InputError
+from gpca.settings import SCHEMA, check_settings
+from gpca.uncertainty.designs import DESIGNS
+
+CONFIG = SCHEMA.parents[2] / "config"
+MISSING = object()
+NAN = float("nan")
+
+
+def merged(*parts):
+    """Snakemake's way of laying one config over another."""
+    whole = {}
+    for part in parts:
+        for key, value in part.items():
+            both = isinstance(value, dict) and isinstance(whole.get(key), dict)
+            whole[key] = merged(whole[key], value) if both else copy.deepcopy(value)
+    return whole
+
+
+def load(*names):
+    return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in ("sources", "config", *names)))
+
+
+def changed(key, value):
+    """The default config with the key (a path with dots) set to the value, or removed."""
+    config = load()
+    *path, last = key.split(".")
+    section = config
+    for name in path:
+        section = section[name]
+    if value is MISSING:
+        del section[last]
+    else:
+        section[last] = value
+    return config
+
+
+@pytest.mark.parametrize("name", ["config", "smoke", "real"])
+def test_the_shipped_configs_are_sound(name):
+    sources = run_config.check(load(name))
+    assert list(sources) == (["coffee_cup", "ycb"] if name == "smoke" else ["coffee_cup", "linemod", "ycb"])
+    for entry in sources.values():
+        assert entry["stand_in"] == (name != "real")
+        assert entry["origin"] == ("download" if name == "real" else "procedural")
+
+
+def test_a_source_that_is_false_is_left_out_as_if_it_were_not_there():
+    config, never_there = changed("sources.linemod", False), changed("sources.linemod", MISSING)
+    for given in (config, never_there):
+        given["kernels"]["sources"] = ["ycb"]
+    assert run_config.check(config) == run_config.check(never_there)
+    assert config["sources"]["linemod"] is False  # for a Snakemake that is given this config once more
+
+
+def test_local_data_comes_before_the_download(tmp_path):
+    (tmp_path / "bop/lm").mkdir(parents=True)
+    sources = run_config.check(load("real") | {"data_dir": str(tmp_path)})
+    assert sources["linemod"]["origin"] == "local"
+    assert sources["linemod"]["location"] == str(tmp_path / "bop/lm")
+    assert sources["ycb"]["origin"] == "download"
+
+
+def folder(**more):
+    return {"title": "Mine", "kind": "mesh_folder", "location": "/", "unit": "mm"} | more
+
+
+LINK = {"title": "Mine", "kind": "mesh_folder", "unit": "mm", "url": "https://a.org/b.zip"}
+FAULTS = [
+    # unknown keys, with a hint
+    ("sedes", [1], "sedes: unknown; did you mean seeds?"),
+    ("zzz", 1, "zzz: unknown; known are run, data_dir, "),
+    ("registrations.trian", 5, "registrations.trian: unknown; did you mean train?"),
+    ("registrations.severities.crops", [0, 0.1], "registrations.severities.crops: unknown; did you mean crop?"),
+    ("encoders.dgcnn.options.kk", 3, "encoders.dgcnn.options.kk: unknown; did you mean k?"),
+    ("encoders.pointnet2.options.widht", 3, "encoders.pointnet2.options.widht: unknown; did you mean width?"),
+    ("reductions.tsne", {}, "reductions.tsne: unknown; known are none, pca, umap, autoencoder"),
+    ("reductions.pca.neighbours", 3, "reductions.pca.neighbours: unknown; known are components"),
+    ("explainers.gpca.iteratons", 3, "explainers.gpca.iteratons: unknown; did you mean iterations?"),
+    ("sources.ycb.famly", "ycb", "sources.ycb.famly: unknown; did you mean family?"),
+    ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
+    ("recovery.thresholds.dominnat", 0.4, "recovery.thresholds.dominnat: unknown; did you mean dominant?"),
+    ("comparison.tolerances.labels.close", 1, "comparison.tolerances.labels: tolerance: 4 and 1; it has to be 0 <= "),
+    ("comparison.tolerances.s.reproduced", 0.5, "comparison.tolerances.s: tolerance: 0.5 and 3; it has to be 1 <= "),
+    ("comparison.tolerances.weeks", {"reproduced": 1, "close": 2}, "comparison.tolerances.weeks: unknown; known are %"),
+    ("reference.tolerances.share", -1, "reference.tolerances.share: -1 is less than the minimum of 0"),
+    ("recovery.thresholds.dominant", 1.5, "recovery.thresholds.dominant: 1.5 is greater than the maximum of 1"),
+    ("recovery.thresholds.improvement", 0.5, "recovery.thresholds: recovery thresholds: improvement 0.5 is not below"),
+    ("recovery.policies", ["gpac"], "recovery.policies: recovery policy 'gpac': unknown; known are gpca, "),
+    ("recovery.policies", ["always_pray"], "recovery.policies: recovery policy 'always_pray': unknown"),
+    ("recovery.treatments.noise", "pray", "recovery.treatments.noise: no action 'pray'; known are reinitialise, "),
+    ("recovery.treatments.noise", "new_view", "recovery.treatments: one action treats two concepts"),
+    ("recovery.actions.pray", {}, "recovery.actions.pray: recovery action 'pray': unknown; known are reinitialise, "),
+    ("recovery.actions.denoise", {"framse": 3}, "recovery.actions.denoise: recovery action 'denoise': got an unexp"),
+    ("recovery.hidden", [0.9, 0.5], "recovery: recovery.hidden: [0.9, 0.5] runs downwards"),
+    ("active_learning.stream.widow", 3, "active_learning.stream.widow: unknown; did you mean window?"),
+    ("active_learning.strategies", ["bold"], "active_learning.strategies: no strategy 'bold'; known are random, "),
+    ("real_world.backbones", ["dgcnn", "pointnet3"], "real_world.backbones: no encoder 'pointnet3'; known are dgcnn"),
+    ("real_world.scenes.views", 0, "real_world.scenes.views: 0 is less than the minimum of 1"),
+    ("real_world.scenes.distance_m", [0.9, 0.6], "real_world.scenes: scenes distance_m: [0.9, 0.6] runs downwards"),
+    ("real_world.scenes.families", ["tools"], "real_world.scenes.families: family 'tools': no such procedural family"),
+    ("real_world.scenes.noise.scal", 1, "real_world.scenes.noise.scal: unknown; did you mean scale?"),
+    ("real_world.datasets", {"lm": {"location": "lost"}}, "real_world.datasets: source 'lm': lost is not there"),
+    ("real_world.datasets", {"lm": {}}, "real_world.datasets.lm: 'location' is a required property"),
+    ("real_world.initial_pose.form", "guess", "real_world.initial_pose.form: 'guess' is not one of ['results', "),
+    ("real_world.initial_pose.form", "results", "real_world.datasets.scenes.results: is needed by initial_pose form"),
+    ("real_world.reductions", ["tsne"], "real_world.reductions.0: 'tsne' is not one of"),
+    ("sources.real_rgbd", folder(), "sources.real_rgbd: is the name of real_world's frames"),
+    ("kernels.kernel", ["rbf"], "kernels.kernel: unknown; did you mean kernels?"),
+    ("shift.severities.crops", [0.6, 0.7], "shift.severities.crops: unknown; did you mean crop?"),
+    ("shift.encoder.options", {"k": 8}, "shift.encoder.options: unknown"),
+    # missing keys
+    ("seeds", MISSING, "'seeds' is a required property"),
+    ("registrations.icp", MISSING, "registrations: 'icp' is a required property"),
+    ("encoders.dgcnn.backbone", MISSING, "encoders.dgcnn: 'backbone' is a required property"),
+    ("sources.ycb.kind", MISSING, "sources.ycb: 'kind' is a required property"),
+    ("sources.my", {key: folder()[key] for key in ("title", "kind", "location")}, "sources.my: 'unit' is a required"),
+    # wrong types
+    ("registrations.train", "many", "registrations.train: 'many' is not of type 'integer'"),
+    ("registrations.train", 36.0, "registrations.train: 36.0 is not of type 'integer'"),
+    ("registrations.train", True, "registrations.train: True is not of type 'integer'"),
+    ("registrations", None, "registrations: None is not of type 'object'"),
+    ("registrations.severities.crop", 0.2, "registrations.severities.crop: 0.2 is not of type 'array'"),
+    ("registrations.severities.crop", ["a", 0.2], "registrations.severities.crop.0: 'a' is not of type 'number'"),
+    ("explainers.gpca", [1], "explainers.gpca: [1] is not of type 'object', 'null'"),
+    ("seeds", 3, "seeds: 3 is not of type 'array'"),
+    # out of range
+    ("kernels.kernels", ["cubic"], "kernels.kernels.0: 'cubic' is not one of"),
+    ("kernels.iterations", [0], "kernels.iterations.0: 0 is less than the minimum of 1"),
+    ("kernels.learning_rates", [], "kernels.learning_rates: [] should be non-empty"),
+    ("learners.gpca", {"draws": 0}, "learners.gpca: setting draws: 0 is less than the minimum of 2"),
+    ("shift.held_out_share", 1, "shift.held_out_share: 1 is "),
+    ("shift.severities.noise", [0.5, 0.4], "shift.severities: severity noise: [0.5, 0.4] runs downwards"),
+    ("active_learning.target", 1.5, "active_learning.target: 1.5 is greater than the maximum of 1"),
+    ("active_learning.held_out", ["weather"], "active_learning.held_out.0: 'weather' is not one of"),
+    ("active_learning.rare_share", 1, "active_learning.rare_share: 1 is "),
+    ("registrations.severities.crop", [0.2, 0.99], "registrations.severities.crop.1: 0.99 is greater than the maximum"),
+    ("registrations.severities.crop", [0.2], "registrations.severities.crop: [0.2] is too short"),
+    ("registrations.severities.noise", [NAN, 0.2], "registrations.severities.noise.0: nan is not of type 'number'"),
+    ("registrations.severities.crop", [0.6, 0.2], "severity crop: [0.6, 0.2] runs downwards; swap the two"),
+    ("registrations.icp.method", "icp2", "registrations.icp.method: 'icp2' is not one of ['point_to_point', "),
+    ("registrations.icp.correspondence_distance", 0, "registrations.icp.correspondence_distance: 0 is less than or eq"),
+    ("encoders.dgcnn.epochs", -1, "encoders.dgcnn.epochs: -1 is less than the minimum of 1"),
+    ("encoders.dgcnn.learning_rate", NAN, "encoders.dgcnn.learning_rate: nan is not of type 'number'"),
+    ("encoders.dgcnn.weight_decay", float("inf"), "encoders.dgcnn.weight_decay: inf is not of type 'number'"),
+    ("encoders.pointnext.options.radius", 0, "encoders.pointnext.options.radius: 0 is less than or equal to the mini"),
+    ("reductions.umap.neighbours", 1, "reductions.umap.neighbours: 1 is less than the minimum of 2"),
+    ("explainers.gpca.iterations", 0, "explainers.gpca.iterations: 0 is less than the minimum of 1"),
+    (
+        "explainers.gpca.kernel",
+        "cubic",
+        "explainers.gpca.kernel: 'cubic' is not one of ['rbf', 'matern32', 'polynomial']",
+    ),
+    ("objects.points", 100, "objects.points: 100 is less than the minimum of 256"),
+    ("seeds", [], "seeds: [] should be non-empty"),
+    ("seeds", [0, 1, 0], "seeds: [0, 1, 0] has non-unique elements"),
+    ("seeds", [-1], "seeds.0: -1 is less than the minimum of 0"),
+    ("run", "../elsewhere", "run: '../elsewhere' does not match"),
+    ("downloads", "", "downloads: '' should be non-empty"),
+    # names of what does not exist
+    ("encoders.dgcnn.backbone", "dgcn", "encoders.dgcnn.backbone: backbone 'dgcn': unknown; known are dgcnn"),
+    ("embedding.encoder", "voxelnet", "embedding.encoder: no encoder 'voxelnet'; known are dgcnn"),
+    ("explainers.shapley", {}, "explainers.shapley: explainer 'shapley': unknown; known are gpca_paper, gpca"),
+    ("figures.source", "ycbv", "figures.source: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    ("model.source", "lab", "model.source: no source 'lab'; known are coffee_cup, linemod, ycb, real_rgbd"),
+    ("model.encoder", "voxelnet", "model.encoder: no encoder 'voxelnet'; known are dgcnn"),
+    ("runtime.repeats", 1, "runtime.repeats: 1 is less than the minimum of 2"),
+    ("kernels.sources", ["ycbv"], "kernels.sources: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    ("learners.learner_tree", {}, "learners.learner_tree: explainer 'learner_tree': unknown; known are gpca_paper"),
+    ("learners.learner_forest", {"tree": 3}, "learners.learner_forest: explainer 'learner_forest': got an unexpected"),
+    ("learners.residuals_forest", {}, "learners.residuals_forest: does not read embeddings; choose another"),
+    # sources
+    ("sources.ycb", None, "sources.ycb: None is not of type 'object'"),
+    ("sources.ycb.kind", "procedurl", "sources.ycb: kind 'procedurl': there is no such kind of source; known are"),
+    ("sources.ycb.family", "ycbb", "sources.ycb: family 'ycbb': no such procedural family; choose one of coffee_cup,"),
+    ("sources.ycb.family", MISSING, "sources.ycb: source 'YCB': names no family"),
+    ("sources.My", folder(), "sources: 'My' does not match"),
+    ("sources.my", folder(location="lost"), "sources.my: source 'Mine': lost is not there; correct location, or set d"),
+    ("sources.my", folder(unit="inch"), "sources.my.unit: 'inch' is not one of ['m', 'cm', 'mm']"),
+    ("sources.my", LINK | {"url": "ftp://a.org/b.zip"}, "sources.my.url: 'ftp://a.org/b.zip' does not match"),
+    ("sources.my", LINK | {"sha256": "abc"}, "sources.my.sha256: 'abc'"),
+    ("sources.my", LINK | {"sha256": ["0" * 64, "1" * 64]}, "sources.my: source 'Mine': has 1 url(s) but 2 sha256"),
+    ("data_dir", "/nowhere/at/all", "/nowhere/at/all: no such folder; correct data_dir in the config"),
+]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"), FAULTS, ids=[f"{key}-{i}" for i, (key, _, _) in enumerate(FAULTS)]
+)
+def test_a_fault_is_one_line_that_names_the_key(key, value, message):
+    with pytest.raises(InputError) as caught:
+        run_config.check(changed(key, value))
+    line = str(caught.value)
+    assert line.startswith("config key ")
+    assert message in line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("explainers.gpca", None),
+        ("registrations.severities.noise", [0, 0]),
+        ("encoders.other", {"backbone": "dgcnn"}),
+        ("sources.my", folder(local={"kind": "bop"})),
+        ("sources.my", LINK | {"sha256": None}),
+    ],
+)
+def test_what_is_allowed_passes(key, value):
+    run_config.check(changed(key, value))
+
+
+def test_settings_given_by_hand_need_not_be_complete():
+    check_settings({}, "registrations")
+    check_settings({"train": 12, "severities": {"noise": [0.1, 0.2]}}, "registrations")
+    check_settings({"points": 64, "options": {"k": 8}}, "encoders", "any")
+    check_settings({"kind": "mesh_folder", "location": "parts"}, "sources", "any")
+    check_settings({"whatever": 1}, "explainers", "an_own_one")
+
+
+@pytest.mark.parametrize(
+    ("section", "settings", "message"),
+    [
+        (("registrations",), {"trian": 12}, "setting trian: unknown; did you mean train?"),
+        (("registrations",), {"severities": {"noise": [NAN, 1]}}, "setting severities.noise.0: nan is not"),
+        (("encoders", "any"), {"epochs": "ten"}, "setting epochs: 'ten' is not of type 'integer'"),
+        (("explainers", "gpca"), {"draws": 0}, "setting draws: 0 is less than the minimum of 2"),
+        (("sources", "any"), {"unit": "inch"}, r"setting unit: 'inch' is not one of"),
+    ],
+)
+def test_settings_given_by_hand_are_checked_like_their_section(section, settings, message):
+    with pytest.raises(InputError, match=message.replace("?", r"\?")):
+        check_settings(settings, *section)
+
+
+def test_jobs_inherit_the_hash_of_the_config_and_this_python(monkeypatch):
+    import os
+    import shutil
+    import sys
+
+    monkeypatch.setenv("GPCA_CONFIG_SHA256", "")
+    monkeypatch.setenv("PATH", "/bin")
+    hashes = []
+    same = (load(), dict(reversed(load().items())), changed("data_dir", "/data"), changed("comparison.tolerances", {}))
+    for config in (*same, changed("seeds", [7])):
+        run_config.export(config)
+        hashes.append(os.environ["GPCA_CONFIG_SHA256"])
+    assert len(set(hashes[:4])) == 1
+    assert hashes[4] != hashes[0]
+    assert os.path.dirname(shutil.which("python")) == os.path.dirname(sys.executable)
+
+
+def test_the_schema_knows_every_design_and_no_other():
+    schema = yaml.safe_load(SCHEMA.read_text())
+    assert set(schema["properties"]["uncertainty"]["propertyNames"]["enum"]) == set(DESIGNS)
+
+
+def test_an_explainer_whose_design_is_not_configured_stops_at_load():
+    with pytest.raises(
+        InputError, match=r"config key explainers\.shap_oracle: no uncertainty 'oracle'; known are addit"
+    ):
+        run_config.check(changed("uncertainty.oracle", MISSING))
+    without = changed("uncertainty.oracle", MISSING)
+    del without["explainers"]["shap_oracle"]
+    run_config.check(without)

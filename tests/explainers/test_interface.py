@@ -1,0 +1,86 @@
+import dataclasses
+import importlib
+import sys
+
+import numpy as np
+import pytest
+
+import baselines
+from baselines.registry import explainer_entry, explainers
+from gpca.errors import InputError
+from gpca.explainers.gpca import GPCA
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.designs import DESIGNS
+
+QUICK = {"learning_rate": 0.05, "iterations": 30, "inducing": 12, "draws": 100}
+
+
+@pytest.fixture(scope="module")
+def embedded(registrations):
+    """Registrations whose embedding tells the concept, as a trained encoder's does."""
+    centres = 3 * np.random.default_rng(0).normal(size=(3, 8))
+    concept_S = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
+    h = centres[concept_S] + np.random.default_rng(1).normal(size=(len(concept_S), 8))
+    return dataclasses.replace(registrations, attached={"embedding": h})
+
+
+@pytest.fixture
+def own_baseline(tmp_path, monkeypatch):
+    """A file of the user's in a folder of baselines."""
+    (tmp_path / "always_noise.py").write_text(
+        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import Entry\n"
+        "EXPLAINERS = {'always_noise': Entry('Always noise', GPCA)}\n"
+    )
+    (tmp_path / "helper_without_explainers.py").write_text("")
+    monkeypatch.setattr(baselines, "__path__", [*baselines.__path__, str(tmp_path)])
+    importlib.invalidate_caches()
+    yield "always_noise"
+    for name in ("always_noise", "helper_without_explainers"):
+        sys.modules.pop(f"baselines.{name}", None)
+
+
+def test_gpca_and_the_papers_setting_are_listed_and_read_embeddings():
+    for name in ("gpca", "gpca_paper"):
+        assert explainers()[name].reads == "embeddings"
+        assert not explainer_entry(name).oracle
+
+
+def test_every_entry_can_be_headed_and_fed():
+    for name, entry in explainers().items():
+        assert entry.title, name
+        assert entry.reads in ("registrations", "embeddings") or entry.design in DESIGNS, name
+        assert ("oracle" in entry.title) == entry.oracle, name
+
+
+def test_an_unknown_explainer_is_refused_with_the_known_ones():
+    with pytest.raises(InputError, match=r"explainer 'shapley': unknown; known are .*gpca_paper, gpca"):
+        explainer_entry("shapley")
+
+
+def test_a_file_dropped_into_baselines_is_found(own_baseline):
+    assert explainer_entry(own_baseline).title == "Always noise"
+    assert {"gpca", "gpca_paper", own_baseline} <= set(explainers())
+
+
+def test_gpca_names_the_concept(embedded):
+    explainer = explainer_entry("gpca").make("tiny", 0, **QUICK)
+    explainer.fit(embedded.subset(embedded.rows("train")))
+    test = embedded.subset(embedded.rows("test"))
+    attribution = explainer.explain(test)
+    assert attribution.concepts == CONCEPTS
+    assert np.mean(attribution.predicted_N == test.concept) > 0.9
+    assert not attribution.abstained_N.any()
+    assert attribution.icp_calls_N.tolist() == [0] * len(test)
+    assert (attribution.seconds_N > 0).all()
+
+
+def test_gpca_does_not_look_at_what_it_is_to_explain(embedded):
+    explainer = GPCA("tiny", 0, **QUICK)
+    explainer.fit(embedded.subset(embedded.rows("train")))
+    shuffled = dataclasses.replace(embedded, concept=np.roll(embedded.concept, 1))
+    expected = explainer.explain(embedded)
+    for other in (shuffled, embedded.without_labels()):
+        attribution = explainer.explain(other)
+        assert np.array_equal(attribution.scores_N_C, expected.scores_N_C)
+        assert np.array_equal(attribution.variances_N_C, expected.variances_N_C)
+        assert np.array_equal(attribution.bald_N, expected.bald_N)

@@ -1,0 +1,188 @@
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca import CanonicalFrame, Explainer
+from gpca.alignment.icp import ICP, ICPSettings
+from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.twist import exp
+from gpca.code_files import ROOT
+from gpca.errors import InputError
+from gpca.model.explanation import WORDS
+from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds
+from gpca.uncertainty.spread import UncertaintySettings
+
+
+@pytest.fixture(scope="module")
+def explainer(model):
+    return Explainer(model, device="cpu")
+
+
+@pytest.fixture(scope="module")
+def pair(registrations):
+    """Source before ICP and target of a pose sample, in metres, the target's centre far from the origin."""
+    row = next(i for i in registrations.rows("test") if registrations.concept[i] == "pose")
+    T_source_target = inverse(registrations.T_target_source("icp", row))
+    scale = registrations.diameter_m[row]
+    source = transform(T_source_target, registrations.cloud(row).astype(float)) * scale
+    return source, registrations.target(row).astype(float) * scale
+
+
+def scores(explanation):
+    return np.array(list(explanation.scores.values()))
+
+
+def test_pose_fitness_and_residual_are_those_of_open3d(explainer, pair):
+    source, target = pair
+    frame = CanonicalFrame.of(target)
+    expected = ICP(target, None, ICPSettings(correspondence_distance=0.1 * frame.diameter)).register(source, np.eye(4))
+    explanation = explainer.explain(source, target)
+    np.testing.assert_allclose(explanation.T_target_source, expected.T_target_source, atol=1e-6)
+    assert explanation.fitness == pytest.approx(expected.fitness)
+    assert explanation.inlier_rmse == pytest.approx(expected.inlier_rmse, rel=1e-5)
+
+
+def test_scores_are_those_of_the_workflow_on_the_same_embedding(explainer, model, registrations):
+    """A cloud of as many points as the encoder sees has one embedding, whatever the draws are called."""
+    import torch
+
+    aligned = registrations.cloud(0)[:64]
+    with torch.inference_mode():
+        h_1_d = model.encoder(torch.from_numpy(aligned)[None]).numpy()
+    np.testing.assert_allclose(explainer.embed(aligned), h_1_d, atol=1e-5)
+    explanation = explainer.explain(aligned, aligned, frame=CanonicalFrame(np.zeros(3), 1.0))
+    expected, variances, bald = model.gpc.attribute(h_1_d)
+    np.testing.assert_allclose(scores(explanation), expected[0], atol=1e-3)
+    np.testing.assert_allclose(list(explanation.variances.values()), variances[0], atol=1e-3)
+    assert explanation.bald == pytest.approx(bald[0], abs=1e-3)
+    assert explanation.concept == model.concepts[expected[0].argmax()]
+    assert sum(explanation.scores.values()) == pytest.approx(1)
+
+
+def test_larger_and_smaller_clouds_are_embedded_as_the_mean_of_draws(explainer, model, registrations):
+    larger, smaller = registrations.cloud(0)[:100], registrations.cloud(0)[:40]
+    seen = []
+    hook = model.encoder.register_forward_pre_hook(lambda _module, clouds: seen.append(clouds[0]))
+    assert explainer.embed(larger).shape == explainer.embed(smaller).shape == (1, 32)
+    hook.remove()
+    assert [tuple(clouds.shape) for clouds in seen] == [(2, 64, 3)] * 2
+    assert len(np.unique(seen[0][0], axis=0)) == 64
+    assert not np.array_equal(seen[0][0], seen[0][1])
+
+
+def test_unit_and_place_of_the_target_change_no_score(explainer, pair):
+    source, target = pair
+    here = explainer.explain(source, target)
+    in_mm = explainer.explain(1e3 * source, 1e3 * target, unit="mm")
+    np.testing.assert_allclose(scores(in_mm), scores(here), atol=1e-6)
+    np.testing.assert_allclose(in_mm.T_target_source[:3, 3], 1e3 * here.T_target_source[:3, 3], atol=1e-6)
+    assert in_mm.inlier_rmse == pytest.approx(1e3 * here.inlier_rmse)
+    shift = np.array([2.0, -1.0, 0.5])
+    there = explainer.explain(source + shift, target + shift)
+    np.testing.assert_allclose(scores(there), scores(here), atol=1e-6)
+    np.testing.assert_allclose(
+        transform(there.T_target_source, source + shift), transform(here.T_target_source, source) + shift, atol=1e-6
+    )
+
+
+def test_the_initial_pose_is_where_icp_starts(explainer, pair):
+    source, target = pair
+    T_source_seen = exp(np.array([[1.0, -2.0, 0.5, 0.3, 0.4, -1.0]]))[0]  # as from a camera elsewhere
+    here = explainer.explain(source, target)
+    seen = explainer.explain(transform(inverse(T_source_seen), source), target, T_source_seen)
+    np.testing.assert_allclose(scores(seen), scores(here), atol=1e-6)
+    np.testing.assert_allclose(seen.T_target_source, here.T_target_source @ T_source_seen, atol=1e-6)
+    assert not here.notes
+    lost = explainer.explain(source + 5, target)
+    assert lost.fitness == 0
+    assert "no source point is near the target" in lost.notes[0]
+
+
+def test_more_points_than_in_the_training_are_left_out_and_said_so(explainer, pair):
+    source, target = pair
+    explanation = explainer.explain(np.tile(source, (3, 1)), target)
+    assert explanation.notes == (f"source: 256 of {3 * len(source)} points, drawn at random",)
+    again = explainer.explain(np.tile(source, (3, 1)), target)
+    assert explanation.scores == again.scores
+
+
+@pytest.mark.parametrize("method", ["point_to_plane", "generalized"])
+def test_other_kinds_of_icp_estimate_the_normals(model, pair, method):
+    source, target = pair
+    explanation = Explainer(replace(model, icp=ICPSettings(method=method)), device="cpu").explain(source, target)
+    assert explanation.fitness > 0
+
+
+def test_the_spread_of_the_pose_is_measured_where_it_is_asked_for(explainer, pair):
+    source, target = pair
+    explanation = explainer.explain(1e3 * source, 1e3 * target, unit="mm", uncertainty=UncertaintySettings(starts=13))
+    assert explainer.explain(source, target).spread is None
+    assert explanation.spread.covariance_6_6.shape == (6, 6)
+    assert 0 <= explanation.spread.rotation_deg < 60
+    assert 0 <= explanation.spread.translation < 100
+    assert "uncertainty" in explanation.seconds
+
+
+def test_an_explanation_is_json_and_text(explainer, pair):
+    explanation = explainer.explain(*pair, uncertainty=UncertaintySettings(starts=13))
+    plain = json.loads(json.dumps(explanation.as_dict()))
+    assert plain["scores"] == explanation.scores
+    assert np.array(plain["T_target_source"]).shape == (4, 4)
+    assert plain["spread"]["starts"] == 13
+    text = explanation.text()
+    for word in (explanation.concept, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
+        assert word in text
+    stages = ["preparation", "icp", "embedding", "attribution", "uncertainty"]
+    assert list(plain["seconds"]) == [*stages, "total"]
+    assert plain["seconds"]["total"] >= sum(plain["seconds"][stage] for stage in stages)
+
+
+def test_the_action_is_that_of_the_models_policy(explainer, model, pair):
+    said = explainer.explain(*pair)
+    decision = model.policy.decide(scores(said), said.bald)
+    assert (said.action, said.reason) == (decision.action, decision.reason)
+    assert said.action == model.policy.treatments[said.concept]
+    assert f"{WORDS[said.action]} ({said.reason})" in said.text()
+
+
+@pytest.mark.parametrize("thresholds", [Thresholds(uncertain=0.0), Thresholds(dominant=0.999)])
+def test_a_policy_of_ones_own_queues_what_it_finds_uncertain(model, pair, thresholds):
+    said = Explainer(model, RecoveryPolicy(thresholds), device="cpu").explain(*pair)
+    assert said.action == QUEUE
+    assert WORDS[QUEUE] in said.text()
+
+
+def changed(**changes):
+    return lambda source, target: {"source_points": source, "target_points": target} | changes
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s, t: changed(source_points=s[:10])(s, t), "source: holds 10 points; give 64"),
+        (lambda s, t: changed(target_points=t[:10])(s, t), "target: holds 10 points"),
+        (lambda s, t: changed(source_points=s * np.nan)(s, t), "source: .*hold NaN"),
+        (lambda s, t: changed(source_points=s[:, :2])(s, t), "source: has no points"),
+        (lambda s, t: changed(source_points=10 * s)(s, t), "source: is .* times as large as the target; give both"),
+        (lambda s, t: changed(source_points=s / 10)(s, t), "source: is 0.* times as large as the target"),
+        (changed(unit="mm"), "target: its diameter is"),
+        (changed(unit="feet"), "unit 'feet'"),
+        (changed(T_target_source_init=2 * np.eye(4)), "initial pose: the pose is no rigid transform"),
+        (changed(T_target_source_init=np.eye(3)), r"initial pose: the pose is of shape \(3, 3\)"),
+    ],
+)
+def test_bad_input_is_one_line(explainer, pair, change, message):
+    with pytest.raises(InputError, match=message):
+        explainer.explain(**change(*pair))
+
+
+def test_the_package_offers_the_explainer_without_loading_it():
+    code = "import sys, gpca; print('Explainer' in gpca.__all__, {'torch', 'numpy'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "True set()\n"
+    with pytest.raises(ImportError, match="Nothing"):
+        from gpca import Nothing  # noqa: F401

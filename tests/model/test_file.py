@@ -1,0 +1,95 @@
+import os
+import pickle
+
+import numpy as np
+import pytest
+import torch
+
+from gpca.errors import InputError
+from gpca.model.file import VARIABLE, Model, model_path
+
+
+@pytest.fixture
+def path(model, tmp_path):
+    model.save(tmp_path / "model.pt")
+    return tmp_path / "model.pt"
+
+
+def embeddings(model, n=5):
+    return np.random.default_rng(0).normal(size=(n, model.encoder.embedding_size)).astype(np.float32)
+
+
+def test_a_loaded_model_says_the_same(model, path):
+    loaded = Model.load(path)
+    cloud = torch.rand(1, 64, 3)
+    with torch.inference_mode():
+        assert torch.equal(loaded.encoder(cloud), model.encoder(cloud))
+    for expected, actual in zip(
+        model.gpc.attribute(embeddings(model)), loaded.gpc.attribute(embeddings(model)), strict=True
+    ):
+        np.testing.assert_array_equal(actual, expected)
+    for name in ("encoder_settings", "icp", "points", "policy", "title", "stand_in", "concepts"):
+        assert getattr(loaded, name) == getattr(model, name)
+
+
+def test_a_loaded_classifier_learns_what_the_saved_one_would(model, path):
+    from copy import copy
+
+    saved, loaded = copy(model.gpc), Model.load(path).gpc
+    h, labels = embeddings(model, 2), np.array(["pose", "noise"])
+    assert saved.update(h, labels) == loaded.update(h, labels)
+    np.testing.assert_allclose(loaded.attribute(h)[0], saved.attribute(h)[0], atol=1e-9)
+
+
+def test_the_same_model_is_written_in_the_same_bytes(model, path, tmp_path):
+    Model.load(path).save(tmp_path / "again.pt")
+    assert (tmp_path / "again.pt").read_bytes() == path.read_bytes()
+
+
+def changed(**changes):
+    def spoil(path):
+        content = torch.load(path, weights_only=True)
+        torch.save({name: value for name, value in (content | changes).items() if value is not None}, path)
+
+    return spoil
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda path: path.unlink(), "no such model; make one with 'make results'"),
+        (lambda path: os.truncate(path, 1000), "is damaged or no model"),
+        (lambda path: path.write_bytes(pickle.dumps(print, protocol=2)), "is damaged or no model"),
+        (lambda path: torch.save({"weights": torch.zeros(3)}, path), "is no model"),
+        (changed(version=7), "is a model of version 7, not of version 2; make one with"),
+        (changed(gpc=None), "something missing or damaged .*'gpc'"),
+        (changed(encoder={}), "something missing or damaged"),
+    ],
+)
+def test_a_file_that_is_no_model_of_this_version_is_one_line(path, spoil, message):
+    spoil(path)
+    with pytest.raises(InputError, match=message) as caught:
+        Model.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_the_best_model_of_the_workflow_is_taken(tmp_path, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    with pytest.raises(InputError, match=f"none in .*snakemake -j2 results/embedded/model.pt.*{VARIABLE}"):
+        model_path(results=tmp_path)
+    for run in ("smoke", "older", "mine", "embedded", "real"):
+        (tmp_path / run).mkdir()
+        (tmp_path / run / "model.pt").touch()
+        os.utime(tmp_path / run / "model.pt", (1000 + (run == "mine"), 1000 + (run == "mine")))
+    for run in ("real", "embedded", "mine", "older", "smoke"):
+        assert model_path(results=tmp_path) == tmp_path / run / "model.pt"
+        (tmp_path / run / "model.pt").unlink()
+
+
+def test_a_named_model_comes_first(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "lost.pt"))
+    with pytest.raises(InputError, match=f"{VARIABLE}=.*lost.pt: no such model"):
+        model_path(results=tmp_path)
+    (tmp_path / "lost.pt").touch()
+    assert model_path() == tmp_path / "lost.pt"
+    assert model_path("other.pt").name == "other.pt"

@@ -1,0 +1,128 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from gpca.alignment.icp import ICP, ICPSettings
+from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
+from gpca.errors import InputError
+from gpca.pairs import synthesis
+from gpca.pairs.dataset import REGISTRATION_COLUMNS
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations
+
+
+def in_object_frame(registrations, row):
+    """The cloud with ICP's pose and the perturbation's undone, in metres."""
+    back = registrations.T_target_source_true[row] @ inverse(registrations.T_target_source_icp[row])
+    return transform(back, registrations.cloud(row) * registrations.diameter_m[row])
+
+
+def test_concepts_and_objects_are_balanced_in_both_splits(registrations):
+    for split, per_cell in (("train", 4), ("test", 2)):
+        rows = registrations.rows(split)
+        cells = list(zip(registrations.concept[rows], registrations.object_name[rows], strict=True))
+        assert {cell: cells.count(cell) for cell in cells} == {
+            (concept, name): per_cell for concept in CONCEPTS for name in ("brick", "cone", "capsule")
+        }
+
+
+def test_a_sample_does_not_depend_on_how_many_there_are(objects, registrations):
+    few, _ = make_registrations(objects, "tiny", 0, RegistrationSettings(train=6, test=3, points=256))
+    for split, n in (("train", 6), ("test", 3)):
+        one, other = few.subset(few.rows(split)), registrations.subset(registrations.rows(split)[:n])
+        for name in {*REGISTRATION_COLUMNS, "points", "offsets"} - {"sample"}:
+            assert np.array_equal(getattr(one, name), getattr(other, name)), name
+
+
+@pytest.mark.parametrize(("source", "seed"), [("tiny", 1), ("other", 0)])
+def test_another_seed_or_source_gives_other_samples(objects, registrations, source, seed):
+    other, _ = make_registrations(objects, source, seed, RegistrationSettings(train=3, test=3, points=256))
+    drawn = np.concatenate([getattr(other, name) for name in ("severity_noise", "severity_crop")])
+    assert not set(drawn[drawn > 0]) & {*registrations.severity_noise, *registrations.severity_crop}
+
+
+def test_severities_are_recorded_for_the_concept_alone(registrations):
+    for name, concept in {"noise": "noise", "rotation_rad": "pose", "translation": "pose", "crop": "overlap"}.items():
+        assert np.array_equal(getattr(registrations, f"severity_{name}") > 0, registrations.concept == concept)
+    kept = np.diff(registrations.offsets)
+    assert np.array_equal(kept, np.round(256 * (1 - registrations.severity_crop)).astype(int))
+    angles = [rotation_angle_rad(T) for T in registrations.T_target_source_true]
+    assert angles == pytest.approx(registrations.severity_rotation_rad, abs=1e-7)
+    shifts = np.linalg.norm(registrations.T_target_source_true[:, :3, 3], axis=1) / registrations.diameter_m
+    assert shifts == pytest.approx(registrations.severity_translation)
+
+
+def test_poses_undone_the_clean_points_lie_on_the_object(objects, registrations):
+    for row in range(len(registrations)):
+        tree = cKDTree(objects.points(registrations.object_index[row]))
+        distance = tree.query(in_object_frame(registrations, row))[0] / registrations.diameter_m[row]
+        if registrations.concept[row] == "noise":
+            assert distance.mean() > 0.3 * registrations.severity_noise[row]
+        else:
+            assert distance.max() < 1e-6
+
+
+def test_source_and_target_share_no_point_and_icp_gives_the_stored_cloud(objects, monkeypatch):
+    seen = []
+
+    class Recorded(ICP):
+        def __init__(self, target, normals, settings):
+            super().__init__(target, normals, settings)
+            self.target = target
+
+        def register(self, source, T_target_source_init):
+            result = super().register(source, T_target_source_init)
+            seen.append((self.target, source, T_target_source_init, result))
+            return result
+
+    monkeypatch.setattr(synthesis, "ICP", Recorded)
+    settings = RegistrationSettings(train=6, test=6, points=2048)
+    made, icp_seconds = make_registrations(objects, "tiny", 0, settings)
+    assert (icp_seconds > 0).all()
+    for row, (target, source, T_init, result) in enumerate(seen):
+        assert len(target) == 300  # half of the object's 600 points, though 2048 were asked for
+        clean = transform(made.T_target_source_true[row], source * made.diameter_m[row]) / made.diameter_m[row]
+        assert cKDTree(target).query(clean)[0].min() > 1e-7
+        assert np.array_equal(made.target(row), target.astype(np.float32))
+        assert np.allclose(made.cloud(row), transform(result.T_target_source, source), atol=1e-6)
+        in_metres = transform(made.T_target_source_icp[row], source * made.diameter_m[row]) / made.diameter_m[row]
+        assert np.allclose(made.cloud(row), in_metres, atol=1e-6)
+        assert np.array_equal(made.T_target_source_init[row], T_init)
+        assert (made.fitness[row], made.inlier_rmse[row]) == (result.fitness, result.inlier_rmse)
+
+
+def test_a_subset_keeps_every_rows_cloud_and_columns(registrations):
+    with_embedding = dataclasses.replace(
+        registrations, attached={"embedding": np.arange(len(registrations))[:, None] * 1.0}
+    )
+    rows = np.array([17, 2, 40, 2])
+    chosen = with_embedding.subset(rows)
+    assert len(chosen) == 4
+    for new, old in enumerate(rows):
+        assert np.array_equal(chosen.cloud(new), registrations.cloud(old))
+        assert np.array_equal(chosen.target(new), registrations.target(old))
+        assert chosen.embedding[new] == old
+        for name in REGISTRATION_COLUMNS:
+            assert np.array_equal(getattr(chosen, name)[new], getattr(registrations, name)[old])
+
+
+def test_without_labels_nothing_tells_the_perturbation(registrations):
+    blind = registrations.without_labels()
+    assert set(blind.concept) == {""}
+    for name in REGISTRATION_COLUMNS:
+        if name.startswith("severity_") or name == "T_target_source_true":
+            assert np.isnan(getattr(blind, name)).all()
+    for name in ("points", "offsets", "T_target_source_icp", "fitness", "sample"):
+        assert np.array_equal(getattr(blind, name), getattr(registrations, name))
+
+
+def test_settings_come_from_the_config():
+    config = {"train": 9, "severities": {"noise": [0.1, 0.2]}, "icp": {"method": "point_to_plane"}}
+    settings = RegistrationSettings.from_dict(config)
+    assert (settings.train, settings.test, settings.severities.noise) == (9, 200, (0.1, 0.2))
+    assert settings.icp == ICPSettings("point_to_plane")
+    assert set(config) == {"train", "severities", "icp"}
+    with pytest.raises(InputError, match="'icp2': unknown"):
+        RegistrationSettings.from_dict({"icp": {"method": "icp2"}})

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+
+from gpca.errors import InputError
+from gpca.recovery.policies import Case, policy_entry
+from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds
+from gpca.seeds import generator
+
+ACTIONS = ("reinitialise", "new_view", "denoise")
+POLICY = RecoveryPolicy(Thresholds(uncertain=0.2, dominant=0.4))
+
+
+def case(actions=(), scores=None, bald=None, cause="", episode=0):
+    scores = None if scores is None else np.array(scores, float)
+    bald = None if bald is None else np.array(bald, float)
+    return Case(actions, scores, bald, cause, generator("test", episode))
+
+
+def made(name):
+    return policy_entry(name, ACTIONS).make(POLICY, ACTIONS)
+
+
+def test_gpca_follows_the_scores_and_queues_what_is_uncertain_while_the_acting_one_never_does():
+    sure, unsure = case(scores=[[0.1, 0.2, 0.7]], bald=[0.1]), case(scores=[[0.1, 0.2, 0.7]], bald=[0.3])
+    assert made("gpca")(sure).action == made("gpca_acting")(sure).action == "new_view"
+    assert made("gpca")(unsure).action == QUEUE
+    assert made("gpca_acting")(unsure).action == "new_view"
+
+
+def test_after_an_action_the_fall_of_its_concept_counts():
+    scores = [[0.1, 0.2, 0.7], [0.1, 0.25, 0.65]]
+    stuck = case(actions=("new_view",), scores=scores, bald=[0.1, 0.1])
+    assert made("gpca")(stuck).action == "reinitialise"
+    fallen = case(actions=("new_view",), scores=[[0.1, 0.0, 0.9], [0.1, 0.25, 0.65]], bald=[0.1, 0.1])
+    assert made("gpca")(fallen).action == "new_view"
+
+
+def test_scores_without_uncertainty_are_followed():
+    assert made("softmax_head")(case(scores=[[0.8, 0.1, 0.1]], bald=[np.nan])).action == "denoise"
+
+
+def test_round_robin_takes_every_action_once_in_an_order_of_the_case():
+    orders = set()
+    for episode in range(12):
+        taken = ()
+        for _ in ACTIONS:
+            taken += (made("round_robin")(case(taken, episode=episode)).action,)
+        assert sorted(taken) == sorted(ACTIONS)
+        orders.add(taken)
+    assert len(orders) > 1
+
+
+def test_random_actions_are_even_and_do_not_repeat_by_the_step():
+    first = [made("random")(case(episode=n)).action for n in range(300)]
+    second = [made("random")(case((first[n],), episode=n)).action for n in range(300)]
+    assert all(70 < first.count(action) < 130 for action in ACTIONS)
+    assert 70 < sum(a == b for a, b in zip(first, second, strict=True)) < 130
+
+
+def test_fixed_actions_and_the_oracle():
+    assert made("always_denoise")(case()).action == "denoise"
+    assert [made("oracle")(case(cause=cause)).action for cause in ("noise", "pose", "overlap")] == [
+        "denoise",
+        "reinitialise",
+        "new_view",
+    ]
+    assert policy_entry("oracle", ACTIONS).oracle
+    assert not any(policy_entry(name, ACTIONS).oracle for name in ("gpca", "random", "always_denoise"))
+
+
+@pytest.mark.parametrize("name", ["gpac", "always_pray", "always_", "denoise"])
+def test_an_unknown_policy_is_refused_and_the_known_are_named(name):
+    with pytest.raises(InputError, match=rf"recovery policy '{name}': unknown; known are gpca, .*always_denoise"):
+        policy_entry(name, ACTIONS)

@@ -1,0 +1,137 @@
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from gpca.errors import InputError
+from gpca.files import save_arrays
+from gpca.reporting.figures import contact_sheet
+from gpca.reporting.figures.contact_sheet import draw_contact_sheet, render_cloud
+from gpca.seeds import generator
+
+ROOT = Path(__file__).parents[3]
+FROM_ABOVE = (-math.pi / 2, math.pi / 2)  # the eye looks down, x to the right, y up
+COUNT = 6000
+
+
+def _ball(radius, *axes, count=COUNT):
+    normals = generator("test contact sheet", *axes).normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return radius * normals, normals
+
+
+def _square(z, normal, half=1.0):
+    points = np.column_stack([generator("square", z).uniform(-half, half, (COUNT, 2)), np.full(COUNT, z)])
+    return points, np.tile(normal, (COUNT, 1)).astype(float)
+
+
+def _write_objects(path, names):
+    clouds = [_ball(0.05 * (index + 1), index, count=200) for index in range(len(names))]
+    save_arrays(
+        path,
+        {
+            "names": np.array(names),
+            "points_m": np.concatenate([points for points, _ in clouds]).astype(np.float32),
+            "normals": np.concatenate([normals for _, normals in clouds]).astype(np.float32),
+            "offsets": np.arange(len(names) + 1) * 200,
+            "diameters_m": 0.1 * np.arange(1, len(names) + 1),
+        },
+    )
+    return path
+
+
+def test_shows_the_nearer_of_two_surfaces():
+    slanted = np.array([0.8, 0.0, 0.6])
+    low = _square(0.0, [0.0, 0.0, 1.0])
+    high = _square(0.3, slanted, half=0.5)
+    both = tuple(np.concatenate(pair) for pair in zip(low, high, strict=True))
+    upside_down = (both[0] * [1, 1, -1], both[1])
+    alone = render_cloud(*low, FROM_ABOVE, 60)
+    seen, hidden = render_cloud(*both, FROM_ABOVE, 60), render_cloud(*upside_down, FROM_ABOVE, 60)
+    middle, border = np.s_[25:35, 25:35], np.s_[25:35, 6:10]
+    assert abs(hidden[middle].mean() - alone[middle].mean()) < 0.1
+    assert seen[middle].mean() < alone[middle].mean() - 0.15  # the slanted normals are darker
+    assert abs(seen[border].mean() - alone[border].mean()) < 0.1
+
+
+def test_ball_is_a_closed_disc_on_white_lit_from_above_left():
+    image = render_cloud(*_ball(0.03, "ball"), (0.3, 0.5), 80)
+    assert image.shape == (80, 80, 3)
+    assert image.min() >= 0
+    assert image.max() == 1
+    rows, columns = np.mgrid[:80, :80] - 39.5
+    distance = np.hypot(rows, columns) / (0.45 * 80)
+    solid = image.min(axis=2) < 1
+    assert solid[distance < 0.9].all()
+    assert not solid[distance > 1.15].any()
+    assert image[22:30, 22:30].mean() > image[50:58, 50:58].mean() + 0.1
+
+
+def test_unit_of_length_and_sign_of_normals_do_not_matter():
+    points, normals = _square(0.0, [0.0, 0.0, 1.0])
+    image = render_cloud(points, normals, FROM_ABOVE, 40)
+    np.testing.assert_allclose(render_cloud(1000 * points, normals, FROM_ABOVE, 40), image, atol=0.02)
+    turned = render_cloud(points, -normals, FROM_ABOVE, 40)
+    np.testing.assert_allclose(turned[12:28, 12:28], image[12:28, 12:28], atol=0.05)
+
+
+def test_single_point_and_flat_cloud_are_drawn():
+    assert render_cloud(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), FROM_ABOVE, 20).shape == (20, 20, 3)
+    line = np.column_stack([np.linspace(0, 1, 50), np.zeros(50), np.zeros(50)])
+    image = render_cloud(line, np.tile([0.0, 0.0, 1.0], (50, 1)), FROM_ABOVE, 40)
+    assert image.min() < 1
+
+
+def test_sheet_is_written_with_the_same_bytes_in_another_process(tmp_path):
+    objects = _write_objects(tmp_path / "balls.npz", ["025_mug", "a_ball"])
+    draw_contact_sheet(objects, "Balls (procedural stand-in)", tmp_path / "a.pdf", tmp_path / "a.png")
+    again = (
+        "import sys; from gpca.reporting.figures.contact_sheet import draw_contact_sheet;"
+        "draw_contact_sheet(sys.argv[1], 'Balls (procedural stand-in)', sys.argv[2], sys.argv[3])"
+    )
+    files = [str(tmp_path / name) for name in ("balls.npz", "b.pdf", "b.png")]
+    subprocess.run([sys.executable, "-c", again, *files], check=True, cwd=ROOT)
+    for kind in ("pdf", "png"):
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+    assert b"CreationDate" not in (tmp_path / "a.pdf").read_bytes()
+    image = matplotlib.image.imread(tmp_path / "a.png")
+    assert abs(image.shape[1] - 7.16 * 300) <= 1
+    assert (image[:, :, :3].min(axis=2) < 0.9).any()
+
+
+@pytest.mark.parametrize("count", [1, 4, 13, 21, 66])
+def test_no_caption_touches_another(tmp_path, monkeypatch, count):
+    names = [f"{index:03d}_an_extra_large_thing_{'w' * (index % 9)}" for index in range(count)]
+    objects = _write_objects(tmp_path / "many.npz", names)
+    monkeypatch.setattr(contact_sheet, "render_cloud", lambda *cloud: np.ones((2, 2, 3)))  # only the text matters here
+    boxes = []
+
+    def keep_boxes(figure, pdf, png):
+        renderer = figure.canvas.get_renderer()
+        boxes.extend(text.get_window_extent(renderer) for text in figure.texts)
+        boxes.extend(axes.get_window_extent(renderer) for axes in figure.axes)
+        page = figure.bbox
+        assert all(page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 for box in boxes)
+
+    monkeypatch.setattr(contact_sheet, "save_figure", keep_boxes)
+    draw_contact_sheet(objects, "Many things (procedural stand-in)", tmp_path / "a.pdf", tmp_path / "a.png")
+    assert len(boxes) == 2 * count + 1
+    for index, first in enumerate(boxes):
+        for second in boxes[index + 1 :]:
+            width = min(first.x1, second.x1) - max(first.x0, second.x0)
+            height = min(first.y1, second.y1) - max(first.y0, second.y0)
+            assert width < 0.5 or height < 0.5  # tiles touch; a rounding error is no overlap
+
+
+def test_broken_objects_file_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        draw_contact_sheet(tmp_path / "none.npz", "x", tmp_path / "a.pdf", tmp_path / "a.png")
+    save_arrays(tmp_path / "half.npz", {"names": np.array(["a"])})
+    with pytest.raises(InputError, match="points_m"):
+        draw_contact_sheet(tmp_path / "half.npz", "x", tmp_path / "a.pdf", tmp_path / "a.png")
+    assert not (tmp_path / "a.pdf").exists()

@@ -1,0 +1,113 @@
+"""Pictures of depth frames; beside the other tests of frames, whose tiny dataset they need."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import collect, write_metrics
+from gpca.attribution.predictions import write_predictions
+from gpca.attribution.scores import Attribution
+from gpca.errors import InputError
+from gpca.files import read_image, write_csv
+from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.synthesis import RegistrationSettings
+from gpca.reporting.figures.frame_views import draw_scores, read_samples
+from gpca.reporting.figures.real_world_confusions import draw_real_world_confusions
+from gpca.reporting.figures.real_world_example import choose_sample, draw_real_world_example
+from gpca.reporting.figures.real_world_failures import _mistakes, draw_real_world_failures
+
+
+@pytest.fixture(scope="module")
+def results(tiny, tmp_path_factory):
+    """Files of one seed in which samples 0 and 3 of the test split are attributed wrongly, 3 more confidently."""
+    folder = tmp_path_factory.mktemp("results")
+    instances, objects = tiny
+    settings = FrameSettings(occluders=1.0, registration=RegistrationSettings(train=9, test=12, points=128))
+    registrations, _, poses = make_frame_registrations(instances, objects, "real_rgbd", 0, settings)
+    scores_N_C = np.array([np.where(np.array(CONCEPTS) == c, 0.8, 0.1) for c in registrations.concept])
+    test = registrations.rows("test")
+    for row, top in ((test[0], 0.6), (test[3], 0.9)):
+        scores_N_C[row] = np.roll(np.where(scores_N_C[row] > 0.5, top, (1 - top) / 2), 1)
+    attribution = Attribution.of_scores(CONCEPTS, scores_N_C, seconds=0.0)
+    instances.save(folder / "instances.npz")
+    registrations.save(folder / "registrations.npz")
+    write_csv(folder / "poses.csv", poses)
+    predictions = folder / "real_rgbd/dgcnn-none/seed0.csv"
+    filled = Attribution(
+        **{**vars(attribution), "variances_N_C": np.full(scores_N_C.shape, 0.01), "bald_N": np.zeros(len(scores_N_C))}
+    )
+    write_predictions(predictions, registrations, filled)
+    write_metrics(collect([predictions]), folder / "metrics.csv")
+    from gpca.files import save_arrays
+
+    save_arrays(
+        folder / "objects.npz",
+        {
+            "names": np.array(objects.names),
+            "points_m": np.concatenate([points for points, _ in objects.clouds]),
+            "normals": np.concatenate([normals for _, normals in objects.clouds]),
+            "offsets": np.cumsum([0, *(len(points) for points, _ in objects.clouds)]),
+            "diameters_m": objects.diameters_m,
+        },
+    )
+    return folder
+
+
+def test_the_most_confident_mistakes_come_first(results):
+    mistakes = _mistakes([results / "poses.csv"], [results / "real_rgbd/dgcnn-none/seed0.csv"])
+    assert mistakes["sample"].tolist() == ["3", "0"]
+    assert mistakes["score"].tolist() == pytest.approx([0.9, 0.6])
+    assert (mistakes["split"] == "test").all()
+
+
+def test_fig5_shows_a_test_sample_that_an_occluder_covers_and_that_is_named_right(results):
+    samples = read_samples(results / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
+    shown = samples.iloc[choose_sample(samples, "predictions")]
+    assert (shown["split"], shown["concept_true"], shown["lost_to"]) == ("test", "overlap", OCCLUDER)
+    wrong = samples.assign(concept_predicted="noise")
+    assert wrong.iloc[choose_sample(wrong, "predictions")]["concept_true"] == "overlap"
+    with pytest.raises(InputError, match="holds no test sample of overlap"):
+        choose_sample(samples[samples["concept_true"] != "overlap"], "predictions")
+
+
+def test_all_three_are_drawn_and_drawing_again_changes_no_byte(results, tmp_path):
+    predictions = results / "real_rgbd/dgcnn-none/seed0.csv"
+    names = [results / f"{name}.npz" for name in ("instances", "objects", "registrations")]
+    for turn in ("a", "b"):
+        out = [(tmp_path / f"{turn}{n}.pdf", tmp_path / f"{turn}{n}.png") for n in range(3)]
+        draw_real_world_example(*names, results / "poses.csv", predictions, "Frames", *out[0])
+        draw_real_world_failures(names[1], [names[2]], [results / "poses.csv"], [predictions], "Frames", *out[1])
+        draw_real_world_confusions(results / "metrics.csv", "Frames", ["dgcnn-none"], *out[2])
+    for n in range(3):
+        assert (tmp_path / f"a{n}.png").read_bytes() == (tmp_path / f"b{n}.png").read_bytes()
+        assert (tmp_path / f"a{n}.pdf").read_bytes() == (tmp_path / f"b{n}.pdf").read_bytes()
+        assert read_image(tmp_path / f"a{n}.png", "").std() > 5
+
+
+def test_files_of_other_samples_are_refused(results, tmp_path):
+    poses = pd.read_csv(results / "poses.csv", dtype=str, keep_default_na=False)
+    write_csv(tmp_path / "poses.csv", poses[::-1])
+    with pytest.raises(InputError, match="holds other samples than"):
+        read_samples(tmp_path / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
+
+
+def test_metrics_of_other_methods_are_refused(results, tmp_path):
+    with pytest.raises(InputError, match="holds no confusion of these backbones"):
+        draw_real_world_confusions(results / "metrics.csv", "Frames", ["pointnet-none"], tmp_path / "a", tmp_path / "b")
+
+
+def test_scores_are_bars_with_their_deviation_and_the_truth_in_bold():
+    import matplotlib.pyplot as plt
+
+    row = pd.Series(
+        {"concept_true": "pose"} | {f"score_{c}": s for c, s in zip(CONCEPTS, (0.2, 0.7, 0.1), strict=True)}
+    )
+    row = pd.concat([row, pd.Series({f"variance_{c}": 0.04 for c in CONCEPTS})])
+    figure, axes = plt.subplots()
+    draw_scores(axes, row)
+    assert [patch.get_width() for patch in axes.patches] == [0.2, 0.7, 0.1]
+    assert [text.get_text() for text in axes.texts if text.get_fontweight() == "bold"] == ["pose"]
+    ends = axes.collections[1].get_segments()[0]
+    assert np.allclose(ends[:, 0], [0.5, 0.9])
+    plt.close(figure)

@@ -1,0 +1,316 @@
+"""The page of a small folder of results: its HTML by a parser, and what a real browser makes of it."""
+
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gpca.errors import InputError
+from gpca.files import whole_file
+from gpca.provenance import record_provenance
+from gpca.reporting.figures.style import save_figure, use_style
+from gpca.reporting.page.page import Run, read_provenance, rendered_caption, write_page
+from gpca.reporting.tables.table import Cell, Column, Table
+
+from .test_comparison import HEAD, LINES
+
+CAPTIONS = Path(__file__).resolve().parents[3] / "workflow/report"
+TABLES = ["table2_per_concept", "table1_single_baselines", "table4_mine"]
+FIGURES = ["objects_bricks", "reliability"]
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: install it to test the page in a browser")
+
+
+class Page(HTMLParser):
+    """What a page refers to, by the kinds that the tests ask for."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.text, self.ids, self.links, self.sources, self.stack = text, [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.ids += [attributes["id"]] if "id" in attributes else []
+        self.links += [attributes["href"]] if attributes.get("href") else []
+        self.sources += [attributes["src"]] if "src" in attributes else []
+        if tag not in ("meta", "link", "img", "br"):
+            self.stack.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.stack.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def folder(registrations, predicted, tmp_path_factory):
+    """A results folder with all that the page needs."""
+    folder = tmp_path_factory.mktemp("results") / "tiny"
+    for name in TABLES:
+        table = Table(
+            name=name,
+            caption="Accuracy (%) of <GP-CA> & co., by `gpca`",
+            row_heads={"source": "Dataset"},
+            rows=((("bricks", "Bricks"),), (("cones", "Cones"),)),
+            column_head="explainer",
+            columns={"gpca": Column("GP-CA"), "shap": Column("SHAP")},
+            cells={(0, "gpca"): Cell(97.7, 0.4, 3, 270), (0, "shap"): Cell(33.3, 2.0, 3, 270)},
+            compared=([(0, "gpca"), (0, "shap")],),
+            footnotes=("A footnote.",),
+        )
+        files = [folder / f"tables/{name}.{suffix}" for suffix in ("csv", "md", "tex")]
+        with record_provenance(files, [], {}):
+            table.write(*files)
+    use_style()
+    import matplotlib.pyplot as plt
+
+    for name in FIGURES:
+        figure, panel = plt.subplots()
+        panel.plot(np.arange(5))
+        save_figure(figure, folder / f"figures/{name}.pdf", folder / f"figures/{name}.png")
+    (folder / "comparison.csv").write_text(HEAD + "".join(LINES))
+    captions = folder.parent / "captions"
+    captions.mkdir()
+    for name in (*TABLES, "objects", "reliability"):
+        (captions / f"{name}.rst").write_text(f"What ``{name}`` shows.\n")
+    predicted(registrations, folder)
+    write_page(folder, captions, run_of(folder))
+    return folder
+
+
+def run_of(folder, **changes):
+    entries = {
+        "name": "tiny",
+        "seeds": [0, 7],
+        "sources": {
+            "bricks": {"title": "Bricks <b>", "stand_in": True},
+            "cones": {"title": "Cones", "stand_in": False},
+        },
+        "tables": TABLES,
+        "figures": FIGURES,
+        "samples": {
+            "bricks": (folder / "registrations/bricks/seed0.npz", folder / "predictions/bricks/gpca/seed0.csv")
+        },
+        "config": {"run": "tiny", "note": "</script><script>alert(1)</script>"},
+        "command": "snakemake -j2 results/tiny/index.html",
+    }
+    return Run(**entries | changes)
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return Page((folder / "index.html").read_text())
+
+
+@pytest.fixture
+def copied(folder, tmp_path):
+    """A copy of the folder, to be damaged, and its run."""
+    shutil.copytree(folder.parent, tmp_path / "results")
+    copy = tmp_path / "results/tiny"
+    (copy / "index.html").unlink()
+    return copy, run_of(copy)
+
+
+# --- the HTML ---
+
+
+def test_every_link_leads_to_a_file_or_a_place_on_the_page(page, folder):
+    assert page.stack == []
+    local = [link for link in page.links if not link.startswith("data:,")]
+    assert len(local) > 15
+    assert [link for link in local if link.startswith("#") and link[1:] not in page.ids] == []
+    assert [link for link in local if not link.startswith("#") and not (folder / link).is_file()] == []
+    assert [source for source in page.sources if not (folder / source).is_file()] == []
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    assert re.findall(r"(?:https?:)?//[\w-]+\.[\w.-]+", page.text) == []
+
+
+def test_ids_are_there_once(page):
+    assert len(set(page.ids)) == len(page.ids)
+
+
+def test_every_table_and_figure_is_shown_with_its_caption_in_the_papers_order(page):
+    shown = [name for name in page.ids if name in (*TABLES, *FIGURES)]
+    assert shown == ["objects_bricks", "table1_single_baselines", "table2_per_concept", "reliability", "table4_mine"]
+    for name in ("objects", *TABLES):
+        assert f'What <span class="docutils literal">{name}</span> shows.' in page.text
+    assert page.text.count('<td class="number best">97.7 ± 0.4</td>') == len(TABLES)
+    assert page.text.count('<td class="number">33.3 ± 2.0</td>') == len(TABLES)
+    assert page.text.count("A footnote.") == len(TABLES)
+
+
+def test_the_comparison_comes_first_with_its_verdicts_counted_and_named(page):
+    assert page.text.index('id="comparison"') < page.text.index('id="objects_bricks"')
+    for verdict in ("reproduced", "close", "not reproduced", "not run"):
+        assert re.search(rf'data-verdict="{verdict}" aria-pressed="true"><b>1</b> {verdict}<', page.text)
+        assert re.search(rf'<span class="verdict[^"]*">{verdict}</span>', page.text)
+
+
+def test_stand_ins_are_labelled_and_real_objects_are_not(page):
+    assert 'Bricks &lt;b&gt; <span class="badge">procedural stand-in</span>' in page.text
+    assert "<li>Cones</li>" in page.text
+
+
+def test_a_run_on_real_objects_has_no_notice(copied):
+    folder, _ = copied
+    sources = {name: {"title": name, "stand_in": False} for name in ("bricks", "cones")}
+    write_page(folder, folder.parent / "captions", run_of(folder, sources=sources))
+    assert "stand-in</span>" not in (folder / "index.html").read_text()
+    assert "stand-ins</strong>" not in (folder / "index.html").read_text()
+
+
+def test_what_comes_from_files_cannot_become_markup(page):
+    assert "Accuracy (%) of &lt;GP-CA&gt; &amp; co., by <code>gpca</code>" in page.text
+    assert "alert(1)</script>" not in page.text.replace("&lt;", "<").split("<pre>")[0]
+    assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page.text
+
+
+def test_the_samples_are_plain_json(page):
+    [text] = re.findall(r'<script type="application/json" id="samples">(.*)</script>', page.text)
+    samples = json.loads(text)
+    assert [sample["concept"] for sample in samples] == ["noise"] * 2 + ["pose"] * 2 + ["overlap"] * 2
+    assert {sample["source"]["title"] for sample in samples} == {"Bricks <b>"}
+
+
+def test_the_same_results_give_the_same_bytes_and_not_many(folder, copied):
+    copy, run = copied
+    write_page(copy, copy.parent / "captions", run)
+    assert (copy / "index.html").read_bytes() == (folder / "index.html").read_bytes()
+    assert (folder / "index.html").stat().st_size < 1e6
+    assert (folder / "page/plotly.min.js").stat().st_size < 6e6
+
+
+def test_without_comparison_and_samples_there_is_no_word_of_them(copied):
+    folder, _ = copied
+    (folder / "comparison.csv").unlink()
+    write_page(folder, folder.parent / "captions", run_of(folder, samples={}))
+    page = Page((folder / "index.html").read_text())
+    assert "comparison" not in page.ids
+    assert "registrations" not in page.ids
+    assert page.sources == ["figures/objects_bricks.png", "figures/reliability.png"]
+
+
+def test_records_of_provenance_are_counted(tmp_path):
+    record = {"code": {"commit": "abc", "dirty": True}, "config_sha256": None, "environment_lock_sha256": "1"}
+    record |= {"device": "a processor", "python": "3.11", "libraries": {"numpy": "2"}}
+    for name in ("a.csv", "b.csv"):
+        with whole_file(tmp_path / f"{name}.provenance.json") as partial:
+            partial.write_text(json.dumps(record))
+    facts = read_provenance([tmp_path / name for name in ("a.csv", "b.csv", "c.csv")])
+    assert facts["Code"] == {"abc with uncommitted changes": 2, "not recorded": 1}
+    assert facts["numpy"] == {"2": 2}
+    (tmp_path / "a.csv.provenance.json").write_text("[]")
+    with pytest.raises(InputError, match=r"a\.csv\.provenance\.json: is not a record of provenance"):
+        read_provenance([tmp_path / "a.csv"])
+
+
+# --- what is refused ---
+
+
+def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
+    folder, run = copied
+    for name in ("tables/table4_mine.md", "figures/reliability.pdf", "predictions/bricks/gpca/seed0.csv"):
+        (folder / name).unlink()
+    with pytest.raises(InputError) as caught:
+        write_page(folder, folder.parent / "captions", run)
+    assert str(caught.value) == (
+        f"{folder}: lacks tables/table4_mine.md, figures/reliability.pdf, "
+        f"{folder / 'predictions/bricks/gpca/seed0.csv'}; make them with 'snakemake -j2 results/tiny/index.html'"
+    )
+    assert not (folder / "index.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("damaged", "text", "fault"),
+    [
+        ("tiny/tables/table4_mine.md", "no table", "is not a caption with a table below it"),
+        ("tiny/figures/reliability.png", "no image", "is no readable image"),
+        ("tiny/comparison.csv", "", "is empty"),
+        ("tiny/registrations/bricks/seed0.npz", "", "is not a readable npz archive"),
+        ("captions/reliability.rst", ".. nonsense::\n", "is no reStructuredText"),
+        ("captions/reliability.rst", ".. raw:: html\n\n   <b>\n", "is no reStructuredText"),
+    ],
+)
+def test_a_damaged_file_is_named(copied, damaged, text, fault):
+    folder, run = copied
+    (folder.parent / damaged).write_text(text)
+    with pytest.raises(InputError, match=f"{re.escape(damaged)}: {fault}"):
+        write_page(folder, folder.parent / "captions", run)
+    assert not (folder / "index.html").exists()
+
+
+def test_a_result_without_caption_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"mine\.rst: no such caption; write it"):
+        rendered_caption(tmp_path / "mine.rst")
+
+
+# --- in a browser ---
+
+# Notes on speed that a software renderer gives.
+SPEED = ("Canvas2D: Multiple readback", "GL Driver Message")
+# What a reader does: hide a verdict, choose a table; look at the last sample in its initial pose.
+READER = """<script>
+addEventListener("load", () => {
+  document.querySelector('#verdict-filters [data-verdict="close"]').click();
+  const table = document.getElementById("table-filter");
+  table.value = "I";
+  table.dispatchEvent(new Event("change"));
+  document.querySelector('[data-pose="initial"]').click();
+  const sample = document.getElementById("sample");
+  sample.value = "5";
+  sample.dispatchEvent(new Event("change"));
+});
+</script></body>"""
+
+
+def chromium(path, profile, *options):
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader"]
+    command += ["--enable-unsafe-swiftshader", f"--user-data-dir={profile}", "--virtual-time-budget=10000"]
+    command += ["--hide-scrollbars", "--enable-logging=stderr", "--v=0", *options, path.as_uri()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
+    assert [line for line in said if not any(note in line for note in SPEED)] == []
+    return done.stdout
+
+
+@in_a_browser
+def test_a_browser_draws_both_clouds_and_has_nothing_to_complain_about(folder, tmp_path):
+    from PIL import Image
+
+    chromium(folder / "index.html", tmp_path, f"--screenshot={tmp_path / 'page.png'}", "--window-size=1000,5000")
+    with Image.open(tmp_path / "page.png") as image:
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    for colour in ((200, 16, 46), (0, 114, 178)):  # of target and source
+        of_colour = (np.abs(pixels - colour).max(axis=2) < 12).sum(axis=1)
+        assert (of_colour > 0).sum() > 100  # rows of pixels: a cloud, not the key below it
+
+
+@in_a_browser
+def test_verdicts_tables_samples_and_poses_can_be_chosen(copied, tmp_path):
+    folder, run = copied
+    write_page(folder, folder.parent / "captions", run)
+    driven = folder / "driven.html"
+    driven.write_text((folder / "index.html").read_text().replace("</body>", READER))
+    shown = chromium(driven, tmp_path, "--dump-dom", "--window-size=400,800")
+    assert 'data-shown="5 initial"' in shown
+    assert "WebGL is not supported" not in shown
+    assert re.search(r'<div id="clouds"[^>]*>.*<canvas', shown, flags=re.DOTALL)
+    assert "1 of 4 numbers" in shown
+    assert re.findall(r'<tr data-verdict="([^"]*)" data-table="[^"]*">', shown) == ["reproduced"]
+    assert "True cause: overlap" in shown
+
+
+@in_a_browser
+def test_without_its_script_the_view_says_what_is_missing(copied, tmp_path):
+    folder, run = copied
+    write_page(folder, folder.parent / "captions", run)
+    alone = tmp_path / "index.html"
+    alone.write_text(re.sub(r'<script src="[^"]*" defer></script>', "", (folder / "index.html").read_text()))
+    assert "needs page/plotly.min.js beside this page" in chromium(alone, tmp_path, "--dump-dom")

@@ -1,0 +1,64 @@
+"""The step ``label`` as a person uses it: commands between the answers, mistypings, and where it stops."""
+
+import csv
+import sys
+
+import numpy as np
+import pytest
+
+from gpca.__main__ import main
+from gpca.files import save_arrays
+from gpca.pairs.perturbation import CONCEPTS
+
+
+@pytest.fixture
+def label(registrations, tmp_path, monkeypatch, capsys):
+    """Label with the given answers: those on the terminal where it is told so, else in a file."""
+    monkeypatch.chdir(tmp_path)
+    registrations.save("registrations.npz")
+    apart = 3 * np.eye(3)[[CONCEPTS.index(concept) for concept in registrations.concept]]
+    save_arrays("embeddings.npz", {"h": apart, "sample": registrations.sample, "split": registrations.split})
+    settings = '{"iterations": 5, "inducing": 6, "draws": 20}'
+    given = ["registrations.npz", "--embeddings", "embeddings.npz", "--labels", "labels.csv", "--settings", settings]
+
+    def run(*answers, terminal=False):
+        (tmp_path / "answers.txt").write_text("".join(f"{answer}\n" for answer in answers))
+        with (tmp_path / "answers.txt").open() as typed:
+            typed.isatty = lambda: terminal
+            monkeypatch.setattr(sys, "stdin", typed)
+            status = main(["label", *given, "--initial", "6", "--batch", "2"])
+        written = list(csv.DictReader((tmp_path / "labels.csv").open())) if (tmp_path / "labels.csv").exists() else []
+        return status, [row["concept"] for row in written], capsys.readouterr()
+
+    return run
+
+
+def test_quit_keeps_the_answers_before_and_the_next_session_counts_them(label):
+    status, concepts, said = label("overlap", "/quit", "noise")
+    assert (status, concepts) == (0, ["overlap"])
+    assert "6 labelled at the start, 0 answered before" in said.out
+    status, concepts, said = label("pose")
+    assert (status, concepts) == (0, ["overlap", "pose"])
+    assert "6 labelled at the start, 1 answered before" in said.out
+
+
+def test_retrain_learns_at_once_and_asks_the_same_question_again(label):
+    _, concepts, said = label("overlap", "/retrain", "noise", "/quit")
+    assert concepts == ["overlap", "noise"]
+    before, after = said.out.split("learnt 1 answer;", 1)
+    assert before.count("BALD") == 2
+    assert after.count("BALD") == 1  # the third question alone: the second one was still open
+    assert "concepts: noise, pose, overlap" in after
+
+
+def test_a_skipped_sample_is_noted_without_a_concept(label):
+    assert label("/skip", "/quit")[1] == [""]
+
+
+def test_a_mistyped_name_is_asked_for_again_on_a_terminal_and_stops_a_file(label):
+    status, concepts, said = label("Not a name", "overlap", terminal=True)
+    assert (status, concepts) == (0, ["overlap"])
+    assert "'Not a name' is no name of a concept" in said.out
+    status, concepts, said = label("Not a name", "noise")
+    assert (status, concepts) == (2, ["overlap"])
+    assert "'Not a name' is no name of a concept" in said.err

@@ -1,0 +1,91 @@
+"""The step ``recover`` as a command, on the smallest tables, and what it says of faulty calls."""
+
+import json
+
+import pandas as pd
+import pytest
+import yaml
+
+from gpca.__main__ import main
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.settings import SCHEMA
+
+from ..config.test_check import load
+from ..frames.tiny import surfaces
+
+
+@pytest.fixture(autouse=True)
+def tiny_objects(monkeypatch):
+    """Five simple objects in place of a family; to find how those of a family rest takes seconds."""
+    monkeypatch.setattr("gpca.objects.procedural.surfaces", lambda family: surfaces())
+
+
+def settings(**changed):
+    config = load("smoke")
+    recovery = config["recovery"] | {
+        "policies": ["gpca_acting", "softmax_head", "always_new_view"],
+        "loop": {"failures": 1, "tries": 6, "budget": 1},
+        "train": 9,
+        "calibration": 6,
+        "tables": 1,
+        "noise_scale": [5, 8],
+    }
+    encoder = config["encoders"]["dgcnn"] | {"points": 32, "epochs": 1, "draws": 1, "options": {"k": 4}}
+    given = {
+        "recovery": recovery | changed,
+        "scenes": config["real_world"]["scenes"] | {"objects": [3, 3]},
+        "registrations": config["registrations"] | {"points": 256},
+        "encoder": encoder,
+        "uncertainty": {"starts": 13, "points": 32},
+        "explainers": {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}, "softmax_head": None},
+    }
+    return json.dumps(given)
+
+
+def call(folder, given):
+    files = {"--out": "seed7.csv", "--timings": "t/seed7.csv", "--policy": "policy.json", "--example": "example.npz"}
+    paths = [word for option, name in files.items() for word in (option, str(folder / name))]
+    return main(["recover", "--seed", "7", "--settings", given, *paths])
+
+
+def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
+    assert call(tmp_path, settings()) == 0
+    rows, seconds = (pd.read_csv(tmp_path / name) for name in ("seed7.csv", "t/seed7.csv"))
+    assert set(rows["policy"]) == {"gpca_acting", "softmax_head", "always_new_view"}
+    assert set(rows["cause"]) <= set(CONCEPTS)
+    assert len(seconds) == len(rows)
+    assert (rows["error_before"] > 0.1).all()
+    policy = json.loads((tmp_path / "policy.json").read_text())
+    assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
+    assert 0 <= policy["thresholds"]["uncertain"] < 1.1
+    assert call(tmp_path / "again", settings()) == 0
+    for name in ("seed7.csv", "policy.json", "example.npz"):
+        assert (tmp_path / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+    for name in ("seed7.csv", "t/seed7.csv", "policy.json", "example.npz"):
+        assert (tmp_path / f"{name}.provenance.json").is_file()
+
+
+@pytest.mark.parametrize(
+    ("changed", "fault"),
+    [
+        ({"policies": ["gpac"]}, "recovery policy 'gpac': unknown; known are gpca, "),
+        ({"actions": {"pray": {}}}, "recovery action 'pray': unknown"),
+        ({"trian": 9}, "setting trian: unknown; did you mean train?"),
+    ],
+)
+def test_a_fault_is_one_line(changed, fault, tmp_path, capsys):
+    assert call(tmp_path, settings(**changed)) == 2
+    assert fault in capsys.readouterr().err
+    assert not (tmp_path / "seed7.csv").exists()
+
+
+def test_a_missing_section_is_named(tmp_path, capsys):
+    given = json.loads(settings())
+    del given["scenes"]
+    assert call(tmp_path, json.dumps(given)) == 2
+    assert "has no section 'scenes'" in capsys.readouterr().err
+
+
+def test_the_schema_knows_every_setting_of_the_shipped_section():
+    known = yaml.safe_load(SCHEMA.read_text())["properties"]["recovery"]
+    assert set(load()["recovery"]) == set(known["required"]) == set(known["properties"])

@@ -1,0 +1,246 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.rigid import transform
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.designs import CORNERS, DESIGNS, KNOB_RANGE, LATIN, SALTELLI, STEP, Pair, sample_knobs
+from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER
+from gpca.uncertainty.spread import UncertaintySettings
+
+SETTINGS = UncertaintySettings(starts=13, points=60)
+XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()
+
+
+def outcomes(design, registrations, row, settings=SETTINGS):
+    return DESIGNS[design].evaluate(Pair(registrations, row), XI, settings, np.random.default_rng(row))
+
+
+def numbers(made):
+    return [(each.covariance.tobytes(), each.residual, each.degenerate, each.icp_calls) for each in made]
+
+
+def finite(made):
+    return all(np.isfinite(each.covariance).all() and np.isfinite(each.residual) for each in made)
+
+
+@pytest.fixture(scope="module")
+def evaluated(registrations):
+    """Outcomes of every design for one test sample of each concept."""
+    rows = [np.flatnonzero((registrations.split == "test") & (registrations.concept == c))[0] for c in CONCEPTS]
+    return {design: {int(row): outcomes(design, registrations, row) for row in rows} for design in DESIGNS}
+
+
+def test_corner_bits_are_switches():
+    assert CORNERS[0] == (False, False, False) and CORNERS[7] == (True, True, True)
+    assert CORNERS[1] == (True, False, False) and CORNERS[4] == (False, False, True)
+    for corner, switches in enumerate(CORNERS):
+        assert sum(on << i for i, on in enumerate(switches)) == corner
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_every_condition_has_a_name_and_an_outcome(evaluated, design):
+    conditions = DESIGNS[design].conditions
+    assert len(set(conditions)) == len(conditions)
+    assert 0 <= DESIGNS[design].reference < len(conditions)
+    for made in evaluated[design].values():
+        assert len(made) == len(conditions)
+        assert finite(made)
+        assert all(each.covariance.shape == (6, 6) for each in made)
+
+
+def test_the_names_of_the_corners_are_what_is_switched_on():
+    knobs = ("untouched", "noise", "pose", "noise+pose", "overlap", "noise+overlap", "pose+overlap")
+    knobs += ("noise+pose+overlap",)
+    assert DESIGNS["oracle"].conditions == DESIGNS["additive"].conditions[:8] == knobs
+    assert DESIGNS["additive"].conditions[8:] == ("noise_step", "pose_step", "overlap_step")
+    assert DESIGNS["removal"].conditions == (
+        *("observed", "denoise", "restart", "denoise+restart", "trim", "denoise+trim", "restart+trim"),
+        "denoise+restart+trim",
+    )
+    assert DESIGNS["removal"].conditions[DESIGNS["removal"].reference] == "denoise+restart+trim"
+    assert DESIGNS["causal"].conditions == ("reference", "clean", "observed")
+    assert len(DESIGNS["latin"].conditions) == 1 + LATIN
+    assert len(DESIGNS["saltelli"].conditions) == 1 + 5 * SALTELLI
+
+
+def test_the_settings_of_the_knobs_are_in_the_order_of_the_names(registrations, monkeypatch):
+    from gpca.uncertainty import designs
+
+    asked = []
+
+    class Recorded(designs.KnobRuns):
+        def __call__(self, knobs):
+            asked.append(knobs)
+            return super().__call__(knobs)
+
+    monkeypatch.setattr(designs, "KnobRuns", Recorded)
+    outcomes("additive", registrations, 40)
+    for knobs, name in zip(asked[:8], DESIGNS["additive"].conditions[:8], strict=True):
+        expected = [
+            middle if concept in name.split("+") else rest
+            for concept, middle, rest in zip(CONCEPTS, MIDDLE, UNTOUCHED, strict=True)
+        ]
+        assert knobs == tuple(expected)
+    for i, knobs in enumerate(asked[8:]):
+        step = np.array(knobs) - UNTOUCHED
+        assert step[i] == pytest.approx(0.1 * KNOB_RANGE[i]) and np.count_nonzero(step) == 1
+    assert STEP == 0.1 and np.allclose(KNOB_RANGE, [0.03, 5.0, 0.6])
+    asked.clear()
+    outcomes("latin", registrations, 40)
+    assert asked[0] == UNTOUCHED and np.array_equal(asked[1:], sample_knobs("latin"))
+
+
+def test_icp_runs_once_for_every_setting_that_differs(evaluated):
+    runs = {"additive": 11, "latin": 25, "saltelli": 41, "oracle": 2, "removal": 8, "causal": 3}
+    for design, of_row in evaluated.items():
+        for made in of_row.values():
+            # Saltelli's scheme may hold a setting twice.
+            distinct = len({each.covariance.tobytes() for each in made}) if design == "saltelli" else runs[design]
+            assert sum(each.icp_calls for each in made) == 13 * distinct
+            assert distinct > 0.8 * runs[design]
+
+
+@pytest.mark.parametrize("concept", CONCEPTS)
+def test_the_oracles_corners_are_two_settings(registrations, evaluated, concept):
+    (made,) = [made for row, made in evaluated["oracle"].items() if registrations.concept[row] == concept]
+    on = [corner[CONCEPTS.index(concept)] for corner in CORNERS]
+    touched, at_rest = ({made[k].covariance.tobytes() for k in range(8) if on[k] == is_on} for is_on in (True, False))
+    assert len(touched) == len(at_rest) == 1 and touched != at_rest
+    assert [each.icp_calls for each in made if each.icp_calls] == [13, 13]
+
+
+def test_the_observed_pair_is_the_same_in_every_design(registrations, evaluated):
+    for row in evaluated["additive"]:
+        observed = evaluated["additive"][row][0]
+        assert not observed.degenerate
+        for design, condition in (("latin", 0), ("saltelli", 0), ("causal", 2), ("removal", 0)):
+            assert np.array_equal(evaluated[design][row][condition].covariance, observed.covariance)
+        for design in ("latin", "saltelli"):
+            assert evaluated[design][row][0].residual == observed.residual
+
+
+def test_the_clean_pairs_are_the_same_in_every_design_and_differ_among_each_other(evaluated):
+    for row, (reference, clean, observed) in evaluated["causal"].items():
+        assert np.array_equal(reference.covariance, evaluated["oracle"][row][0].covariance)
+        assert not np.array_equal(reference.covariance, clean.covariance)
+        assert not np.array_equal(reference.covariance, observed.covariance)
+
+
+@pytest.mark.parametrize("design", [name for name, design in DESIGNS.items() if not design.oracle])
+def test_only_the_oracle_is_told_what_was_perturbed(registrations, evaluated, design):
+    for row, made in evaluated[design].items():
+        assert numbers(outcomes(design, registrations.without_labels(), row)) == numbers(made)
+
+
+def test_the_oracle_cannot_do_without_what_was_perturbed(registrations):
+    assert [name for name, design in DESIGNS.items() if design.oracle] == ["oracle"]
+    with pytest.raises(InputError, match="knob 'noise': nan"):
+        outcomes("oracle", registrations.without_labels(), 40)
+
+
+@pytest.mark.parametrize(
+    ("noise", "rotation_deg", "translation", "crop", "expected"),
+    [
+        (0.02, 0.0, 0.0, 0.0, (0.02, 1.0, 0.0)),
+        (0.0, 30.0, 0.05, 0.0, (0.0, 3.0, 0.0)),
+        (0.0, 30.0, 0.25, 0.0, (0.0, 5.0, 0.0)),
+        (0.0, 5.0, 0.01, 0.0, (0.0, 1.0, 0.0)),
+        (0.0, 0.0, 0.0, 0.45, (0.0, 1.0, 0.45)),
+        (0.0, 0.0, 0.0, 0.0, (0.0, 1.0, 0.0)),
+    ],
+)
+def test_the_true_knobs_are_the_severities(registrations, noise, rotation_deg, translation, crop, expected):
+    one = replace(
+        registrations.subset(np.array([0])),
+        severity_noise=np.array([noise]),
+        severity_rotation_rad=np.deg2rad([rotation_deg]),
+        severity_translation=np.array([translation]),
+        severity_crop=np.array([crop]),
+    )
+    assert Pair(one, 0).true_knobs(SETTINGS) == pytest.approx(expected)
+    wider = UncertaintySettings(start_rotation_deg=20.0, start_translation=0.1)
+    assert Pair(one, 0).true_knobs(wider).spread == pytest.approx(max(1.0, expected[1] / 2))
+
+
+def test_true_knobs_lie_within_the_ranges_and_move_one_knob(registrations):
+    for row in range(len(registrations)):
+        knobs = Pair(registrations, row).true_knobs(SETTINGS)
+        moved = [name for name, value, rest in zip(CONCEPTS, knobs, UNTOUCHED, strict=True) if value != rest]
+        assert moved == [registrations.concept[row]]
+        assert (np.array(knobs) <= np.array(UPPER) + 1e-12).all()
+
+
+def test_a_pair_is_the_source_in_its_own_frame(registrations):
+    for row in range(0, len(registrations), 7):
+        pair = Pair(registrations, row)
+        assert np.allclose(transform(pair.T_icp, pair.source), registrations.cloud(row), atol=1e-6)
+        assert np.array_equal(pair.target, registrations.target(row))
+        translation_m = registrations.T_target_source_icp[row][:3, 3]
+        assert np.allclose(pair.T_icp[:3, 3], translation_m / registrations.diameter_m[row])
+
+
+def test_observed_and_clean_pairs_hold_as_many_points_as_asked_for(registrations):
+    pair = Pair(registrations, 40)
+    source, target, T_init, T_ref = pair.observed(60, np.random.default_rng(0))
+    assert len(source) == len(target) == 60
+    assert len(np.unique(source, axis=0)) == 60 and np.isin(source, pair.source).all()
+    assert T_init is pair.T_init and T_ref is pair.T_icp
+    many = pair.observed(10_000, np.random.default_rng(0))
+    assert len(many[0]) == len(pair.source) and len(many[1]) == len(pair.target)
+    for points, expected in ((60, 60), (10_000, len(pair.target) // 3)):
+        first, second = pair.clean(points, 1), pair.clean(points, 2)
+        clouds = [first[0], second[0], first[1]]
+        assert [len(cloud) for cloud in clouds] == [expected] * 3
+        # No point is in two of the clouds, nor twice in one.
+        assert len(np.unique(np.concatenate(clouds), axis=0)) == 3 * expected
+        assert np.array_equal(first[1], second[1])
+        assert np.array_equal(first[2], np.eye(4)) and np.array_equal(first[3], np.eye(4))
+
+
+@pytest.mark.parametrize(("kind", "settings"), [("latin", LATIN), ("saltelli", 5 * SALTELLI)])
+def test_sampled_knobs_lie_within_the_ranges(kind, settings):
+    sampled = sample_knobs(kind)
+    assert sampled.shape == (settings, 3)
+    assert (sampled >= UNTOUCHED).all() and (sampled <= UPPER).all()
+    assert (np.ptp(sampled, axis=0) > 0.8 * KNOB_RANGE).all()
+    sample_knobs.cache_clear()
+    assert np.array_equal(sample_knobs(kind), sampled)
+
+
+def test_the_latin_hypercube_has_one_setting_in_every_stratum_of_every_knob():
+    stratum = np.floor((sample_knobs("latin") - UNTOUCHED) / KNOB_RANGE * LATIN).astype(int)
+    for column in stratum.T:
+        assert sorted(column) == list(range(LATIN))
+    # and the knobs are not moved together
+    assert np.abs(np.corrcoef(sample_knobs("latin").T) - np.eye(3)).max() < 0.6
+
+
+def test_saltellis_settings_change_one_knob_of_the_first_to_that_of_the_last():
+    for block in sample_knobs("saltelli").reshape(SALTELLI, 5, 3):
+        first, *changed, last = block
+        for knob, setting in enumerate(changed):
+            expected = first.copy()
+            expected[knob] = last[knob]
+            assert np.array_equal(setting, expected)
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_a_source_and_target_of_the_same_points_are_survived(registrations, design):
+    one = registrations.subset(np.array([40]))
+    eye = np.eye(4)[None]
+    same = replace(
+        one,
+        points=one.target_points,
+        offsets=one.target_offsets,
+        T_target_source_icp=eye,
+        T_target_source_init=eye,
+        T_target_source_true=eye,
+    )
+    made = outcomes(design, same, 0, UncertaintySettings(starts=13, points=1000))
+    assert finite(made)
+    observed = {"causal": 2, "oracle": 0}.get(design, 0)
+    if design != "oracle":
+        assert made[observed].residual == pytest.approx(np.log(1e-6))
