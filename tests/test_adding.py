@@ -118,7 +118,7 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     start = initial_gpc(task, settings, "tiny", 0)
     paths = []
     for name in config["active_learning"]["strategies"]:
-        steps = run_rounds(task.projected(start), start, name, settings, "tiny", 0)
+        steps = run_rounds(task.project(start), start, name, settings, "tiny", 0)
         assert [step["labels"] for step in steps] == [0, 4, 8]
         paths.append(tmp_path / f"tiny/{name}/seed0.csv")
         paths[-1].parent.mkdir(parents=True)

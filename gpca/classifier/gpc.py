@@ -127,14 +127,14 @@ class GPC:
         It starts from the posterior of the call before, or from the prior where there was none.
         """
         sites = Sites.silent(0, 0) if self._sites is None else self._sites
-        sites = sites.extended(len(self._targets_N), len(self.classes))
+        sites = sites.extend(len(self._targets_N), len(self.classes))
         self._sites, self._latents, done = refine(self._labelled, self._targets_N, sites, iterations, tolerance)
         return done
 
     def level(self) -> None:
         """Give classes without a label the mean kernel of the others, and refit the posterior."""
         known_C = np.isin(np.arange(len(self.classes)), self._targets_N)
-        self._set_prior(self._prior.levelled(known_C))
+        self._set_prior(self._prior.level(known_C))
 
     def grow(self, name: str) -> None:
         """Add a class that the label space never had; its kernel is the geometric mean of the others'.
@@ -144,7 +144,7 @@ class GPC:
         if not name or name in self.classes:
             raise InputError(f"concept '{name}'", "is empty or known already", f"known are {', '.join(self.classes)}")
         self.classes = (*self.classes, name)
-        self._set_prior(self._prior.grown())
+        self._set_prior(self._prior.grow())
 
     def _set_prior(self, prior: Prior) -> None:
         self._prior = prior

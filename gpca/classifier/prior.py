@@ -51,7 +51,7 @@ class Prior:
         residual_C_N = variance_C_N - np.square(weights_C_M_N).sum(axis=1)
         return Projection(inputs_N_d.numpy(), np.swapaxes(weights_C_M_N, 1, 2), np.maximum(residual_C_N, 0))
 
-    def grown(self) -> Prior:
+    def grow(self) -> Prior:
         """Return the prior with one more kernel, its parameters the geometric means of the others'."""
         return self._with_parameters(lambda values_C: torch.cat([values_C, _geometric_mean(values_C)]))
 
@@ -62,12 +62,12 @@ class Prior:
         """
         is_known_C = torch.from_numpy(known_C)
 
-        def level(values_C: torch.Tensor) -> torch.Tensor:
+        def with_known_mean(values_C: torch.Tensor) -> torch.Tensor:
             values_C = values_C.clone()
             values_C[~is_known_C] = _geometric_mean(values_C[is_known_C])
             return values_C
 
-        return self._with_parameters(level)
+        return self._with_parameters(with_known_mean)
 
     def _with_parameters(self, change) -> Prior:
         """Return the prior with each kernel parameter (C, …), as it acts, replaced by `change` of it."""

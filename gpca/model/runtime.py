@@ -59,7 +59,7 @@ def measure(
     import torch
 
     gpc = initial_gpc(task, settings, *axes, "runtime")
-    projected = task.projected(gpc)
+    projected = task.project(gpc)
     hardware = {"CPU": cpu_name()}
     devices = {"CPU": Explainer(model, device="cpu")}
     if torch.cuda.is_available():

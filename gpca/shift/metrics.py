@@ -48,8 +48,8 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
         set_files: named `…/{source}/seed{seed}.npz`; their `DISTANCES` become columns of the rows.
 
     Raises:
-        InputError: an unusable prediction file, an unknown set, scores that are no probabilities, other samples in the two
-            kinds of files.
+        InputError: an unusable prediction file, an unknown set, scores that are no probabilities, other samples in
+            the two kinds of files.
     """
     distances = {}
     for path in set_files:

@@ -71,7 +71,7 @@ def make_sets(
     if len(held_out):
         parts = _of_unseen_objects(registrations, held_out, source, seed, settings)
         measured.append(_measured(parts, source, seed, settings))
-    return ShiftedSets.joined(measured)
+    return ShiftedSets.join(measured)
 
 
 def held_out_objects(names: np.ndarray, share: float, source: str, seed: int) -> np.ndarray:
@@ -125,7 +125,7 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
         columns = {column: getattr(part, column) for column in ("split", "sample", "concept", "object_name")}
         named = np.full(len(part), name)
         joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
-    return ShiftedSets.joined(joined)
+    return ShiftedSets.join(joined)
 
 
 def settings_from(shift: dict, registrations: dict, encoder: dict) -> ShiftSettings:

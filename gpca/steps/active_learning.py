@@ -91,4 +91,4 @@ def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tup
         attached = replace(registrations, attached={"embedding": h_S_d})
         task = make_task(attached, concept, settings, *axes, new_share=share)
         gpc = initial_gpc(task, settings, *axes, setting)
-        yield setting, task.projected(gpc), gpc
+        yield setting, task.project(gpc), gpc

@@ -32,7 +32,7 @@ def gpc(embedded):
 
 @pytest.fixture(scope="module")
 def task(embedded, gpc):
-    return make_task(embedded, "overlap", SETTINGS, "tiny", 0).projected(gpc)
+    return make_task(embedded, "overlap", SETTINGS, "tiny", 0).project(gpc)
 
 
 def learnt(task, gpc, strategy="bald_kmeans", **changed):

@@ -36,7 +36,7 @@ def gpc(plain):
 
 @pytest.fixture(scope="module")
 def task(plain, gpc):
-    return plain.projected(gpc)
+    return plain.project(gpc)
 
 
 def run(task, gpc, strategy, **changed):

@@ -131,7 +131,7 @@ def test_single_iterations_are_those_of_one_call(projection):
 @pytest.mark.parametrize("first", [6, 40])
 def test_a_warm_start_ends_where_a_cold_one_does(projection, best, first):
     early, _ = refined(projection[:first], TARGETS[:first])
-    _, warm = refined(projection, sites=early.extended(len(TARGETS), 3))
+    _, warm = refined(projection, sites=early.extend(len(TARGETS), 3))
     assert_equal_posterior(warm, best[1], 1e-5)
 
 
@@ -176,7 +176,7 @@ def test_silent_sites_give_the_prior(projection):
 def test_silent_sites_leave_a_posterior_as_it_was(projection, best):
     sites, latents = best
     twice = projection.followed_by(projection[:5])
-    assert_equal_posterior(sites.extended(len(twice), 3).posterior(twice), latents, 1e-12)
+    assert_equal_posterior(sites.extend(len(twice), 3).posterior(twice), latents, 1e-12)
 
 
 @pytest.mark.parametrize("seed", [0, 1])

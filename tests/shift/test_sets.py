@@ -57,6 +57,6 @@ def test_rows_become_registrations_without_clouds():
 
 
 def test_parts_are_joined_in_order():
-    joined = ShiftedSets.joined([sets(), sets(3)])
+    joined = ShiftedSets.join([sets(), sets(3)])
     assert len(joined.set) == 6 * 12 + 6 * 3
     assert np.array_equal(joined.h[72:], sets(3).h)

@@ -90,8 +90,9 @@ EDITS = {
     "gpca/active_learning/stream.py": {"active_learning": 4, "fig4_pipeline": 1} | LEARNED | RUNTIME,
     "gpca/reporting/figures/active_learning.py": {"active_learning_curves": 1, "fig4_pipeline": 1},
     # Not Table II: it shows GP-CA alone.
-    "gpca/alignment/icp_kernels.py": {"uncertainty": 12, "table": 2}
-    | ON_UNCERTAINTY | COLLECTORS | RUNTIME | RECOVERY,
+    "gpca/alignment/icp_kernels.py": (
+        {"uncertainty": 12} | ON_UNCERTAINTY | COLLECTORS | {"table": 2} | RUNTIME | RECOVERY
+    ),
     "baselines/softmax_head.py": {"explain": 2} | COLLECTORS | {"table": 1} | RECOVERY,
     "gpca/reporting/figures/contact_sheet.py": {"objects_figure": 2},
     "gpca/reporting/figures/concepts.py": {"fig3_concepts": 1, "fig5_real_world_example": 1} | METHOD,
