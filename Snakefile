@@ -1,4 +1,5 @@
-# GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names.
+# GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names; every table, figure
+# and stage is a target by its name: `snakemake -j2 table2`, `fig5`, `objects`, `paper` (what the paper shows).
 import sys
 
 sys.path.insert(0, workflow.basedir)
@@ -6,8 +7,8 @@ from gpca.config import check as run_config
 from gpca.errors import InputError
 
 
-configfile: "config/sources.yaml"
-configfile: "config/config.yaml"
+configfile: f"{workflow.basedir}/config/sources.yaml"
+configfile: f"{workflow.basedir}/config/config.yaml"
 
 
 try:
@@ -17,44 +18,39 @@ except InputError as fault:
 run_config.export(config)
 
 
-wildcard_constraints:
-    run=config["run"],
-    seed=r"\d+",
+pathvars:
+    results=f"results/{config['run']}",
+    logs=f"results/{config['run']}/logs",
+    benchmarks=f"results/{config['run']}/benchmarks",
 
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/objects.smk"
 include: "workflow/rules/registrations.smk"
+include: "workflow/rules/frames.smk"
 include: "workflow/rules/encoders.smk"
 include: "workflow/rules/uncertainty.smk"
 include: "workflow/rules/explainers.smk"
 include: "workflow/rules/active_learning.smk"
-include: "workflow/rules/ablations.smk"
-include: "workflow/rules/real_world.smk"
+include: "workflow/rules/kernel_grid.smk"
+include: "workflow/rules/learners.smk"
 include: "workflow/rules/model.smk"
 include: "workflow/rules/recovery.smk"
-include: "workflow/rules/collect.smk"
-include: "workflow/rules/tables.smk"
-include: "workflow/rules/figures.smk"
+include: "workflow/rules/results.smk"
 include: "workflow/rules/comparison.smk"
-include: "workflow/rules/report.smk"
+include: "workflow/rules/targets.smk"
 
 
 rule all:
     default_target: True
     input:
-        collect("results/{run}/{file}", run=config["run"], file=RESULTS),
+        [f"<results>/{name}" for name in COLLECTED],
+        [f"<results>/{result.main_file}" for result in RESULTS],
+        "<results>/model.pt",
+        "<results>/comparison.md",
+        "<results>/index.html",
 
 
-rule smoke:
-    output:
-        touch("results/smoke/complete"),
-    log:
-        "results/logs/smoke.log",
-    conda:
-        "workflow/envs/gpca.yaml"
-    threads: 2
-    resources:
-        mem_mb=4000,
-    shell:
-        "python -m snakemake -j{threads} all --configfile config/smoke.yaml --nolock 2>&1 | tee {log} >&2"
+rule paper:
+    input:
+        [f"<results>/{result.main_file}" for result in RESULTS if result.paper],

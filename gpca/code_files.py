@@ -8,7 +8,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("gpca", "baselines")
-BESIDE = {"gpca.reporting.figures.style": "matplotlibrc"}  # a file that a module reads from its own folder
+BESIDE = {  # what a module reads from its own folder
+    "gpca.comparison.published": "published.csv",
+    "gpca.comparison.reasons": "reasons.csv",
+    "gpca.reporting.figures.style": "matplotlibrc",
+    "gpca.reporting.page.page": "templates/*",
+}
 
 
 def code_files(*modules: str) -> list[str]:
@@ -26,7 +31,8 @@ def code_files(*modules: str) -> list[str]:
             found.add(module)
             open_modules += _imports(module)
     files = [_file_of(module) for module in found]
-    files += [_file_of(module).with_name(BESIDE[module]) for module in found.intersection(BESIDE)]
+    for module in found.intersection(BESIDE):
+        files += _file_of(module).parent.glob(BESIDE[module])
     return sorted(str(file.relative_to(ROOT)) for file in files)
 
 

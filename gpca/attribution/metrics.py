@@ -221,6 +221,13 @@ def source_method_seed(path: str | Path) -> tuple[str, str, int]:
     return parts[-3], parts[-2], int(seed)
 
 
+def read_all_metrics(paths: Iterable[str | Path]) -> pd.DataFrame:
+    """Read several files as :func:`read_metrics` reads one, one after the other."""
+    import pandas as pd
+
+    return pd.concat([read_metrics(path) for path in paths])
+
+
 def tidy(records: list[tuple], name: str) -> pd.DataFrame:
     import pandas as pd
 

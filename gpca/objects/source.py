@@ -105,6 +105,23 @@ def data_files(entry: dict) -> list[Path]:
     return sorted(path for path in found if path.is_file())
 
 
+def data_options(entry: dict, data_dir: str | None, downloads: str) -> list[str]:
+    """Return the options of ``python -m gpca objects`` for the one folder that a resolved entry's data comes from.
+
+    No other folder is named, so that a change of another one does not make the objects anew.
+    """
+    if entry["origin"] == "local" and data_dir:
+        return ["--data-dir", data_dir]
+    return ["--downloads", downloads] if entry["origin"] == "download" else []
+
+
+def source_modules(entry: dict) -> list[str]:
+    """Return the modules that read an entry: they are found by name at run time, so no import tells of them."""
+    if entry["kind"] == "procedural":
+        return ["gpca.objects.procedural", f"gpca.objects.shapes.{procedural.FAMILIES[entry['family']]}"]
+    return [f"gpca.objects.{entry['kind']}"]
+
+
 def _unpacked(file: Path) -> Path:
     # Named by content: an archive that was fetched anew is unpacked anew.
     return archive.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))

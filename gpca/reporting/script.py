@@ -35,5 +35,10 @@ def job(snakemake) -> Iterator[None]:
             sys.exit(2)
 
 
+def data_of(files) -> dict[str, str | list[str]]:
+    """Return a script's inputs by name, without `code`: a path, or a list of them."""
+    return {name: paths if isinstance(paths, str) else list(paths) for name, paths in files.items() if name != "code"}
+
+
 def _named(files) -> list[tuple[str, list[str]]]:
     return [(name, [paths] if isinstance(paths, str) else list(paths)) for name, paths in files.items()]

@@ -1,15 +1,16 @@
-rule embeddings_without:
+# Embeddings -> learning curves of every acquisition strategy -> active_learning.csv.
+rule embed_without:
     input:
-        registrations="results/{run}/registrations/{source}/seed{seed}.npz",
-        code=lambda wildcards: code_files(
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        code=code_files(
             "gpca.steps.without", encoder_module(config["embedding"]["encoder"])
         ),
     output:
-        "results/{run}/embeddings/{source}/without/seed{seed}.npz",
+        "<results>/embeddings/{source}/without/seed{seed}.npz",
     log:
-        "results/{run}/logs/embeddings/{source}/without/seed{seed}.log",
+        "<logs>/embeddings/{source}/without/seed{seed}.log",
     benchmark:
-        "results/{run}/benchmarks/embeddings/{source}/without/seed{seed}.tsv"
+        "<benchmarks>/embeddings/{source}/without/seed{seed}.tsv"
     priority: 7
     conda:
         "../envs/gpca.yaml"
@@ -18,10 +19,9 @@ rule embeddings_without:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=json.dumps(
+        settings=as_json(
             config["encoders"][config["embedding"]["encoder"]]
-            | config["active_learning"]["without"],
-            sort_keys=True,
+            | config["active_learning"]["without"]
         ),
         concepts=config["active_learning"]["held_out"],
     shell:
@@ -30,21 +30,21 @@ rule embeddings_without:
         "--settings {params.settings:q} --out {output} 2> {log}"
 
 
-rule active_learning:
+rule learn_actively:
     input:
-        registrations="results/{run}/registrations/{source}/seed{seed}.npz",
-        embeddings=f"results/{{run}}/embeddings/{{source}}/{EMBEDDING}/seed{{seed}}.npz",
-        without="results/{run}/embeddings/{source}/without/seed{seed}.npz",
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        embeddings=f"<results>/embeddings/{{source}}/{EMBEDDING}/seed{{seed}}.npz",
+        without="<results>/embeddings/{source}/without/seed{seed}.npz",
         code=code_files("gpca.steps.active_learning"),
     output:
         collect(
-            "results/{{run}}/active_learning/{{source}}/{strategy}/seed{{seed}}.csv",
-            strategy=STRATEGIES,
+            "<results>/active_learning/{{source}}/{strategy}/seed{{seed}}.csv",
+            strategy=NAMES["strategy"],
         ),
     log:
-        "results/{run}/logs/active_learning/{source}/seed{seed}.log",
+        "<logs>/active_learning/{source}/seed{seed}.log",
     benchmark:
-        "results/{run}/benchmarks/active_learning/{source}/seed{seed}.tsv"
+        "<benchmarks>/active_learning/{source}/seed{seed}.tsv"
     priority: 4
     conda:
         "../envs/gpca.yaml"
@@ -54,7 +54,7 @@ rule active_learning:
         runtime=60,
     params:
         settings=settings("active_learning"),
-        strategies=STRATEGIES,
+        strategies=NAMES["strategy"],
     shell:
         "python -m gpca active_learning --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
         "--registrations {input.registrations} --embeddings {input.embeddings} "
@@ -62,16 +62,22 @@ rule active_learning:
         "--strategies {params.strategies} --out {output} 2> {log}"
 
 
-rule active_learning_metrics:
+rule active_learning:
     input:
-        curves=learning_curves(STRATEGIES),
-        code=code_files("gpca.active_learning.metrics", "gpca.reporting.script"),
+        curve_files=collect(
+            "<results>/active_learning/{source}/{strategy}/seed{seed}.csv",
+            source=SOURCES,
+            strategy=NAMES["strategy"],
+            seed=SEEDS,
+        ),
+        code=collector_code("gpca.active_learning.metrics:collect_curves"),
     output:
-        "results/{run}/active_learning.csv",
+        "<results>/active_learning.csv",
     log:
-        "results/{run}/logs/active_learning.log",
+        "<logs>/active_learning.log",
     benchmark:
-        "results/{run}/benchmarks/active_learning.tsv"
+        "<benchmarks>/active_learning.tsv"
+    localrule: True
     conda:
         "../envs/gpca.yaml"
     threads: 1
@@ -79,60 +85,7 @@ rule active_learning_metrics:
         mem_mb=1000,
         runtime=10,
     params:
+        collector="gpca.active_learning.metrics:collect_curves",
         target=config["active_learning"]["target"],
     script:
-        "../scripts/collect_curves.py"
-
-
-rule learning_table:
-    input:
-        metrics="results/{run}/active_learning.csv",
-        code=code_files("gpca.reporting.tables.active_learning", "gpca.reporting.script"),
-    output:
-        csv=reported("results/{run}/tables/{table}.csv"),
-        md="results/{run}/tables/{table}.md",
-        tex="results/{run}/tables/{table}.tex",
-    log:
-        "results/{run}/logs/tables/{table}.log",
-    benchmark:
-        "results/{run}/benchmarks/tables/{table}.tsv"
-    wildcard_constraints:
-        table="|".join(LEARNING_TABLES),
-    conda:
-        "../envs/gpca.yaml"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        sources=SHOWN_SOURCES,
-        strategies=STRATEGY_TITLES,
-        conditions=config["active_learning"]
-        | {name: config["registrations"][name] for name in ("train", "test")},
-    script:
-        "../scripts/learning_table.py"
-
-
-rule active_learning_curves:
-    input:
-        curves=learning_curves(POOL_STRATEGIES),
-        code=code_files("gpca.reporting.figures.active_learning", "gpca.reporting.script"),
-    output:
-        pdf="results/{run}/figures/active_learning_curves.pdf",
-        png=reported("results/{run}/figures/active_learning_curves.png"),
-    log:
-        "results/{run}/logs/figures/active_learning_curves.log",
-    benchmark:
-        "results/{run}/benchmarks/figures/active_learning_curves.tsv"
-    conda:
-        "../envs/gpca.yaml"
-    threads: 1
-    resources:
-        mem_mb=2000,
-        runtime=10,
-    params:
-        sources={name: title_of(entry) for name, entry in SOURCES.items()},
-        strategies=STRATEGY_TITLES,
-        target=config["active_learning"]["target"],
-    script:
-        "../scripts/learning_curves.py"
+        "../scripts/collect.py"

@@ -1,50 +1,36 @@
-# The collected files that have a counterpart of a printed number and that this run makes.
+# The numbers that the paper prints beside those of the run, and the page of the run.
+from gpca.comparison.published import read_published
+
+COLLECTED = [
+    *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
+    *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
+]
+# Those of them that hold a counterpart of a printed number.
 COMPARED = sorted(
-    {
-        number.counterpart.file
-        for number in read_published()
-        if number.counterpart and number.counterpart.file in RESULTS
-    }
+    {number.counterpart.file for number in read_published() if number.counterpart}
+    & set(COLLECTED)
 )
-
-
-rule kernel_metrics:
-    input:
-        grids=KERNEL_GRIDS,
-        code=code_files("gpca.classifier.kernel_metrics", "gpca.reporting.script"),
-    output:
-        "results/{run}/kernels.csv",
-    log:
-        "results/{run}/logs/kernels.log",
-    benchmark:
-        "results/{run}/benchmarks/kernels.tsv"
-    conda:
-        "../envs/gpca.yaml"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    script:
-        "../scripts/collect_kernels.py"
+# Sources whose first registrations the page shows in 3-D -> the form of GP-CA that explains them there.
+SAMPLED = {source: NAMES["gpca"] for source in SOURCES if NAMES["gpca"]}
+SAMPLED |= {FRAMES: NAMES["first_backbone"]}
 
 
 rule comparison:
     input:
-        collected=[f"results/{{run}}/{name}" for name in COMPARED],
-        published=PUBLISHED_NUMBERS,
-        reasons=os.path.relpath(REASONS),
+        collected=[f"<results>/{name}" for name in COMPARED],
         code=code_files(
             "gpca.comparison.verdicts",
             "gpca.reporting.tables.comparison",
             "gpca.reporting.script",
         ),
     output:
-        csv="results/{run}/comparison.csv",
-        md="results/{run}/comparison.md",
+        csv="<results>/comparison.csv",
+        md="<results>/comparison.md",
     log:
-        "results/{run}/logs/comparison.log",
+        "<logs>/comparison.log",
     benchmark:
-        "results/{run}/benchmarks/comparison.tsv"
+        "<benchmarks>/comparison.tsv"
+    localrule: True
     conda:
         "../envs/gpca.yaml"
     threads: 1
@@ -52,7 +38,57 @@ rule comparison:
         mem_mb=1000,
         runtime=10,
     params:
-        objects={**SHOWN_SOURCES, REAL_WORLD: REAL_WORLD_SHOWN, "model": MODEL_SHOWN},
+        objects={**SHOWN["sources"], FRAMES: SHOWN["frames"], "model": SHOWN["model"]},
         tolerances=config["comparison"]["tolerances"],
     script:
         "../scripts/comparison.py"
+
+
+rule page:
+    input:
+        comparison="<results>/comparison.csv",
+        results=[
+            f"<results>/{result.file(suffix)}"
+            for result in RESULTS
+            for suffix in (
+                ("md", "csv", "tex") if result.kind == "tables" else ("png", "pdf")
+            )
+        ],
+        registrations=collect(
+            f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SAMPLED
+        ),
+        predictions=[
+            f"<results>/predictions/{source}/{explainer}/seed{SEEDS[0]}.csv"
+            for source, explainer in SAMPLED.items()
+        ],
+        code=code_files("gpca.reporting.page.page", "gpca.reporting.script"),
+    output:
+        page="<results>/index.html",
+        script="<results>/page/plotly.min.js",
+    log:
+        "<logs>/page.log",
+    benchmark:
+        "<benchmarks>/page.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        run=config["run"],
+        shown=[
+            (result.name, result.kind, result.section, result.title, result.caption)
+            for result in RESULTS
+        ],
+        samples=list(SAMPLED),
+        sources={**SHOWN["sources"], FRAMES: SHOWN["frames"]},
+        # Not where data lie: that changes no number, and is nobody's business.
+        config={
+            key: value
+            for key, value in config.items()
+            if key not in ("data_dir", "downloads")
+        },
+    script:
+        "../scripts/page.py"

@@ -1,14 +1,45 @@
-rule encoder:
+# Registrations -> encoders -> embeddings, and their reductions.
+rule encoders:
     input:
-        registrations="results/{run}/registrations/{source}/seed{seed}.npz",
+        collect(
+            "<results>/encoders/{source}/{encoder}/seed{seed}.pt",
+            source=SOURCES,
+            encoder=config["embedding"]["encoder"],
+            seed=SEEDS,
+        ),
+        collect(
+            f"<results>/encoders/{FRAMES}/{{encoder}}/seed{{seed}}.pt",
+            encoder=SHOWN["backbones"],
+            seed=SEEDS,
+        ),
+
+
+rule embeddings:
+    input:
+        collect(
+            f"<results>/embeddings/{{source}}/{EMBEDDING}/seed{{seed}}.npz",
+            source=SOURCES,
+            seed=SEEDS,
+        ),
+        collect(
+            f"<results>/embeddings/{FRAMES}/{{backbone}}/{{reduction}}/seed{{seed}}.npz",
+            backbone=config["real_world"]["backbones"],
+            reduction=config["real_world"]["reductions"],
+            seed=SEEDS,
+        ),
+
+
+rule train_encoder:
+    input:
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
         code=encoder_code("train"),
     output:
-        weights="results/{run}/encoders/{source}/{backbone}/seed{seed}.pt",
-        curve="results/{run}/encoders/{source}/{backbone}/seed{seed}.csv",
+        weights="<results>/encoders/{source}/{backbone}/seed{seed}.pt",
+        curve="<results>/encoders/{source}/{backbone}/seed{seed}.csv",
     log:
-        "results/{run}/logs/encoders/{source}/{backbone}/seed{seed}.log",
+        "<logs>/encoders/{source}/{backbone}/seed{seed}.log",
     benchmark:
-        "results/{run}/benchmarks/encoders/{source}/{backbone}/seed{seed}.tsv"
+        "<benchmarks>/encoders/{source}/{backbone}/seed{seed}.tsv"
     # The longest jobs go first, so that none of them is left over while the other cores wait.
     priority: 10
     conda:
@@ -25,19 +56,19 @@ rule encoder:
         "--out {output.weights} --curve {output.curve} 2> {log}"
 
 
-rule embeddings:
+rule embed:
     input:
-        registrations="results/{run}/registrations/{source}/seed{seed}.npz",
-        timings="results/{run}/timings/{source}/icp/seed{seed}.csv",
-        weights="results/{run}/encoders/{source}/{backbone}/seed{seed}.pt",
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/icp/seed{seed}.csv",
+        weights="<results>/encoders/{source}/{backbone}/seed{seed}.pt",
         code=encoder_code("embed"),
     output:
-        embeddings="results/{run}/embeddings/{source}/{backbone}/none/seed{seed}.npz",
-        timings="results/{run}/timings/{source}/{backbone}/seed{seed}.csv",
+        embeddings="<results>/embeddings/{source}/{backbone}/none/seed{seed}.npz",
+        timings="<results>/timings/{source}/{backbone}/seed{seed}.csv",
     log:
-        "results/{run}/logs/embeddings/{source}/{backbone}/seed{seed}.log",
+        "<logs>/embeddings/{source}/{backbone}/seed{seed}.log",
     benchmark:
-        "results/{run}/benchmarks/embeddings/{source}/{backbone}/seed{seed}.tsv"
+        "<benchmarks>/embeddings/{source}/{backbone}/seed{seed}.tsv"
     priority: 5
     conda:
         "../envs/gpca.yaml"
@@ -52,3 +83,33 @@ rule embeddings:
         "--registration-timings {input.timings} --encoder {input.weights} "
         "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
         "--out {output.embeddings} --timings {output.timings} 2> {log}"
+
+
+rule reduce_embeddings:
+    input:
+        embeddings=collect(
+            "<results>/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
+            seed=SEEDS,
+        ),
+        code=code_files("gpca.steps.reduce"),
+    output:
+        collect(
+            "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/embeddings/{source}/{backbone}/{reduction}.log",
+    benchmark:
+        "<benchmarks>/embeddings/{source}/{backbone}/{reduction}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        settings=settings("reductions", "{reduction}"),
+        seeds=SEEDS,
+    shell:
+        "python -m gpca reduce --threads {threads} --reduction {wildcards.reduction} --source {wildcards.source} "
+        "--seeds {params.seeds} --settings {params.settings:q} --embeddings {input.embeddings} --out {output} 2> {log}"

@@ -1,25 +1,50 @@
-rule explain:
+# Every explainer -> its predictions, one schema for all; the tidy metrics and timings of these.
+from gpca.reporting.run import explainer_of, files_behind
+
+
+rule predictions:
     input:
-        unpack(explainer_inputs),
+        collect(
+            "<results>/predictions/{source}/{explainer}/seed{seed}.csv",
+            source=SOURCES,
+            explainer=config["explainers"],
+            seed=SEEDS,
+        ),
+        collect(
+            f"<results>/predictions/{FRAMES}/{{explainer}}/seed{{seed}}.csv",
+            explainer=[*NAMES["backbone"], *NAMES["classic"]],
+            seed=SEEDS,
+        ),
+
+
+rule attribute:
+    input:
+        unpack(
+            lambda wildcards: {
+                option: collect(
+                    f"<results>/{pattern}", source=wildcards.source, seed=SEEDS
+                )
+                for option, pattern in files_behind(wildcards.explainer, NAMES).items()
+            }
+        ),
         registrations=collect(
-            "results/{{run}}/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
         code=lambda wildcards: code_files(
-            "gpca.steps.attribute", explainer_module(wildcards.explainer)
+            "gpca.steps.attribute",
+            explainer_module(explainer_of(wildcards.explainer, NAMES)),
         ),
     output:
         predictions=collect(
-            "results/{{run}}/predictions/{{source}}/{{explainer}}/seed{seed}.csv",
-            seed=SEEDS,
+            "<results>/predictions/{{source}}/{{explainer}}/seed{seed}.csv", seed=SEEDS
         ),
         timings=collect(
-            "results/{{run}}/timings/{{source}}/{{explainer}}/seed{seed}.csv",
-            seed=SEEDS,
+            "<results>/timings/{{source}}/{{explainer}}/seed{seed}.csv", seed=SEEDS
         ),
     log:
-        "results/{run}/logs/predictions/{source}/{explainer}.log",
+        "<logs>/predictions/{source}/{explainer}.log",
     benchmark:
-        "results/{run}/benchmarks/predictions/{source}/{explainer}.tsv"
+        "<benchmarks>/predictions/{source}/{explainer}.tsv"
     conda:
         "../envs/gpca.yaml"
     threads: 1
@@ -27,11 +52,79 @@ rule explain:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=settings("explainers", "{explainer}"),
+        explainer=lambda wildcards: explainer_of(wildcards.explainer, NAMES),
+        settings=lambda wildcards: as_json(
+            config["explainers"].get(explainer_of(wildcards.explainer, NAMES)) or {}
+        ),
         seeds=SEEDS,
-        attached=attached_options,
+        attached=lambda wildcards, input: [
+            word
+            for option in files_behind(wildcards.explainer, NAMES)
+            for word in (f"--{option.replace('_', '-')}", *input.get(option))
+        ],
     shell:
-        "python -m gpca attribute --threads {threads} --explainer {wildcards.explainer} "
+        "python -m gpca attribute --threads {threads} --explainer {params.explainer} "
         "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
-        "--registrations {input.registrations} {params.attached} --input-timings {input.timings} "
+        "--registrations {input.registrations} {params.attached} "
         "--predictions {output.predictions} --timings {output.timings} 2> {log}"
+
+
+rule metrics:
+    input:
+        prediction_files=collect(
+            "<results>/predictions/{source}/{explainer}/seed{seed}.csv",
+            source=SOURCES,
+            explainer=config["explainers"],
+            seed=SEEDS,
+        ),
+        causal_files=collect(
+            "<results>/uncertainty/{source}/causal/seed{seed}.csv",
+            source=SOURCES,
+            seed=SEEDS,
+        ),
+        code=collector_code("gpca.attribution.metrics:collect"),
+    output:
+        "<results>/metrics.csv",
+    log:
+        "<logs>/metrics.log",
+    benchmark:
+        "<benchmarks>/metrics.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.attribution.metrics:collect",
+    script:
+        "../scripts/collect.py"
+
+
+rule timings:
+    input:
+        timing_files=collect(
+            "<results>/timings/{source}/{explainer}/seed{seed}.csv",
+            source=SOURCES,
+            explainer=config["explainers"],
+            seed=SEEDS,
+        ),
+        code=collector_code("gpca.attribution.metrics:collect_timings"),
+    output:
+        "<results>/timings.csv",
+    log:
+        "<logs>/timings.log",
+    benchmark:
+        "<benchmarks>/timings.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.attribution.metrics:collect_timings",
+    script:
+        "../scripts/collect.py"

@@ -1,13 +1,24 @@
+# Sources -> canonical clouds.
+from gpca.objects.source import data_files, data_options, source_modules
+
+
 rule objects:
     input:
+        collect("<results>/objects/{source}.npz", source=SOURCES),
+
+
+rule sample_objects:
+    input:
         data=lambda wildcards: data_files(SOURCES[wildcards.source]),
-        code=objects_code,
+        code=lambda wildcards: code_files(
+            "gpca.steps.objects", *source_modules(SOURCES[wildcards.source])
+        ),
     output:
-        "results/{run}/objects/{source}.npz",
+        "<results>/objects/{source}.npz",
     log:
-        "results/{run}/logs/objects/{source}.log",
+        "<logs>/objects/{source}.log",
     benchmark:
-        "results/{run}/benchmarks/objects/{source}.tsv"
+        "<benchmarks>/objects/{source}.tsv"
     wildcard_constraints:
         source="|".join(CONFIGURED_SOURCES),
     conda:
@@ -17,11 +28,11 @@ rule objects:
         mem_mb=2000,
         runtime=30,
     params:
-        settings=lambda wildcards: json.dumps(
-            config["sources"][wildcards.source], sort_keys=True
+        settings=settings("sources", "{source}"),
+        data=lambda wildcards: data_options(
+            SOURCES[wildcards.source], config["data_dir"], config["downloads"]
         ),
-        data=data_option,
         points=config["objects"]["points"],
     shell:
         "python -m gpca objects --threads {threads} --source {wildcards.source} --settings {params.settings:q} "
-        "{params.data} --points {params.points} --out {output} 2> {log}"
+        "{params.data:q} --points {params.points} --out {output} 2> {log}"

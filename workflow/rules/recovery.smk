@@ -1,22 +1,43 @@
+# Failures on virtual tables, and what every policy makes of them -> recovery.csv.
+from gpca.recovery.policies import policy_entry
+
+RECOVERY = config["recovery"]
+RECOVERY_EXPLAINERS = sorted(
+    {
+        entry.explainer
+        for name in RECOVERY["policies"]
+        if (entry := policy_entry(name, tuple(RECOVERY["actions"]))).explainer
+    }
+)
+RECOVERY_SETTINGS = {
+    "recovery": RECOVERY,
+    "scenes": config["real_world"]["scenes"],
+    "registrations": config["registrations"],
+    "encoder": config["encoders"][config["embedding"]["encoder"]] | RECOVERY["encoder"],
+    "uncertainty": config["uncertainty"].get("removal", {}),
+    "explainers": {
+        name: config["explainers"].get(name) or {} for name in RECOVERY_EXPLAINERS
+    },
+}
+
+
 rule recover:
     input:
         code=code_files(
-            *("gpca.steps.recover", encoder_module(config["embedding"]["encoder"])),
-            *(explainer_module(name) for name in RECOVERY_EXPLAINERS),
-            *(
-                f"gpca.objects.shapes.{FAMILIES[family]}"
-                for family in config["real_world"]["scenes"]["families"]
-            ),
+            "gpca.steps.recover",
+            encoder_module(config["embedding"]["encoder"]),
+            *map(explainer_module, RECOVERY_EXPLAINERS),
+            *shapes_code(config["real_world"]["scenes"]["families"]),
         ),
     output:
-        rows="results/{run}/recovery/seed{seed}.csv",
-        policy="results/{run}/recovery/policy_seed{seed}.json",
-        example="results/{run}/recovery/example_seed{seed}.npz",
-        timings="results/{run}/timings/recovery/seed{seed}.csv",
+        rows="<results>/recovery/seed{seed}.csv",
+        policy="<results>/recovery/policy_seed{seed}.json",
+        example="<results>/recovery/example_seed{seed}.npz",
+        timings="<results>/timings/recovery/seed{seed}.csv",
     log:
-        "results/{run}/logs/recovery/seed{seed}.log",
+        "<logs>/recovery/seed{seed}.log",
     benchmark:
-        "results/{run}/benchmarks/recovery/seed{seed}.tsv"
+        "<benchmarks>/recovery/seed{seed}.tsv"
     priority: 6
     conda:
         "../envs/gpca.yaml"
@@ -25,36 +46,23 @@ rule recover:
         mem_mb=3000,
         runtime=30,
     params:
-        settings=json.dumps(
-            {
-                "recovery": RECOVERY,
-                "scenes": config["real_world"]["scenes"],
-                "registrations": config["registrations"],
-                "encoder": config["encoders"][config["embedding"]["encoder"]]
-                | RECOVERY["encoder"],
-                "uncertainty": config["uncertainty"].get("removal", {}),
-                "explainers": {
-                    name: config["explainers"].get(name) or {}
-                    for name in RECOVERY_EXPLAINERS
-                },
-            },
-            sort_keys=True,
-        ),
+        settings=as_json(RECOVERY_SETTINGS),
     shell:
         "python -m gpca recover --threads {threads} --seed {wildcards.seed} --settings {params.settings:q} "
         "--out {output.rows} --timings {output.timings} --policy {output.policy} --example {output.example} 2> {log}"
 
 
-rule recovery_metrics:
+rule recovery:
     input:
-        recovery=collect("results/{{run}}/recovery/seed{seed}.csv", seed=SEEDS),
-        code=code_files("gpca.recovery.metrics", "gpca.reporting.script"),
+        files=collect("<results>/recovery/seed{seed}.csv", seed=SEEDS),
+        code=collector_code("gpca.recovery.metrics:collect_recovery"),
     output:
-        "results/{run}/recovery.csv",
+        "<results>/recovery.csv",
     log:
-        "results/{run}/logs/recovery.log",
+        "<logs>/recovery.log",
     benchmark:
-        "results/{run}/benchmarks/recovery.tsv"
+        "<benchmarks>/recovery.tsv"
+    localrule: True
     conda:
         "../envs/gpca.yaml"
     threads: 1
@@ -62,62 +70,8 @@ rule recovery_metrics:
         mem_mb=1000,
         runtime=10,
     params:
+        collector="gpca.recovery.metrics:collect_recovery",
         treatments=RECOVERY["treatments"],
         budget=RECOVERY["loop"]["budget"],
     script:
-        "../scripts/collect_recovery.py"
-
-
-rule table8_recovery:
-    input:
-        metrics="results/{run}/recovery.csv",
-        timings=collect("results/{{run}}/timings/recovery/seed{seed}.csv", seed=SEEDS),
-        code=code_files("gpca.reporting.tables.recovery", "gpca.reporting.script"),
-    output:
-        csv=reported("results/{run}/tables/table8_recovery.csv"),
-        md="results/{run}/tables/table8_recovery.md",
-        tex="results/{run}/tables/table8_recovery.tex",
-    log:
-        "results/{run}/logs/tables/table8_recovery.log",
-    benchmark:
-        "results/{run}/benchmarks/tables/table8_recovery.tsv"
-    conda:
-        "../envs/gpca.yaml"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        policies=POLICIES,
-        budget=RECOVERY["loop"]["budget"],
-    script:
-        "../scripts/recovery_table.py"
-
-
-rule recovery_figure:
-    input:
-        data=lambda wildcards: f"results/{wildcards.run}/{RECOVERY_FIGURES[wildcards.figure]}",
-        code=code_files(
-            *("gpca.reporting.figures.recovery_rates", "gpca.reporting.figures.policy"),
-            *("gpca.reporting.figures.recovery_example", "gpca.reporting.script"),
-        ),
-    output:
-        pdf="results/{run}/figures/{figure}.pdf",
-        png=reported("results/{run}/figures/{figure}.png"),
-    log:
-        "results/{run}/logs/figures/{figure}.log",
-    benchmark:
-        "results/{run}/benchmarks/figures/{figure}.tsv"
-    wildcard_constraints:
-        figure="|".join(RECOVERY_FIGURES),
-    conda:
-        "../envs/gpca.yaml"
-    threads: 1
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        policies=POLICIES,
-        budget=RECOVERY["loop"]["budget"],
-    script:
-        "../scripts/recovery_figure.py"
+        "../scripts/collect.py"

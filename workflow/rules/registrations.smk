@@ -1,14 +1,24 @@
+# Canonical clouds -> perturbed pairs, aligned by ICP and labelled.
 rule registrations:
     input:
-        objects="results/{run}/objects/{source}.npz",
+        collect(
+            "<results>/registrations/{source}/seed{seed}.npz",
+            source=[*SOURCES, FRAMES],
+            seed=SEEDS,
+        ),
+
+
+rule register:
+    input:
+        objects="<results>/objects/{source}.npz",
         code=code_files("gpca.steps.registrations"),
     output:
-        registrations="results/{run}/registrations/{source}/seed{seed}.npz",
-        timings="results/{run}/timings/{source}/icp/seed{seed}.csv",
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/icp/seed{seed}.csv",
     log:
-        "results/{run}/logs/registrations/{source}/seed{seed}.log",
+        "<logs>/registrations/{source}/seed{seed}.log",
     benchmark:
-        "results/{run}/benchmarks/registrations/{source}/seed{seed}.tsv"
+        "<benchmarks>/registrations/{source}/seed{seed}.tsv"
     wildcard_constraints:
         source="|".join(SOURCES),
     conda:

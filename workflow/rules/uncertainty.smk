@@ -1,26 +1,35 @@
+# Registrations -> Monte-Carlo ICP under the conditions of a design, for the explainers that read it.
 rule uncertainty:
     input:
+        collect(
+            "<results>/uncertainty/{source}/{design}/seed{seed}.npz",
+            source=SOURCES,
+            design=config["uncertainty"],
+            seed=SEEDS,
+        ),
+
+
+rule run_icp:
+    input:
         registrations=collect(
-            "results/{{run}}/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
         code=code_files("gpca.steps.uncertainty"),
     output:
         outcomes=collect(
-            "results/{{run}}/uncertainty/{{source}}/{{design}}/seed{seed}.npz",
-            seed=SEEDS,
+            "<results>/uncertainty/{{source}}/{{design}}/seed{seed}.npz", seed=SEEDS
         ),
         tables=collect(
-            "results/{{run}}/uncertainty/{{source}}/{{design}}/seed{seed}.csv",
-            seed=SEEDS,
+            "<results>/uncertainty/{{source}}/{{design}}/seed{seed}.csv", seed=SEEDS
         ),
         timings=collect(
-            "results/{{run}}/timings/{{source}}/uncertainty_{{design}}/seed{seed}.csv",
+            "<results>/timings/{{source}}/uncertainty_{{design}}/seed{seed}.csv",
             seed=SEEDS,
         ),
     log:
-        "results/{run}/logs/uncertainty/{source}/{design}.log",
+        "<logs>/uncertainty/{source}/{design}.log",
     benchmark:
-        "results/{run}/benchmarks/uncertainty/{source}/{design}.tsv"
+        "<benchmarks>/uncertainty/{source}/{design}.tsv"
     priority: 3
     conda:
         "../envs/gpca.yaml"
@@ -29,10 +38,9 @@ rule uncertainty:
         mem_mb=2000,
         runtime=60,
     params:
-        settings=lambda wildcards: json.dumps(
+        settings=lambda wildcards: as_json(
             config["uncertainty"][wildcards.design]
-            | {"icp": config["registrations"]["icp"]},
-            sort_keys=True,
+            | {"icp": config["registrations"]["icp"]}
         ),
         seeds=SEEDS,
     shell:

@@ -9,14 +9,14 @@ from gpca.reporting.tables.comparison import comparison_markdown
 
 with job(snakemake):
     given, params = snakemake.input, snakemake.params
-    numbers = read_published(given.published)
+    numbers = read_published()
     tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in params.tolerances.items()}
     comparison = compare(
         numbers,
         read_results(given.collected),
         params.objects,
         tolerances,
-        read_reasons(numbers, given.reasons),
+        read_reasons(numbers),
         measured_on(given.collected),
     )
     with whole_file(snakemake.output.csv) as partial:

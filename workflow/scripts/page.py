@@ -2,20 +2,18 @@
 
 from pathlib import Path
 
-from gpca.reporting.page.page import Run, write_page
+from gpca.reporting.page.page import Run, Shown, write_page
 from gpca.reporting.script import job
 
 with job(snakemake):
-    given = snakemake.params
-    folder = Path(snakemake.output.page).parent
+    given, files = snakemake.params, snakemake.input
     run = Run(
-        name=snakemake.wildcards.run,
+        name=given.run,
         seeds=given.config["seeds"],
         sources=given.sources,
-        tables=given.shown["tables"],
-        figures=given.shown["figures"],
-        samples=given.samples,
+        results=[Shown(*fields) for fields in given.shown],
+        samples=dict(zip(given.samples, zip(files.registrations, files.predictions, strict=True), strict=True)),
         config=given.config,
         command=f"snakemake -j2 {snakemake.output.page}",
     )
-    write_page(folder, Path(snakemake.input.captions[0]).parent, run)
+    write_page(Path(snakemake.output.page).parent, run)

@@ -143,13 +143,13 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
-def draw_contact_sheet(objects_npz: str | Path, title: str, pdf: str | Path, png: str | Path) -> None:
+def draw_contact_sheet(objects_npz: str | Path, title: str, pdf_path: str | Path, png_path: str | Path) -> None:
     """Draw all objects of one source in a grid, each filling its tile, with its name and diameter below.
 
     Args:
         objects_npz: the clouds as `gpca objects` writes them.
         title: the line on top; it says so when the objects are stand-ins.
-        pdf, png: the two files to write.
+        pdf_path, png_path: the two files to write.
 
     Raises:
         InputError: the npz is missing, unreadable or not of that format.
@@ -186,7 +186,7 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, pdf: str | Path, png
         text_x, text_y = (left + tile / 2) / TEXT_WIDTH_IN, (bottom - 0.02) / height
         text = f"{name_lines}\n{diameter_m * 1000:.0f} mm"
         figure.text(text_x, text_y, text, ha="center", va="top", fontsize=size_pt, linespacing=1.15)
-    save_figure(figure, pdf, png)
+    save_figure(figure, pdf_path, png_path)
 
 
 def _columns(count: int) -> int:

@@ -14,10 +14,20 @@ from gpca.files import whole_file
 from gpca.reporting.page.comparison import page_comparison
 from gpca.reporting.page.markdown_table import read_markdown_table
 from gpca.reporting.page.samples import POINTS, RULE, page_samples
-from gpca.reporting.sections import by_section, listed_as, title_of_result
 
 TEMPLATES = Path(__file__).parent / "templates"
 _CSS_PIXELS = 130 / 300  # of a pixel of a figure, which has 300 in an inch: a little larger than in print
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A table or figure as the page shows it; the attributes are those of :class:`gpca.reporting.registry.Result`."""
+
+    name: str
+    kind: str
+    section: str
+    title: str
+    caption: str
 
 
 @dataclass(frozen=True)
@@ -28,7 +38,7 @@ class Run:
         name: of the run.
         seeds: of its repeats.
         sources: name -> ``{"title": str, "stand_in": bool}``.
-        tables, figures: names of the files in ``tables/`` and ``figures/``.
+        results: its tables and figures, in order.
         samples: source -> files of registrations and of GP-CA's predictions on them.
         config: the whole configuration.
         command: that makes what is missing.
@@ -37,21 +47,19 @@ class Run:
     name: str
     seeds: Sequence[int]
     sources: Mapping[str, Mapping]
-    tables: Sequence[str]
-    figures: Sequence[str]
+    results: Sequence[Shown]
     samples: Mapping[str, tuple[str, str]]
     config: Mapping
     command: str
 
 
-def write_page(folder: str | Path, captions: str | Path, run: Run) -> None:
+def write_page(folder: str | Path, run: Run) -> None:
     """Write ``index.html`` of a finished run into its folder, and ``page/plotly.min.js`` beside it.
 
     The comparison is shown where the folder has a ``comparison.csv``.
 
     Args:
         folder: ``results/{run}``.
-        captions: a folder with a reStructuredText file for each table and figure.
         run: what is shown.
 
     Raises:
@@ -61,13 +69,12 @@ def write_page(folder: str | Path, captions: str | Path, run: Run) -> None:
 
     folder = Path(folder)
     require_complete(folder, run)
-    shown = {
-        section: [_shown(folder, Path(captions), run, name) for name in names]
-        for section, names in by_section([*run.tables, *run.figures]).items()
-    }
+    sections: dict[str, list[dict]] = {}
+    for result in run.results:
+        sections.setdefault(result.section, []).append(_content(folder, result))
     text = render(
         run=run,
-        sections=shown,
+        sections=sections,
         comparison=page_comparison(folder / "comparison.csv"),
         samples=[
             sample for source, files in run.samples.items() for sample in page_samples(*files, run.sources[source])
@@ -100,8 +107,8 @@ def render(**content) -> str:
 
 def require_complete(folder: Path, run: Run) -> None:
     """Raise an InputError that names every result of the run that is not there, and the command that makes it."""
-    needed = [f"tables/{name}.{suffix}" for name in run.tables for suffix in ("md", "csv", "tex")]
-    needed += [f"figures/{name}.{suffix}" for name in run.figures for suffix in ("png", "pdf")]
+    suffixes = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}
+    needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in suffixes[each.kind]]
     missing = [name for name in needed if not (folder / name).is_file()]
     missing += [str(path) for files in run.samples.values() for path in files if not Path(path).is_file()]
     if missing:
@@ -134,26 +141,25 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
 
 
 def _provenance_files(folder: Path, run: Run) -> list[Path]:
-    files = [folder / f"tables/{name}.csv" for name in run.tables]
-    files += [folder / f"figures/{name}.pdf" for name in run.figures]
+    suffix = {"tables": "csv", "figures": "pdf"}
+    files = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
     return files + [Path(path) for of_source in run.samples.values() for path in of_source]
 
 
-def _shown(folder: Path, captions: Path, run: Run, name: str) -> dict:
+def _content(folder: Path, result: Shown) -> dict:
     """Return one table or figure as the template takes it."""
-    caption = rendered_caption(captions / f"{listed_as(name)}.rst")
-    common = {"name": name, "title": title_of_result(name), "caption": caption}
-    if name in run.tables:
-        return common | {"table": read_markdown_table(folder / f"tables/{name}.md")}
-    width, height = _size(folder / f"figures/{name}.png")
+    common = {"name": result.name, "title": result.title, "caption": rendered_caption(result.name, result.caption)}
+    if result.kind == "tables":
+        return common | {"table": read_markdown_table(folder / f"tables/{result.name}.md")}
+    width, height = _size(folder / f"figures/{result.name}.png")
     return common | {"table": None, "width": round(width * _CSS_PIXELS), "height": round(height * _CSS_PIXELS)}
 
 
-def rendered_caption(path: Path):
+def rendered_caption(name: str, caption: str):
     """Return a caption, reStructuredText, as safe HTML.
 
     Raises:
-        InputError: no such file, or a fault in it.
+        InputError: a fault in the caption of that table or figure.
     """
     from docutils.core import publish_parts
     from docutils.utils import SystemMessage
@@ -162,12 +168,9 @@ def rendered_caption(path: Path):
     # Nothing of its own gets into the page, neither files nor raw HTML; a fault stops instead of being printed.
     settings = {"raw_enabled": False, "file_insertion_enabled": False, "halt_level": 2, "report_level": 5}
     try:
-        text = path.read_text(encoding="utf-8")
-        return Markup(publish_parts(text, writer="html5", settings_overrides=settings)["body"])
-    except FileNotFoundError as fault:
-        raise InputError(path, "no such caption", "write it: what is shown, of which table or figure") from fault
+        return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
     except SystemMessage as fault:
-        raise InputError(path, f"is no reStructuredText ({fault})", "correct it") from fault
+        raise InputError(f"caption of {name}", f"is no reStructuredText ({fault})", "correct it") from fault
 
 
 def _size(path: Path) -> tuple[int, int]:

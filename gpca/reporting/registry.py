@@ -1,0 +1,247 @@
+"""The registry of results: every table and figure, what it is called, and what it is made from (``results.yaml``)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from functools import cache
+from importlib import import_module
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+REGISTRY = Path(__file__).with_name("results.yaml")
+Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values
+
+
+@dataclass(frozen=True)
+class Input:
+    """What becomes one argument of a builder.
+
+    Attributes:
+        argument: its name.
+        files: keyword of the reader -> patterns below the folder of a run; the key is empty where the reader takes
+            the files themselves.
+        read: ``module:function`` that turns the files into the argument; empty for the paths themselves.
+    """
+
+    argument: str
+    files: Mapping[str, tuple[str, ...]]
+    read: str = ""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A table or figure.
+
+    Attributes:
+        name: of its files, without suffix.
+        kind: ``tables`` or ``figures``, the folder that it goes to.
+        section, title, caption: where it stands and what is said about it.
+        builder: ``module:function`` that makes it.
+        inputs: the builder's arguments that come from files.
+        settings: the builder's other arguments -> place of the value among the settings of a run.
+        only: name of a list -> those of its members that are shown.
+        needs: names that must not be empty, besides those of the inputs.
+        paper: it is a table or figure of the paper.
+    """
+
+    name: str
+    kind: str
+    section: str
+    title: str
+    caption: str
+    builder: str
+    inputs: tuple[Input, ...]
+    settings: Mapping[str, str]
+    only: Mapping[str, tuple[str, ...]]
+    needs: tuple[str, ...]
+    paper: bool
+
+    @property
+    def modules(self) -> list[str]:
+        """The modules that make it: its builder's and its readers'."""
+        functions = [self.builder, *(given.read for given in self.inputs if given.read)]
+        return [function.split(":")[0] for function in functions]
+
+    @property
+    def readers(self) -> dict[str, dict]:
+        """How each argument is read, in plain words for the rules: the function, and its keywords' names of files."""
+        return {
+            given.argument: {
+                "function": given.read,
+                "keywords": {keyword: input_name(given.argument, keyword) for keyword in given.files},
+            }
+            for given in self.inputs
+        }
+
+    def file(self, suffix: str) -> str:
+        """Return the path of its file below the folder of a run, e.g. ``tables/table2_per_concept.md``."""
+        return f"{self.kind}/{self.name}.{suffix}"
+
+    @property
+    def main_file(self) -> str:
+        """The file by which a run asks for it, with all others that come along."""
+        return self.file("md" if self.kind == "tables" else "png")
+
+    def files(self, names: Names) -> dict[str, list[str] | str]:
+        """Return the files of each input, a path where there can be but one; see :func:`input_name` for the keys."""
+        return {
+            input_name(given.argument, keyword): _expand(patterns, self._shown(names))
+            for given in self.inputs
+            for keyword, patterns in given.files.items()
+        }
+
+    def is_made(self, names: Names) -> bool:
+        """Return whether a run with these names makes it: none of those that it takes is empty."""
+        shown = self._shown(names)
+        patterns = [pattern for given in self.inputs for of_key in given.files.values() for pattern in of_key]
+        return all(shown[name] for name in (*self.needs, *_braced(patterns)))
+
+    def arguments(self, settings: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the builder's arguments that come from the settings of a run, e.g. ``source_titles.ycb`` of them."""
+        return {argument: _found(settings, place) for argument, place in self.settings.items()}
+
+    def of_source(self, source: str) -> Result:
+        """Return the result of one source, where the name has ``{source}`` in it."""
+
+        def named(text: str) -> str:
+            return text.replace("{source}", source)
+
+        inputs = tuple(
+            replace(given, files={key: tuple(map(named, patterns)) for key, patterns in given.files.items()})
+            for given in self.inputs
+        )
+        settings = {argument: named(place) for argument, place in self.settings.items()}
+        return replace(self, name=named(self.name), title=named(self.title), inputs=inputs, settings=settings)
+
+    def _shown(self, names: Names) -> dict[str, Any]:
+        kept = {key: [name for name in names[key] if name in members] for key, members in self.only.items()}
+        return {**names, **kept}
+
+
+@cache
+def registered() -> tuple[Result, ...]:
+    """Return every entry of the registry, in order."""
+    sections = yaml.safe_load(REGISTRY.read_text(encoding="utf-8"))
+    return tuple(_result(section["section"], entry) for section in sections for entry in section["results"])
+
+
+def results_of(names: Names) -> list[Result]:
+    """Return the tables and figures that a run with these names makes, in the order of the registry.
+
+    Args:
+        names: what the patterns of the registry have in braces; ``source`` lists the sources.
+    """
+    results = []
+    for entry in registered():
+        of_entry = [entry.of_source(source) for source in names["source"]] if "{source}" in entry.name else [entry]
+        results += [result for result in of_entry if result.is_made(names)]
+    return results
+
+
+def targets(results: Iterable[Result]) -> dict[str, Result]:
+    """Return short names for those that begin with a number of the paper's: ``table2``, ``fig5``; the first of each."""
+    short: dict[str, Result] = {}
+    for result in results:
+        if numbered := re.match(r"(table|fig)\d+(?=_)", result.name):
+            short.setdefault(numbered[0], result)
+    return short
+
+
+def unknown_target(target: str, known: Iterable[str]) -> str:
+    """Return the line that answers a misspelt target: the known ones nearest to it, or all."""
+    known = sorted(known)
+    near = get_close_matches(target, known, n=3, cutoff=0.5)
+    remedy = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+    return f"gpca: target '{target}': there is no such table, figure or stage; {remedy}"
+
+
+def by_section(results: Iterable[Result]) -> dict[str, list[Result]]:
+    """Return section -> its results, both in the order given."""
+    sections: dict[str, list[Result]] = {}
+    for result in results:
+        sections.setdefault(result.section, []).append(result)
+    return sections
+
+
+def input_name(argument: str, keyword: str) -> str:
+    """Return what the files of an input are called: the argument, and the reader's keyword where it has several."""
+    return f"{argument}_{keyword}" if keyword else argument
+
+
+def build(builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any], arguments: Mapping[str, Any]) -> Any:
+    """Read the inputs and call the builder.
+
+    Args:
+        builder: ``module:function``.
+        readers: as :attr:`Result.readers` has them.
+        files: of each input, as :meth:`Result.files` names them.
+        arguments: the builder's other arguments.
+    """
+    given = {argument: _read(files, **reader) for argument, reader in readers.items()}
+    return load(builder)(**given, **arguments)
+
+
+def load(function: str) -> Any:
+    """Return the function that ``module:function`` names."""
+    module, name = function.split(":")
+    return getattr(import_module(module), name)
+
+
+def _read(files: Mapping[str, Any], function: str, keywords: Mapping[str, str]) -> Any:
+    given = {keyword: files[name] for keyword, name in keywords.items()}
+    if not function:
+        return given[""]
+    return load(function)(given[""]) if "" in given else load(function)(**given)
+
+
+def _result(section: str, entry: Mapping) -> Result:
+    kind = "tables" if "table" in entry else "figures"
+    return Result(
+        name=entry["table" if kind == "tables" else "figure"],
+        kind=kind,
+        section=section,
+        title=entry["title"],
+        caption=entry["caption"].strip(),
+        builder=entry["builder"],
+        inputs=tuple(_input(argument, given) for argument, given in entry["inputs"].items()),
+        settings=entry.get("settings", {}),
+        only={key: tuple(members) for key, members in entry.get("only", {}).items()},
+        needs=tuple(entry.get("needs", ())),
+        paper=entry.get("paper", False),
+    )
+
+
+def _input(argument: str, given: str | Mapping) -> Input:
+    if isinstance(given, str):
+        return Input(argument, {"": (given,)})
+    files = given.get("from", {})
+    of_key = files if isinstance(files, Mapping) else {"": files}
+    patterns = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in of_key.items()}
+    return Input(argument, patterns, given["read"])
+
+
+def _expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
+    """Return the files of all combinations of the listed names; a path where nothing is listed."""
+    files = []
+    listed = [name for name in _braced(patterns) if not isinstance(names[name], str)]
+    for pattern in patterns:
+        in_pattern = [name for name in _braced([pattern]) if name in listed]
+        for values in product(*(names[name] for name in in_pattern)):
+            files.append(pattern.format(**{**names, **dict(zip(in_pattern, values, strict=True))}))
+    return files if listed or len(patterns) > 1 else files[0]
+
+
+def _braced(patterns: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(name for pattern in patterns for name in re.findall(r"{(\w+)}", pattern)))
+
+
+def _found(settings: Mapping[str, Any], place: str) -> Any:
+    for key in place.split("."):
+        settings = settings[key]
+    return settings

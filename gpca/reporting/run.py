@@ -1,0 +1,114 @@
+"""What a run consists of, worked out from its configuration: the names in its paths, and what its results show.
+
+The registry of results (:mod:`gpca.reporting.registry`) refers to both by name, as do the rules of the workflow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from baselines.registry import explainer_entry
+from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.frames.source import REAL_WORLD
+from gpca.objects.title import title_of
+from gpca.recovery.policies import policy_entry
+from gpca.reporting.tables.backbones import CLASSIC, encoder_title
+from gpca.reporting.tables.explainers import GPCA_FORMS
+from gpca.reporting.tables.kernel_grid import PRINTED
+
+
+def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return what stands in the braces of paths: one value, or the list of all.
+
+    Args:
+        config: that :func:`gpca.config.check.check` has checked.
+        sources: name -> its resolved entry.
+    """
+    frames, kernels = config["real_world"], config["kernels"]
+    backbones = [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
+    strategies = list(config["active_learning"]["strategies"])
+    return {
+        "source": list(sources),
+        "seed": list(config["seeds"]),
+        "first_seed": str(config["seeds"][0]),
+        "explainer": list(config["explainers"]),
+        "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
+        "learner": list(config["learners"]),
+        "strategy": strategies,
+        "pool_strategy": [name for name in strategies if name in STRATEGIES],
+        "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
+        "shown_source": config["figures"]["source"],
+        "kernel_source": list(kernels["sources"]),
+        "printed_kernels": [kernel for kernel, rate, n in PRINTED if _is_fitted(kernels, kernel, rate, n)],
+        "frames": REAL_WORLD,
+        "backbone": backbones,
+        "first_backbone": backbones[0],
+        "classic": [name for name in CLASSIC if name in config["explainers"]],
+    }
+
+
+def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return what tables and figures show besides numbers: titles by name, and conditions of the protocol."""
+    frames, recovery, learning = config["real_world"], config["recovery"], config["active_learning"]
+    shown = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
+    of_frames = {"title": frames["title"], "stand_in": not frames["datasets"]}
+    entries = {name: explainer_entry(name) for name in config["explainers"]}
+    first_reduction = next(iter(frames["reductions"]))
+    return {
+        "sources": shown,
+        "source_titles": {name: title_of(entry) for name, entry in shown.items()},
+        "shown_title": title_of(shown[config["figures"]["source"]]),
+        "frames": of_frames,
+        "frames_title": title_of(of_frames),
+        "model": {**shown, REAL_WORLD: of_frames}[config["model"]["source"]],
+        "model_title": title_of({**shown, REAL_WORLD: of_frames}[config["model"]["source"]]),
+        "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
+        "explainer_titles": {name: entry.title for name, entry in entries.items()},
+        "learners": {
+            name: explainer_entry(name).title.removesuffix(" on the embedding") for name in config["learners"]
+        },
+        "strategies": {
+            name: STRATEGIES[name].title if name in STRATEGIES else STREAMS[name] for name in learning["strategies"]
+        },
+        "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
+        "target": learning["target"],
+        "batch": learning["batch"],
+        "test_samples": config["registrations"]["test"],
+        "kernel_sources": {name: shown[name] for name in shown if name in config["kernels"]["sources"]},
+        "encoder_title": encoder_title(**config["embedding"]),
+        "backbones": {name: config["encoders"][name] for name in frames["backbones"]},
+        "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],
+        "backbone_reductions": list(frames["reductions"]),
+        "policies": {name: policy_entry(name, tuple(recovery["actions"])).title for name in recovery["policies"]},
+        "treatments": recovery["treatments"],
+        "budget": recovery["loop"]["budget"],
+    }
+
+
+def explainer_of(method: str, names: Mapping[str, Any]) -> str:
+    """Return the explainer behind a row of predictions: itself, or GP-CA for a ``{backbone}-{reduction}``."""
+    return "gpca" if method in names["backbone"] else method
+
+
+def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
+    """Return what an explainer reads besides the registrations: option of the step ``attribute`` -> pattern of files.
+
+    ``input_timings`` are the seconds that were spent before it starts.
+    """
+    entry = explainer_entry(explainer_of(method, names))
+    encoder, reduction = method.split("-") if method in names["backbone"] else names["embedding"].split("/")
+    if entry.reads == "embeddings":
+        return {
+            "input_timings": f"timings/{{source}}/{encoder}/seed{{seed}}.csv",
+            "embeddings": f"embeddings/{{source}}/{encoder}/{reduction}/seed{{seed}}.npz",
+        }
+    files = {"input_timings": "timings/{source}/icp/seed{seed}.csv"}
+    if entry.design:
+        files["uncertainty"] = f"uncertainty/{{source}}/{entry.design}/seed{{seed}}.npz"
+        files["uncertainty_timings"] = f"timings/{{source}}/uncertainty_{entry.design}/seed{{seed}}.csv"
+    return files
+
+
+def _is_fitted(kernels: Mapping, kernel: str, rate: float, iterations: int) -> bool:
+    return kernel in kernels["kernels"] and rate in kernels["learning_rates"] and iterations in kernels["iterations"]

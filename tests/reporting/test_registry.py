@@ -1,0 +1,145 @@
+import inspect
+import json
+
+import pytest
+
+from gpca.reporting import registry
+from gpca.reporting.page.page import rendered_caption
+from gpca.reporting.registry import (
+    Input,
+    Result,
+    build,
+    by_section,
+    load,
+    registered,
+    results_of,
+    targets,
+    unknown_target,
+)
+
+NAMES = {"source": ["ycb", "mine"], "seed": [0, 1], "first_seed": "0", "explainer": ["gpca", "forest"], "gpca": "gpca"}
+ENTRIES = {result.name: result for result in registered()}
+
+
+def result(*inputs, **fields):
+    nothing = {"settings": {}, "only": {}, "needs": (), "paper": False}
+    head = {"name": "table9_mine", "kind": "tables", "section": "S", "title": "T", "caption": "C.", "builder": "m:f"}
+    return Result(**head | {"inputs": inputs} | nothing | fields)
+
+
+def given(pattern, **fields):
+    return Input("metrics", {"": (pattern,)}, **fields)
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_every_builder_and_reader_takes_what_its_entry_gives(name):
+    entry = ENTRIES[name]
+    paths = {"pdf_path", "png_path"} if entry.kind == "figures" else set()
+    builder = inspect.signature(load(entry.builder))
+    builder.bind(**dict.fromkeys({each.argument for each in entry.inputs} | set(entry.settings) | paths))
+    for each in entry.inputs:
+        if each.read:
+            keywords = {key: None for key in each.files if key}
+            inspect.signature(load(each.read)).bind(*[None for key in each.files if not key], **keywords)
+        else:
+            assert set(each.files) == {""}
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_a_caption_is_whole_text(name):
+    html = str(rendered_caption(name, ENTRIES[name].caption))
+    assert html.startswith("<p>")
+    assert html.rstrip().endswith(".</p>")
+    assert "``" not in html
+
+
+def test_no_name_is_registered_twice():
+    assert len(ENTRIES) == len(registered())
+
+
+def test_the_papers_seven_tables_and_six_figures_are_marked():
+    paper = {name.split("_")[0] for name, entry in ENTRIES.items() if entry.paper}
+    assert paper == {*(f"table{n}" for n in range(1, 8)), *(f"fig{n}" for n in range(1, 7))}
+
+
+def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
+    entry = result(given("predictions/{source}/{explainer}/seed{seed}.csv"), only={"explainer": ("gpca", "gone")})
+    assert entry.files(NAMES) == {
+        "metrics": [f"predictions/{source}/gpca/seed{seed}.csv" for source in ("ycb", "mine") for seed in (0, 1)]
+    }
+    assert result(given("metrics.csv")).files(NAMES) == {"metrics": "metrics.csv"}
+    assert result(given("recovery/policy_seed{first_seed}.json")).files(NAMES)["metrics"].endswith("seed0.json")
+
+
+def test_a_result_of_which_a_name_is_empty_is_left_out():
+    entry = result(given("predictions/{gpca}.csv"))
+    assert entry.is_made(NAMES)
+    assert not entry.is_made(NAMES | {"gpca": ""})
+    assert not result(given("x/{explainer}.csv"), only={"explainer": ("gone",)}).is_made(NAMES)
+    assert not result(given("metrics.csv"), needs=("explainer",)).is_made(NAMES | {"explainer": []})
+
+
+def test_one_entry_stands_for_a_figure_of_each_source(monkeypatch):
+    objects = result(
+        given("objects/{source}.npz"),
+        name="objects_{source}",
+        title="Objects: {source}",
+        settings={"title": "source_titles.{source}"},
+    )
+    monkeypatch.setattr(registry, "registered", lambda: (objects,))
+    ycb, mine = results_of(NAMES)
+    assert (ycb.name, mine.title) == ("objects_ycb", "Objects: mine")
+    assert ycb.files(NAMES) == {"metrics": "objects/ycb.npz"}
+    assert mine.arguments({"source_titles": {"ycb": "YCB", "mine": "Mine"}}) == {"title": "Mine"}
+
+
+def test_a_builder_is_given_what_was_read_and_what_the_run_shows(tmp_path):
+    path = tmp_path / "given.json"
+    path.write_text("[1, 2]")
+    readers = {
+        "iterable": {"function": "tests.reporting.test_registry:read", "keywords": {"": "iterable"}},
+        "key": {"function": "", "keywords": {"": "key"}},
+    }
+    built = build("tests.reporting.test_registry:show", readers, {"iterable": str(path), "key": "a"}, {"reverse": True})
+    assert built == ([1, 2], "a", True)
+
+
+def read(path):
+    with open(path) as file:
+        return json.load(file)
+
+
+def show(iterable, key, reverse):
+    return iterable, key, reverse
+
+
+def test_a_reader_of_several_kinds_of_files_is_given_each_by_its_keyword():
+    both = Input("learned", {"a": ("a.csv",), "b": ("b.csv",)}, "tests.reporting.test_registry:joined")
+    entry = result(both)
+    assert entry.files(NAMES) == {"learned_a": "a.csv", "learned_b": "b.csv"}
+    built = build("tests.reporting.test_registry:only", entry.readers, entry.files(NAMES), {})
+    assert built == "a.csv and b.csv"
+
+
+def joined(a, b):
+    return f"{a} and {b}"
+
+
+def only(learned):
+    return learned
+
+
+def test_short_names_are_those_of_the_paper_and_the_first_of_a_number():
+    names = ["table1_single", "table1_extended", "fig2_overview", "reliability", "fig_attribution_confusions"]
+    short = targets(result(name=name) for name in names)
+    assert {key: value.name for key, value in short.items()} == {"table1": "table1_single", "fig2": "fig2_overview"}
+
+
+def test_a_misspelt_target_is_answered_by_the_nearest_or_by_all():
+    assert unknown_target("tabel2", ["table2", "page"]).endswith("did you mean table2?")
+    assert unknown_target("xyz", ["table2", "page"]).endswith("known are page, table2")
+
+
+def test_results_stand_by_section_in_order():
+    a, b, c = (result(name=name, section=section) for name, section in (("a", "II"), ("b", "I"), ("c", "II")))
+    assert by_section([a, b, c]) == {"II": [a, c], "I": [b]}

@@ -1,0 +1,64 @@
+"""What a run consists of, worked out from the config that the suite ships."""
+
+from copy import deepcopy
+
+import pytest
+
+from gpca.config.check import check
+from gpca.reporting.registry import results_of
+from gpca.reporting.run import explainer_of, files_behind, names_of, settings_of
+
+from ..config.test_check import load
+
+
+@pytest.fixture(scope="module")
+def config():
+    return load()
+
+
+@pytest.fixture(scope="module")
+def sources(config):
+    return check(deepcopy(config))
+
+
+def test_every_place_that_the_registry_names_is_there(config, sources):
+    names, settings = names_of(config, sources), settings_of(config, sources)
+    results = results_of(names)
+    assert len(results) == 33
+    for result in results:
+        assert all(files for files in result.files(names).values())
+        result.arguments(settings)
+
+
+def test_tables_of_what_a_run_leaves_out_are_not_made(config, sources):
+    smaller = deepcopy(config)
+    smaller["explainers"] = {"softmax_head": {}}
+    made = {result.name for result in results_of(names_of(smaller, sources))}
+    assert not made & {"table1_single_baselines", "table2_per_concept", "fig2_overview", "fig4_pipeline"}
+    assert "table1_extended" in made
+
+
+def test_the_rows_of_table_6_are_gp_ca_on_their_own_embeddings(config, sources):
+    names = names_of(config, sources)
+    assert explainer_of("pointnet-pca", names) == "gpca"
+    assert explainer_of("residuals_forest", names) == "residuals_forest"
+    assert files_behind("pointnet-pca", names) == {
+        "input_timings": "timings/{source}/pointnet/seed{seed}.csv",
+        "embeddings": "embeddings/{source}/pointnet/pca/seed{seed}.npz",
+    }
+    assert files_behind("gpca", names)["embeddings"] == "embeddings/{source}/dgcnn/none/seed{seed}.npz"
+
+
+def test_an_explainer_of_uncertainties_is_given_its_design(config, sources):
+    behind = files_behind("shap_oracle", names_of(config, sources))
+    assert behind == {
+        "input_timings": "timings/{source}/icp/seed{seed}.csv",
+        "uncertainty": "uncertainty/{source}/oracle/seed{seed}.npz",
+        "uncertainty_timings": "timings/{source}/uncertainty_oracle/seed{seed}.csv",
+    }
+
+
+def test_a_stand_in_says_so_wherever_its_title_stands(config, sources):
+    settings = settings_of(config, sources)
+    for title in (*settings["source_titles"].values(), settings["frames_title"], settings["model_title"]):
+        assert "procedural stand-in" in title

@@ -1,0 +1,129 @@
+# Samples unlike those of the training -> predictions of every learner on them -> diagnostics.csv.
+ENCODER = config["embedding"]["encoder"]
+# A learner that is an explainer of the config too has its settings, and those of its own besides.
+LEARNER_SETTINGS = {
+    name: (config["explainers"].get(name) or {}) | (own or {})
+    for name, own in config["learners"].items()
+}
+
+
+rule shifted:
+    input:
+        collect("<results>/shifted/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS),
+
+
+rule learners:
+    input:
+        collect(
+            "<results>/learners/{source}/{learner}/seed{seed}.csv",
+            source=SOURCES,
+            learner=LEARNER_SETTINGS,
+            seed=SEEDS,
+        ),
+
+
+rule shift:
+    input:
+        objects="<results>/objects/{source}.npz",
+        registrations=collect(
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
+        ),
+        embeddings=collect(
+            f"<results>/embeddings/{{{{source}}}}/{EMBEDDING}/seed{{seed}}.npz",
+            seed=SEEDS,
+        ),
+        encoders=collect(
+            f"<results>/encoders/{{{{source}}}}/{ENCODER}/seed{{seed}}.pt", seed=SEEDS
+        ),
+        # Of a source that the encoder never saw, the first other one.
+        other=lambda wildcards: collect(
+            "<results>/registrations/{source}/seed{seed}.npz",
+            source=[name for name in SOURCES if name != wildcards.source][:1],
+            seed=SEEDS,
+        ),
+        code=code_files("gpca.steps.shift", encoder_module(ENCODER)),
+    output:
+        collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
+    log:
+        "<logs>/shifted/{source}.log",
+    benchmark:
+        "<benchmarks>/shifted/{source}.tsv"
+    priority: 6
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(
+            {
+                "shift": config["shift"],
+                "registrations": config["registrations"],
+                "encoder": config["encoders"][ENCODER],
+            }
+        ),
+        seeds=SEEDS,
+        other=lambda wildcards, input: (
+            ["--other-registrations", *input.other] if input.get("other") else []
+        ),
+    shell:
+        "python -m gpca shift --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "--objects {input.objects} --registrations {input.registrations} {params.other} "
+        "--embeddings {input.embeddings} --encoders {input.encoders} --settings {params.settings:q} "
+        "--out {output} 2> {log}"
+
+
+rule fit_learners:
+    input:
+        sets=collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
+        code=code_files("gpca.steps.learn", *map(explainer_module, LEARNER_SETTINGS)),
+    output:
+        collect(
+            "<results>/learners/{{source}}/{learner}/seed{seed}.csv",
+            learner=LEARNER_SETTINGS,
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/learners/{source}.log",
+    benchmark:
+        "<benchmarks>/learners/{source}.tsv"
+    priority: 4
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(LEARNER_SETTINGS),
+        learners=list(LEARNER_SETTINGS),
+        seeds=SEEDS,
+    shell:
+        "python -m gpca learn --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "--learners {params.learners} --settings {params.settings:q} --sets {input.sets} "
+        "--out {output} 2> {log}"
+
+
+rule diagnostics:
+    input:
+        prediction_files=rules.learners.input,
+        set_files=rules.shifted.input,
+        code=collector_code("gpca.shift.metrics:collect_diagnostics"),
+    output:
+        "<results>/diagnostics.csv",
+    log:
+        "<logs>/diagnostics.log",
+    benchmark:
+        "<benchmarks>/diagnostics.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.shift.metrics:collect_diagnostics",
+    script:
+        "../scripts/collect.py"

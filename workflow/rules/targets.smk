@@ -1,0 +1,54 @@
+# What else can be asked for by name: numbers of the paper's (table2, fig5), the smoke run.
+from gpca.reporting.registry import targets, unknown_target
+
+SHORT = targets(RESULTS)
+
+
+for short, result in SHORT.items():
+
+    rule:
+        name:
+            short
+        input:
+            f"<results>/{result.main_file}",
+
+
+# Of another config, so another Snakemake runs it.
+rule smoke:
+    output:
+        touch("results/smoke/complete"),
+    log:
+        "results/logs/smoke.log",
+    conda:
+        "../envs/gpca.yaml"
+    threads: 2
+    resources:
+        mem_mb=4000,
+    params:
+        snakefile=workflow.main_snakefile,
+        config=workflow.source_path("../../config/smoke.yaml"),
+    shell:
+        "python -m snakemake --snakefile {params.snakefile} -j{threads} all --configfile {params.config} "
+        "--nolock 2>&1 | tee {log} >&2"
+
+
+# A target that is no rule's name is taken for a file; without a folder it is a name that was misspelt.
+rule misspelt:
+    input:
+        lambda wildcards: sys.exit(
+            unknown_target(
+                wildcards.name,
+                [rule.name for rule in workflow.rules if not rule.has_wildcards()],
+            )
+        ),
+    output:
+        "{name}",
+    log:
+        "<logs>/{name}.log",
+    wildcard_constraints:
+        name=r"\w+",
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    shell:
+        "exit 2"
