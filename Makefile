@@ -88,13 +88,13 @@ endef
 	.venv/bin/python -m gpca.environment
 	touch $@
 
-lock: ## renew environment.lock from environment.in, in a fresh environment
+lock: ## renew environment.lock from what pyproject.toml names, in a fresh environment
 	@$(choose_python)
 	rm -rf build/lock
 	$$python -m venv build/lock
-	build/lock/bin/python $(INSTALL) -r environment.in
-	# The build of torch is the user's choice: neither its local version nor its CUDA packages belong into the lock.
-	build/lock/bin/python -m pip freeze --all --exclude pip --exclude wheel \
+	build/lock/bin/python $(INSTALL) '.[workflow,dev]'
+	# The suite itself is no package of the lock. The build of torch is the user's choice: neither its local version nor its CUDA packages belong into the lock.
+	build/lock/bin/python -m pip freeze --all --exclude pip --exclude wheel --exclude gpca-bench \
 	    | sed -E -e '/^(nvidia|cuda|triton)/Id' -e 's/\+[A-Za-z0-9.]+$$//' > build/lock/packages
 	{ sed '/^[^#]/,$$d' environment.lock; cat build/lock/packages; } > build/lock/environment.lock
 	mv build/lock/environment.lock environment.lock

@@ -2,20 +2,21 @@
 # and stage is a target by its name: `snakemake -j2 table2`, `fig5`, `objects`, `paper` (what the paper shows).
 import sys
 
-sys.path.insert(0, workflow.basedir)
-from gpca.config import check as run_config
+sys.path.insert(0, str(workflow.current_basedir))
+from gpca.config.check import check
+from gpca.config.jobs import export_to_jobs
 from gpca.errors import InputError
 
 
-configfile: f"{workflow.basedir}/config/sources.yaml"
-configfile: f"{workflow.basedir}/config/config.yaml"
+configfile: f"{workflow.current_basedir}/config/sources.yaml"
+configfile: f"{workflow.current_basedir}/config/config.yaml"
 
 
 try:
-    SOURCES = run_config.check(config)
+    SOURCES = check(config)
 except InputError as fault:
     sys.exit(f"gpca: {fault}")
-run_config.export(config)
+export_to_jobs(config)
 
 
 pathvars:

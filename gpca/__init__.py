@@ -1,11 +1,13 @@
 """GP-CA Bench: Gaussian-process concept attribution for point cloud registration, and its rivals."""
 
+__version__ = "0.1.0"  # the one place: pyproject.toml reads it here, and CITATION.cff is held to it by a test
+
 _EXPORTS = {
     "CanonicalFrame": "gpca.alignment.canonical_frame",
     "Explainer": "gpca.model.explainer",
     "Explanation": "gpca.model.explanation",
 }
-__all__ = list(_EXPORTS)
+__all__ = ["__version__", *_EXPORTS]
 
 
 def __getattr__(name: str):

@@ -1,4 +1,4 @@
-"""``python -m gpca <step> …``: the steps of the workflow, each usable by hand."""
+"""The command ``gpca <step> …``, or ``python -m gpca <step> …``: the steps of the workflow, each usable by hand."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import json
 import os
 import sys
 from importlib import import_module
+from pathlib import Path
 
+from gpca import __version__
 from gpca.errors import InputError
 
 STEPS = {
@@ -60,7 +62,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(arguments: list[str], chosen: str | None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m gpca", description=__doc__)
+    command = "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
+    parser = argparse.ArgumentParser(prog=command, description="The steps of the workflow, each usable by hand.")
+    parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
     for name, summary in STEPS.items():
         step = steps.add_parser(name, help=summary, description=summary)

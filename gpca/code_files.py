@@ -6,7 +6,7 @@ import ast
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parent.parent  # the folder that holds both packages: a checkout, or site-packages
 PACKAGES = ("gpca", "baselines")
 BESIDE = {  # what a module reads from its own folder
     "gpca.comparison.published": "published.csv",
@@ -20,7 +20,8 @@ def code_files(*modules: str) -> list[str]:
     """Return the files of the given modules and of all project modules they import, anywhere in their text.
 
     What is imported only for type checking never runs, so it does not count; a file in `BESIDE` counts with its module.
-    Paths are relative to the project's folder, sorted. Modules chosen by name at run time (kinds of source, encoders,
+    Paths are sorted, and lead there from the working directory: relative where the packages lie below it, as in a run
+    at the root of a checkout, else absolute. Modules chosen by name at run time (kinds of source, encoders,
     explainers) are not seen and have to be given.
     """
     found: set[str] = set()
@@ -33,7 +34,9 @@ def code_files(*modules: str) -> list[str]:
     files = [_file_of(module) for module in found]
     for module in found.intersection(BESIDE):
         files += _file_of(module).parent.glob(BESIDE[module])
-    return sorted(str(file.relative_to(ROOT)) for file in files)
+    working = Path.cwd().resolve()  # as ROOT is
+    seen = ROOT.relative_to(working) if ROOT.is_relative_to(working) else ROOT
+    return sorted(str(seen / file.relative_to(ROOT)) for file in files)
 
 
 @cache

@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from gpca.files import sha256_of_file, whole_file
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
 CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # set by the Snakefile for its jobs
-_ROOT = Path(__file__).resolve().parent.parent
+_ROOT = Path(__file__).resolve().parent.parent  # of the checkout, or the site-packages that gpca is installed in
 
 
 @contextmanager
@@ -28,6 +29,9 @@ def record_provenance(
     outputs: Sequence[Path | str], inputs: Sequence[Path | str], settings: Mapping, seed: int | None = None
 ) -> Iterator[None]:
     """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.
+
+    The commit and the hash of environment.lock are those of the checkout that the package lies in; where it is
+    installed elsewhere they are null, and the package's version is all that is known of the code.
 
     Args:
         outputs, inputs: files; the inputs are hashed (SHA-256).
@@ -45,7 +49,7 @@ def record_provenance(
         "config_sha256": os.environ.get(CONFIG_VARIABLE),
         "inputs_sha256": {str(path): sha256_of_file(path) for path in inputs},
         "code": _code_version(),
-        "environment_lock_sha256": sha256_of_file(_ROOT / "environment.lock"),
+        "environment_lock_sha256": sha256_of_file(lock) if (lock := _ROOT / "environment.lock").is_file() else None,
         "device": _device(),
         "python": platform.python_version(),
         "libraries": _library_versions(),
@@ -61,16 +65,27 @@ def sha256_of_settings(settings: Mapping) -> str:
 
 
 def _code_version() -> dict[str, object]:
-    """The commit and whether tracked files differ from it; nulls outside a git checkout, or without git."""
-    if shutil.which("git") is None:
-        return {"commit": None, "dirty": None}
-    commit, changes = (
-        subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, check=False)
-        for arguments in (("rev-parse", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
-    )
-    if commit.returncode or changes.returncode:
-        return {"commit": None, "dirty": None}
-    return {"commit": commit.stdout.strip(), "dirty": bool(changes.stdout.strip())}
+    """The version, the commit, and whether tracked files differ from it.
+
+    Commit and changes are null without git and where git does not keep this package: a virtual environment may well lie
+    in the checkout of another project, whose commit says nothing of this code.
+    """
+    # No import statement: with gpca/__init__.py among the code of every step, a new version would rerun all of them.
+    installed = import_module("gpca").__version__
+    commit, changes, ours = None, None, False
+    if shutil.which("git") is not None:
+        ours = _git("ls-files", "--error-unmatch", "gpca/__init__.py") is not None
+    if ours:
+        commit, changes = _git("rev-parse", "HEAD"), _git("status", "--porcelain", "--untracked-files=no")
+    if not commit or changes is None:
+        return {"version": installed, "commit": None, "dirty": None}
+    return {"version": installed, "commit": commit, "dirty": bool(changes)}
+
+
+def _git(*arguments: str) -> str | None:
+    """What git says about the folder of the package, or None where it fails."""
+    done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, check=False)
+    return None if done.returncode else done.stdout.strip()
 
 
 def cpu_name() -> str:

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-NOT_OURS = {"__pycache__", "data", "build"}
+NOT_OURS = {"__pycache__", "data", "build", "gpca_bench.egg-info"}  # the last two are left by pip
 
 
 def our_files():

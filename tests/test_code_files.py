@@ -30,6 +30,7 @@ def project(tmp_path, monkeypatch):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(module_under_test, "ROOT", tmp_path)
+    monkeypatch.chdir(tmp_path)
     module_under_test._imports.cache_clear()
     yield tmp_path
     module_under_test._imports.cache_clear()
@@ -52,11 +53,24 @@ def test_imports_are_followed_wherever_they_stand(project, modules, expected):
     assert code_files(*modules) == expected
 
 
-def test_paths_are_sorted_relative_and_there():
+def test_paths_are_those_that_the_working_directory_sees(project, tmp_path_factory, monkeypatch):
+    files = ["gpca/__init__.py", "gpca/base.py", "gpca/middle.py"]
+    assert code_files("gpca.middle") == files
+    monkeypatch.chdir(tmp_path_factory.mktemp("elsewhere"))
+    assert code_files("gpca.middle") == [f"{project}/{file}" for file in files]
+    monkeypatch.chdir(project / "gpca")
+    assert code_files("gpca.middle") == [f"{project}/{file}" for file in files]
+    monkeypatch.chdir(project.parent)
+    assert code_files("gpca.middle") == [f"{project.name}/{file}" for file in files]
+
+
+def test_paths_are_sorted_and_there(monkeypatch):
+    monkeypatch.chdir(ROOT)
     files = code_files("gpca.steps.attribute", "gpca.explainers.interface")
     assert files == sorted(set(files))
     for file in files:
         assert (ROOT / file).is_file()
+        assert file.startswith(("gpca/", "baselines/"))
 
 
 STEPS = {

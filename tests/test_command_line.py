@@ -12,6 +12,7 @@ import time
 import numpy as np
 import pytest
 
+import gpca
 from gpca import __main__ as command_line
 from gpca.__main__ import STEPS, main
 from gpca.code_files import ROOT
@@ -553,6 +554,30 @@ def test_help_and_wrong_usage_need_no_heavy_library():
     assert done.stdout.endswith("set()\n")
     for step in STEPS:
         assert step in done.stdout
+
+
+@pytest.mark.parametrize("step", [None, *STEPS])
+def test_help_is_plain_text(capsys, step):
+    with pytest.raises(SystemExit) as caught:
+        main([step, "--help"] if step else ["--help"])
+    assert caught.value.code == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"usage: python -m gpca {step or ''}")
+    assert not re.search(r"`|:\w+:|None", out), out
+
+
+def test_the_command_goes_by_the_name_that_it_was_called_by(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["/somewhere/bin/gpca"])
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert capsys.readouterr().out.startswith("usage: gpca [-h] [--version] step")
+
+
+def test_the_version(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0
+    assert capsys.readouterr().out == f"gpca {gpca.__version__}\n"
 
 
 @pytest.mark.parametrize("words", [[], ["nosuchstep"], ["train", "--seed", "one"], ["objects"]])

@@ -70,16 +70,17 @@ def options_of(program):
     return set(re.findall(r"--[\w-]+", shown.stdout))
 
 
-@pytest.mark.parametrize("command", commands("python "))
+@pytest.mark.parametrize("command", [*commands("python "), *commands("gpca ")])
 def test_every_python_command_names_something_that_is_there(command):
-    words = shlex.split(command)[1:]
+    words = shlex.split(command.replace("gpca", "python -m gpca", command.startswith("gpca ")))[1:]
     flags = {word.split("=")[0] for word in words if word.startswith("--")}
     if words[0] != "-m":
         assert (ROOT / words[0]).is_file()
         assert not flags or flags <= options_of(words[0])
     elif words[1] == "gpca":
-        assert words[2] in STEPS or words[2] in ("<step>", "--help")
-        assert words[2] not in STEPS or flags <= options_of(words[2])
+        step = (*words[2:], "--help")[0]
+        assert step in STEPS or step in ("<step>", "--help", "--version")
+        assert step not in STEPS or flags <= options_of(step)
     else:
         assert find_spec(words[1]) is not None
 

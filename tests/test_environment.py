@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import yaml
 
 from gpca.environment import require_open3d, system_library_hint
 
@@ -58,18 +57,3 @@ def test_a_failing_import_is_one_line_and_status_2(tmp_path, package, expected):
     assert run.stderr.count("\n") == 1
     assert run.stderr.startswith("Open3D: cannot be imported")
     assert expected in run.stderr
-
-
-def test_the_lock_pins_every_package_and_no_build():
-    packages = [line for line in (ROOT / "environment.lock").read_text().splitlines() if line and line[0] != "#"]
-    direct = [line for line in (ROOT / "environment.in").read_text().splitlines() if line and line[0] != "#"]
-    assert all(line.count("==") == 1 and "+" not in line and "@" not in line for line in packages)
-    assert not [line for line in packages if line.lower().startswith(("nvidia", "cuda", "triton"))]
-    names = {line.split("==")[0].lower().replace("_", "-") for line in packages}
-    assert {line.split("==")[0].lower().replace("_", "-") for line in direct} <= names
-
-
-def test_the_conda_environment_of_the_rules_holds_the_lock():
-    lock = [line for line in (ROOT / "environment.lock").read_text().splitlines() if line and line[0].isalnum()]
-    conda = yaml.safe_load((ROOT / "workflow" / "envs" / "gpca.yaml").read_text())
-    assert conda["dependencies"][-1]["pip"] == lock

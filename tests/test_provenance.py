@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from gpca import provenance
+from gpca import __version__, provenance
 from gpca.provenance import record_provenance, sha256_of_settings
 
 
@@ -37,7 +37,8 @@ def test_the_sidecar_says_where_a_result_comes_from(record, tmp_path):
     assert 0.02 <= record["seconds"] < 5
     assert 10 < record["peak_memory_mb"] < 1e6
     assert "cores" in record["device"]
-    assert set(record["code"]) == {"commit", "dirty"}
+    assert set(record["code"]) == {"version", "commit", "dirty"}
+    assert record["code"]["version"] == __version__
 
 
 def test_another_setting_gives_another_hash():
@@ -51,28 +52,52 @@ def test_a_failed_block_leaves_no_sidecar(tmp_path):
 
 
 @pytest.fixture
-def checkout(tmp_path, monkeypatch):
+def git_at(monkeypatch):
+    """Makes a package in a folder, and a commit there of all files that are given."""
     if shutil.which("git") is None:
         pytest.skip("needs git")
-    identity = ["-c", "user.name=A", "-c", "user.email=a@b.org"]
-    for command in (["init"], ["add", "."], [*identity, "commit", "-m", "first"]):
-        (tmp_path / "code.py").write_text("one = 1\n")
-        subprocess.run(["git", "-C", tmp_path, *command], check=True, capture_output=True)
-    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
-    return tmp_path
+
+    def make(package, repository, *kept):
+        (package / "gpca").mkdir(parents=True)
+        (package / "gpca/__init__.py").write_text("one = 1\n")
+        identity = ["-c", "user.name=A", "-c", "user.email=a@b.org"]
+        for command in (["init"], ["add", "--", *kept], [*identity, "commit", "--allow-empty", "-m", "first"]):
+            subprocess.run(["git", "-C", repository, *command], check=True, capture_output=True)
+        monkeypatch.setattr(provenance, "_ROOT", package)
+
+    return make
 
 
-def test_the_code_version_tells_the_commit_and_whether_it_was_edited(checkout):
-    head = subprocess.run(["git", "-C", checkout, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
-    assert provenance._code_version() == {"commit": head.stdout.strip(), "dirty": False}
-    (checkout / "result.csv").write_text("untracked files are no code\n")
+def test_the_code_version_tells_the_commit_and_whether_it_was_edited(git_at, tmp_path):
+    git_at(tmp_path, tmp_path, "gpca")
+    head = subprocess.run(["git", "-C", tmp_path, "rev-parse", "HEAD"], capture_output=True, text=True, check=True)
+    assert provenance._code_version() == {"version": __version__, "commit": head.stdout.strip(), "dirty": False}
+    (tmp_path / "result.csv").write_text("untracked files are no code\n")
     assert provenance._code_version()["dirty"] is False
-    (checkout / "code.py").write_text("one = 2\n")
+    (tmp_path / "gpca/__init__.py").write_text("one = 2\n")
     assert provenance._code_version()["dirty"] is True
+
+
+UNKNOWN = {"version": __version__, "commit": None, "dirty": None}
 
 
 def test_no_checkout_and_no_git_are_no_fault(tmp_path, monkeypatch):
     monkeypatch.setattr(provenance, "_ROOT", tmp_path)
-    assert provenance._code_version() == {"commit": None, "dirty": None}
+    assert provenance._code_version() == UNKNOWN
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert provenance._code_version() == {"commit": None, "dirty": None}
+    assert provenance._code_version() == UNKNOWN
+
+
+def test_a_checkout_of_something_else_around_the_package_is_not_its_own(git_at, tmp_path):
+    (tmp_path / "analysis.py").write_text("one = 1\n")
+    git_at(tmp_path / "venv/site-packages", tmp_path, "analysis.py")
+    assert provenance._code_version() == UNKNOWN
+
+
+def test_a_package_without_a_lock_beside_it_has_no_hash_of_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    with record_provenance([tmp_path / "out.csv"], [], {}):
+        pass
+    record = json.loads((tmp_path / "out.csv.provenance.json").read_text())
+    assert record["environment_lock_sha256"] is None
+    assert record["code"] == UNKNOWN

@@ -23,7 +23,7 @@ from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 FORMAT, VERSION = "GP-CA model", 2
 VARIABLE = "GPCA_MODEL"  # of the environment: the file that is taken where none is named
-RESULTS = Path(__file__).resolve().parents[2] / "results"
+RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
 BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
 REMEDY = "make one with 'make results', or alone with 'snakemake -j2 results/embedded/model.pt'"
 
@@ -111,8 +111,8 @@ class Model:
 def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path:
     """Return the model that is meant: the given one, that of the environment, or one that the workflow made.
 
-    Of those in `results`, that of the run ``real`` comes first, then ``embedded``, then the newest of any other, and
-    ``smoke`` last.
+    Of those in `results`, by default the folder of that name in the working directory, that of the run ``real`` comes
+    first, then ``embedded``, then the newest of any other, and ``smoke`` last.
 
     Raises:
         InputError: there is none.
@@ -131,5 +131,7 @@ def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path
 
     found = sorted(results.glob("*/model.pt"), key=rank)
     if not found:
-        raise InputError("no model", f"none in {results}", f"{REMEDY}, or name one with --model or {VARIABLE}")
+        raise InputError(
+            "no model", f"none in {results.absolute()}", f"{REMEDY}, or name one with --model or {VARIABLE}"
+        )
     return found[0]

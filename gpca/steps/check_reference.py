@@ -8,16 +8,20 @@ from pathlib import Path
 
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.comparison.reference import check_reference
 from gpca.errors import InputError
 from gpca.settings import check_settings
+
+CONFIG = Path("config/config.yaml")  # as seen from the folder of the suite, where its commands are given
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the folders; ``--settings`` replaces keys of the config's section ``reference``."""
     parser.add_argument("folder", type=Path, help="folder of the run, such as results/real")
     parser.add_argument("--reference", type=Path, help="its reference (default: reference/ beside it, same name)")
+    parser.add_argument(
+        "--config", type=Path, default=CONFIG, help=f"file whose section reference says what agrees (default: {CONFIG})"
+    )
 
 
 def run(options: Namespace) -> int:
@@ -25,8 +29,7 @@ def run(options: Namespace) -> int:
     if not options.folder.is_dir():
         raise InputError(options.folder, "no such folder", f"make it with '{_command(options.folder, [])}'")
     reference = options.reference or options.folder.parent / "reference" / options.folder.name
-    config = yaml.safe_load((ROOT / "config/config.yaml").read_text(encoding="utf-8"))
-    settings = config["reference"] | options.settings
+    settings = _section(options.config) | options.settings
     check_settings(settings, "reference")
     outcomes = check_reference(options.folder, reference, settings["tolerances"], settings["half_widths"])
     width = max(len(outcome.file) for outcome in outcomes)
@@ -40,8 +43,23 @@ def run(options: Namespace) -> int:
     return 1 if differ or missing else 0
 
 
+def _section(config: Path) -> dict:
+    """Return the section ``reference`` of a config."""
+    if not config.is_file():
+        raise InputError(config, "no such file", "run this in the folder of the suite, or name the file with --config")
+    try:
+        section = yaml.safe_load(config.read_text(encoding="utf-8"))["reference"]
+    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError) as fault:
+        raise InputError(
+            config, "holds no section reference", f"name another file with --config, as {CONFIG}"
+        ) from fault
+    if not isinstance(section, dict) or not {"tolerances", "half_widths"} <= set(section):
+        raise InputError(config, "its section reference lacks tolerances or half_widths", f"complete it as in {CONFIG}")
+    return section
+
+
 def _command(folder: Path, targets: list[str]) -> str:
     """Return the command that makes targets of a run; a table's CSV comes with its Markdown."""
-    config = f"config/{folder.name}.yaml"
-    option = f" --configfile {config}" if (ROOT / config).is_file() else ""
+    config = Path("config", f"{folder.name}.yaml")
+    option = f" --configfile {config}" if config.is_file() else ""
     return f"snakemake -j2 {' '.join(targets) or 'all'}{option}"

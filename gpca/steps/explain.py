@@ -23,7 +23,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("target", type=Path, help="the reference that it is aligned to")
     parser.add_argument("--init", type=Path, help="text file of T_target_source where ICP starts, 4×4 numbers")
     parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="of files and pose (default m)")
-    parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, or one in results/")
+    parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, or one in ./results/")
     parser.add_argument("--uncertainty", action="store_true", help="measure how the pose scatters by Monte-Carlo ICP")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 

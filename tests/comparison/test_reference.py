@@ -209,6 +209,34 @@ def test_settings_replace_the_configs(folders, capsys):
     assert "config key reference.tolerances: no kind" in one_line(capsys)
 
 
+def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert check(folders) == 2
+    assert "config/config.yaml: no such file; run this in the folder of the suite, or name" in one_line(capsys)
+    assert check(folders, "--config", str(ROOT / "config/config.yaml")) == 0
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/config.yaml").write_text(yaml.safe_dump({"reference": SETTINGS}))
+    assert check(folders) == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("seeds: [0]", "holds no section reference"),
+        ("- a list", "holds no section reference"),
+        ("a: b: c", "holds no section reference"),
+        ("reference: {tolerances: {}}", "lacks tolerances or half_widths"),
+        ("reference: 3", "lacks tolerances or half_widths"),
+    ],
+)
+def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_path, content, message):
+    (tmp_path / "own.yaml").write_text(content)
+    assert check(folders, "--config", str(tmp_path / "own.yaml")) == 2
+    line = one_line(capsys)
+    assert f"{tmp_path}/own.yaml: " in line
+    assert message in line
+
+
 @pytest.mark.parametrize(
     ("file", "quantity", "kind"),
     [

@@ -86,6 +86,16 @@ def test_the_best_model_of_the_workflow_is_taken(tmp_path, monkeypatch):
         (tmp_path / run / "model.pt").unlink()
 
 
+def test_results_are_those_below_the_working_directory(tmp_path, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=f"none in {tmp_path}/results; "):
+        model_path()
+    (tmp_path / "results/mine").mkdir(parents=True)
+    (tmp_path / "results/mine/model.pt").touch()
+    assert model_path().resolve() == tmp_path / "results/mine/model.pt"
+
+
 def test_a_named_model_comes_first(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(tmp_path / "lost.pt"))
     with pytest.raises(InputError, match=f"{VARIABLE}=.*lost.pt: no such model"):

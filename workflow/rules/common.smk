@@ -10,7 +10,7 @@ from gpca.reporting.run import names_of, settings_of
 
 # An own kind of source is a file in sources/ that writes <results>/objects/<name>.npz and adds itself to SOURCES.
 CONFIGURED_SOURCES = list(SOURCES)
-for path in sorted(Path(workflow.basedir, "workflow/rules/sources").glob("*.smk")):
+for path in sorted(Path(workflow.current_basedir, "sources").glob("*.smk")):
 
     include: path
 

@@ -1,0 +1,41 @@
+"""What the jobs of a run inherit from the process that plans them, through the environment."""
+
+from __future__ import annotations
+
+import os
+import sys
+import sysconfig
+from collections.abc import Mapping
+from pathlib import Path
+
+from gpca.code_files import ROOT
+from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
+
+# Where data lies, and how results are judged: two runs that differ in nothing else are runs of one config.
+OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
+
+
+def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
+    """Set environment variables such that jobs run this Python and this very code, wherever the working directory is.
+
+    PATH begins with this Python's folder: jobs call ``python``, which need not be the one that plans the run where its
+    environment is not activated. PYTHONPATH begins with `source_folder`, unless Python looks there anyway; and with
+    PYTHONSAFEPATH a ``gpca`` in the working directory, such as that of another checkout, is not taken for it. The hash
+    of the config, without what no result depends on, is for the provenance.
+
+    Args:
+        config: the whole configuration of the run.
+        source_folder: the folder that holds ``gpca`` and ``baselines``, by default that of the package itself.
+    """
+    os.environ[CONFIG_VARIABLE] = sha256_of_settings({k: v for k, v in config.items() if k not in OF_NO_RESULT})
+    _put_first("PATH", Path(sys.executable).parent)
+    source_folder = Path(source_folder).resolve()
+    if source_folder not in {Path(sysconfig.get_path(name)).resolve() for name in ("purelib", "platlib")}:
+        _put_first("PYTHONPATH", source_folder)
+    os.environ["PYTHONSAFEPATH"] = "1"
+
+
+def _put_first(variable: str, folder: Path) -> None:
+    """Put a folder at the head of a list of folders, where it stands once however often jobs start jobs."""
+    others = [name for name in os.environ.get(variable, "").split(os.pathsep) if name and name != str(folder)]
+    os.environ[variable] = os.pathsep.join([str(folder), *others])

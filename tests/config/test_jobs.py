@@ -1,0 +1,77 @@
+"""What jobs inherit: tested by a job, a Python in another folder."""
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+import yaml
+
+from gpca.code_files import ROOT
+from gpca.config.jobs import export_to_jobs
+
+CONFIG = {"seeds": [0], "data_dir": "data", "comparison": {}, "registrations": {"train": 800, "test": 200}}
+VARIABLES = ("GPCA_CONFIG_SHA256", "PATH", "PYTHONPATH", "PYTHONSAFEPATH")
+
+
+@pytest.fixture(autouse=True)
+def environment(monkeypatch):
+    """One with nothing of ours in it; what is exported goes when the test ends."""
+    for variable in VARIABLES:
+        monkeypatch.setenv(variable, "")
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")
+
+
+def job(folder, code):
+    done = subprocess.run(["python", "-c", code], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+def test_a_job_in_another_folder_runs_this_python_and_this_code(tmp_path):
+    export_to_jobs(CONFIG)
+    code = "import sys, gpca, baselines; print(sys.prefix, gpca.__file__, baselines.__file__)"
+    expected = [sys.prefix, f"{ROOT}/gpca/__init__.py", f"{ROOT}/baselines/__init__.py"]
+    assert job(tmp_path, code) == expected
+    (tmp_path / "gpca").mkdir()
+    (tmp_path / "gpca/__init__.py").write_text("raise SystemExit('the gpca of another checkout')\n")
+    assert job(tmp_path, code) == expected
+    done = subprocess.run(["python", "-m", "gpca", "--version"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout.startswith("gpca "), done.stderr
+
+
+def test_a_job_takes_the_code_of_the_folder_that_is_named(tmp_path):
+    (tmp_path / "gpca").mkdir()
+    (tmp_path / "gpca/__init__.py").write_text("")
+    export_to_jobs(CONFIG, tmp_path)
+    assert job(ROOT, "import gpca; print(gpca.__file__)") == [f"{tmp_path}/gpca/__init__.py"]
+
+
+def test_an_installed_package_is_found_without_pythonpath(monkeypatch):
+    """The packages of one Python in the path of another, as of a rule's own environment, would do harm."""
+    monkeypatch.setenv("PYTHONPATH", "/other")
+    export_to_jobs(CONFIG, sysconfig.get_path("purelib"))
+    assert os.environ["PYTHONPATH"] == "/other"
+
+
+def test_jobs_that_start_jobs_do_not_make_the_paths_longer(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", f"/other{os.pathsep}{ROOT}")
+    export_to_jobs(CONFIG)
+    first = {variable: os.environ[variable] for variable in VARIABLES}
+    export_to_jobs(CONFIG)
+    assert {variable: os.environ[variable] for variable in VARIABLES} == first
+    assert first["PYTHONPATH"].split(os.pathsep) == [str(ROOT), "/other"]
+    assert Path(shutil.which("python")).parent == Path(sys.executable).parent
+
+
+def test_the_hash_is_that_of_what_results_depend_on():
+    whole = yaml.safe_load((ROOT / "config/config.yaml").read_text())
+    hashes = []
+    for changed in ({}, {"data_dir": "/data"}, {"comparison": {"tolerances": {}}}, {"reference": {}}, {"seeds": [7]}):
+        export_to_jobs(dict(reversed((whole | changed).items())))
+        hashes.append(os.environ["GPCA_CONFIG_SHA256"])
+    assert len(set(hashes[:4])) == 1
+    assert hashes[4] != hashes[0]

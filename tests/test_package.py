@@ -1,0 +1,141 @@
+"""The package as `pip` builds and installs it: what is inside, and that it runs far from the checkout."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import pytest
+import yaml
+
+import gpca
+
+from .documents import ROOT
+
+BUILT_FROM = ("gpca", "baselines", "pyproject.toml", "README.md", "LICENSE")
+
+
+def files_of(folder):
+    """The files of both packages, but for what Python and numba write beside them."""
+    paths = [path for name in ("gpca", "baselines") for path in (folder / name).rglob("*")]
+    return {str(path.relative_to(folder)) for path in paths if path.is_file() and "__pycache__" not in path.parts}
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """A wheel, built without the network, of a copy: builds leave files beside their sources."""
+    pytest.importorskip("pip")
+    sources, out = tmp_path_factory.mktemp("sources"), tmp_path_factory.mktemp("wheel")
+    for name in BUILT_FROM:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, sources / name, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy2(ROOT / name, sources / name)
+    pip("wheel", "--no-build-isolation", "--wheel-dir", out, sources)
+    [file] = out.iterdir()
+    return file
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    """A folder with the package and its command, and nothing else."""
+    folder = tmp_path_factory.mktemp("installed")
+    pip("install", "--target", folder, wheel)
+    return folder
+
+
+def pip(*arguments):
+    command = [sys.executable, "-m", "pip", *map(str, arguments), "--quiet", "--no-deps", "--no-index"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def isolated(installed, code, folder, *flags):
+    """Run code in another folder by a Python that knows of the installed package, and of no checkout."""
+    code = f"import sys; sys.path.insert(0, {str(installed)!r})\n{code}"
+    done = subprocess.run([sys.executable, "-I", *flags, "-c", code], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_wheel_holds_every_module_and_every_data_file_and_nothing_else(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if ".dist-info/" not in name}
+    assert names == files_of(ROOT)
+    assert {"gpca/py.typed", "baselines/py.typed", "gpca/config/config.schema.yaml"} <= names
+
+
+def test_the_wheel_says_its_version_licence_and_command(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        [metadata] = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
+        entry_points = archive.read(metadata.replace("METADATA", "entry_points.txt")).decode()
+        text = archive.read(metadata).decode()
+    assert wheel.name == f"gpca_bench-{gpca.__version__}-py3-none-any.whl"
+    assert f"\nVersion: {gpca.__version__}\n" in text
+    assert "\nLicense-Expression: MIT\n" in text
+    assert "gpca = gpca.__main__:main" in entry_points
+
+
+def test_the_version_stands_once_and_is_the_citations():
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == gpca.__version__
+    assert re.fullmatch(r"\d+\.\d+\.\d+", gpca.__version__)
+
+
+def test_importing_it_needs_no_other_package(installed, tmp_path):
+    """Without site-packages, -S, there is no other; what `gpca` offers is loaded when it is asked for."""
+    code = "import gpca; print(gpca.__file__, gpca.__version__, len([m for m in sys.modules if m.startswith('gpca')]))"
+    out = isolated(installed, code, tmp_path, "-S").split()
+    assert out == [str(installed / "gpca/__init__.py"), gpca.__version__, "1"]
+    out = isolated(installed, "from gpca.__main__ import main; main(['--version'])", tmp_path, "-S")
+    assert out == f"gpca {gpca.__version__}\n"
+
+
+def test_the_command_runs_anywhere(installed, tmp_path):
+    def run(*words):
+        command = [installed / "bin/gpca", *words]
+        environment = os.environ | {"PYTHONPATH": str(installed), "PYTHONSAFEPATH": "1"}
+        environment.pop("GPCA_MODEL", None)
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+
+    assert run("--version").stdout == f"gpca {gpca.__version__}\n"
+    assert run("--help").stdout.startswith("usage: gpca ")
+    missing = run("explain", "a.ply", "b.ply")
+    assert missing.returncode == 2
+    assert missing.stderr.startswith(f"gpca explain: no model: none in {tmp_path}/results; ")
+    (tmp_path / "run").mkdir()
+    missing = run("check-reference", "run")
+    assert missing.returncode == 2
+    assert missing.stderr == (
+        "gpca check-reference: config/config.yaml: no such file; "
+        "run this in the folder of the suite, or name the file with --config\n"
+    )
+
+
+def test_its_data_code_and_provenance_are_its_own(installed, tmp_path):
+    code = """
+import json
+from pathlib import Path
+from gpca.code_files import code_files
+from gpca.comparison.published import PUBLISHED, read_published
+from gpca.comparison.reasons import REASONS
+from gpca.provenance import record_provenance
+from gpca.reporting.figures.style import MATPLOTLIBRC
+from gpca.reporting.page.page import TEMPLATES
+from gpca.settings import SCHEMA, load_schema
+assert load_schema() and len(read_published(PUBLISHED))
+files = [PUBLISHED, REASONS, MATPLOTLIBRC, TEMPLATES / "index.html.jinja", SCHEMA, *code_files("gpca.steps.attribute")]
+for file in files:
+    assert Path(file).is_file(), file
+    print(file)
+with record_provenance([Path("out.csv")], [], {}):
+    pass
+"""
+    files = isolated(installed, code, tmp_path).split()
+    assert len(files) > 10
+    for file in files:
+        assert file.startswith(str(installed)), file
+    record = yaml.safe_load((tmp_path / "out.csv.provenance.json").read_text())
+    assert record["code"] == {"version": gpca.__version__, "commit": None, "dirty": None}
+    assert record["environment_lock_sha256"] is None

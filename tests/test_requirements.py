@@ -1,0 +1,101 @@
+"""What pyproject.toml names is what the code imports or runs, and environment.lock holds that and what it needs."""
+
+import ast
+import importlib.metadata
+import sys
+import tomllib
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from .documents import ROOT
+
+ROOMS = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "gpca").iterdir() if path.is_dir())
+LIBRARY = ("baselines", *(room for room in ROOMS if room != "gpca/reporting"))  # what steps import, and `gpca explain`
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+# Modules that are not called as their packages are.
+CALLED = {
+    "PIL": "pillow",
+    "open3d": "open3d-cpu",
+    "skactiveml": "scikit-activeml",
+    "sklearn": "scikit-learn",
+    "umap": "umap-learn",
+    "yaml": "pyyaml",
+}
+# What is run, by name or as a plugin, and imported by nobody.
+RUN = {"mypy", "pytest-cov", "ruff", "setuptools", "snakefmt", "snakemake", "snakemake-executor-plugin-slurm"}
+
+
+def requirements(*lists):
+    """What pyproject.toml names for the library, and in the lists of extras."""
+    named = [PROJECT["dependencies"], *(PROJECT["optional-dependencies"][name] for name in lists)]
+    return [Requirement(line) for lines in named for line in lines]
+
+
+def lock():
+    """The lines of environment.lock that are packages."""
+    return [line for line in (ROOT / "environment.lock").read_text().splitlines() if line and line[0] != "#"]
+
+
+def pinned():
+    """Package -> version, of environment.lock."""
+    return {canonicalize_name(name): version for name, version in (line.split("==") for line in lock())}
+
+
+def test_the_lock_pins_every_package_and_no_build():
+    assert all(line.count("==") == 1 and "+" not in line and "@" not in line for line in lock())
+    assert not [line for line in lock() if line.lower().startswith(("nvidia", "cuda", "triton"))]
+    for requirement in requirements("workflow", "dev"):
+        assert requirement.specifier.contains(pinned()[canonicalize_name(requirement.name)]), requirement
+
+
+def test_the_lock_holds_nothing_that_nothing_needs():
+    needed, open_requirements = set(), requirements("workflow", "dev")
+    while open_requirements:
+        requirement = open_requirements.pop()
+        key = canonicalize_name(requirement.name), *sorted(requirement.extras)
+        if key[0] not in pinned() or key in needed:
+            continue
+        needed.add(key)
+        for further in map(Requirement, importlib.metadata.requires(key[0]) or ()):
+            extras = requirement.extras or {""}
+            if further.marker is None or any(further.marker.evaluate({"extra": extra}) for extra in extras):
+                open_requirements.append(further)
+    assert set(pinned()) == {name for name, *_ in needed}
+
+
+def imported(*folders):
+    """Packages of others that the files of the folders import, anywhere in their text."""
+    modules = set()
+    for file in (file for folder in folders for file in (ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                modules |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                modules.add(node.module.split(".")[0])
+    others = modules - sys.stdlib_module_names - {"gpca", "baselines", "benchmarks", "tests"}
+    return {canonicalize_name(CALLED.get(module, module)) for module in others}
+
+
+@pytest.mark.parametrize(
+    ("folders", "lists"),
+    [
+        (LIBRARY, ()),
+        (("gpca", "baselines", "workflow"), ("workflow",)),
+        (("gpca", "baselines", "workflow", "benchmarks", "tests"), ("workflow", "dev")),
+    ],
+)
+def test_what_is_imported_is_named_where_it_is_needed(folders, lists):
+    assert imported(*folders) <= {canonicalize_name(requirement.name) for requirement in requirements(*lists)}
+
+
+def test_what_is_named_is_imported_or_run():
+    named = {canonicalize_name(requirement.name) for requirement in requirements("workflow", "dev")}
+    assert named == imported("gpca", "baselines", "workflow", "benchmarks", "tests") | RUN
+
+
+def test_the_conda_environment_of_the_rules_holds_the_lock():
+    conda = yaml.safe_load((ROOT / "workflow" / "envs" / "gpca.yaml").read_text())
+    assert conda["dependencies"][-1]["pip"] == lock()
