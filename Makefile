@@ -10,6 +10,7 @@ SHELL := /bin/bash
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
 CHECKED ?= embedded
+REPORT ?= results/embedded/report.html
 PYTEST_ARGS ?=
 # Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
@@ -19,8 +20,8 @@ PYTEST := $(RUN) OMP_NUM_THREADS=1 python -m pytest
 results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
 	$(RUN) snakemake -j$(CORES) all $(SNAKEMAKE_ARGS)
 
-report: environment ## Snakemake's report of the same run in one HTML file, results/{run}/report.html
-	$(RUN) snakemake -j$(CORES) report $(SNAKEMAKE_ARGS)
+report: environment ## Snakemake's report of the same run in one HTML file, REPORT
+	$(RUN) snakemake -j$(CORES) all --report $(REPORT) --report-after-run $(SNAKEMAKE_ARGS)
 
 # Two halves side by side, as a test waits for one core most of the time; each prints its report when it is done.
 test: environment ## the tests, or those of PYTEST_ARGS alone
@@ -37,7 +38,7 @@ test-workflow: environment ## the tests that run Snakemake, the whole smoke run 
 	$(PYTEST) tests/workflow
 
 smoke: environment ## every rule of the workflow at tiny size
-	$(RUN) snakemake -j$(CORES) smoke $(SNAKEMAKE_ARGS)
+	$(RUN) snakemake -j$(CORES) all --configfile config/smoke.yaml $(SNAKEMAKE_ARGS)
 
 coverage: environment ## the share of the lines that the tests of functions and steps run, 90 % at the least
 	$(PYTEST) --ignore=tests/workflow --cov --cov-report=term:skip-covered --cov-fail-under=90

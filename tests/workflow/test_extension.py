@@ -11,12 +11,14 @@ from ..documents import block, blocks_of
 from .conftest import without_ends
 
 SMOKE = ("--configfile", "config/smoke.yaml")
-ROW = {"objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19}
-ROW |= {"shift": 1, "learn": 1}
-ROW |= {"objects_figure": 1, "embeddings_without": 2, "active_learning": 2}
-COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
-LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
-LEARNED |= {"diagnostics": 1, "learner_table": 3, "learner_figure": 3}
+ROW = {"sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "run_icp": 6, "attribute": 19}
+ROW |= {"shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
+COLLECTORS = {"metrics": 1, "timings": 1, "fig_attribution_confusions": 1, "table1_extended": 1}
+TABLES = dict.fromkeys(("table1_single_baselines", "table2_per_concept"), 1)
+TABLES |= dict.fromkeys(("active_learning", "active_learning_curves", "diagnostics"), 1)
+TABLES |= dict.fromkeys(("table3_active_learning", "table3_extended", "table3_stream"), 1)
+TABLES |= dict.fromkeys(("table5_learners", "table5_shift", "table5_claims"), 1)
+TABLES |= dict.fromkeys(("coverage_risk", "reliability", "uncertainty_vs_distance"), 1)
 
 
 @pytest.fixture
@@ -36,7 +38,7 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
     finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     planned = finished.dry_run("all", *SMOKE, *data_dir)
-    assert without_ends(planned.jobs) == ROW | COLLECTORS | LEARNED
+    assert without_ends(planned.jobs) == ROW | COLLECTORS | TABLES | {"objects_my_parts": 1}
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in planned.outputs
 
     for file, text in blocks_of("docs/adding.md"):
@@ -44,8 +46,9 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
             (finished.folder / file).parent.mkdir(exist_ok=True)
             (finished.folder / file).write_text(text)
     planned = finished.dry_run("all", *SMOKE, *data_dir)
-    both = {rule: 2 * count for rule, count in ROW.items()} | {"objects": 1, "torus": 1}
-    assert without_ends(planned.jobs) == both | COLLECTORS | LEARNED
+    both = {rule: 2 * count for rule, count in ROW.items()} | {"sample_objects": 1, "torus": 1}
+    pictures = {"objects_my_parts": 1, "objects_torus": 1}
+    assert without_ends(planned.jobs) == both | COLLECTORS | TABLES | pictures
     assert "results/smoke/predictions/torus/gpca_paper/seed0.csv" in planned.outputs
 
     table2 = "results/smoke/tables/table2_per_concept"
@@ -110,7 +113,7 @@ def test_an_explainer_dropped_into_baselines_becomes_a_row(finished):
     assert not finished.dry_run("all", *SMOKE).jobs
     finished.append("config/smoke.yaml", "  fitness_only: {sharpness: 50.0}\n")
     planned = finished.dry_run("all", *SMOKE)
-    assert without_ends(planned.jobs) == COLLECTORS | {"explain": 2, "table": 1}
+    assert without_ends(planned.jobs) == COLLECTORS | {"attribute": 2}
 
     finished.snakemake("-j2", "results/smoke/tables/table1_extended.md", *SMOKE)
     table = (finished.folder / "results/smoke/tables/table1_extended.md").read_text()

@@ -1,26 +1,40 @@
 import csv
 import json
+from collections import Counter
+from pathlib import Path
 
 import pytest
 
 from .conftest import without_ends
 
 SMOKE = ("all", "--configfile", "config/smoke.yaml")
-COLLECTORS = {"metrics": 1, "timings": 1, "table": 3, "fig_attribution_confusions": 1}
-LEARNED = {"active_learning_metrics": 1, "learning_table": 3, "active_learning_curves": 1}
-DIAGNOSED = {"learn": 2, "diagnostics": 1, "learner_table": 3, "learner_figure": 3}
-KERNELS = {"kernels": 1, "kernel_metrics": 1, "kernel_table": 2, "kernel_learning_curves": 1}
-METHOD = {"fig2_overview": 1, "fig4_pipeline": 1}
-PICTURES = {"fig5_real_world_example": 1, "real_world_failures": 1}
-REAL_WORLD = {"real_world_metrics": 1, "table6_backbones": 1, "confusion_real_world": 1} | PICTURES
-BACKBONES = {"explain_with_backbone": 2} | REAL_WORLD
-RUNTIME = {"runtime": 1, "table7_runtime": 1, "runtime_figure": 1}
-MODEL = {"model": 1} | RUNTIME
-RECOVERY_FIGURES = {"recovery_figure": 3}
-RECOVERY = {"recover": 2, "recovery_metrics": 1, "table8_recovery": 1} | RECOVERY_FIGURES
-# Explainers times two sources: those with a GPC, those on embeddings, those on uncertainties, all.
-WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = ({"explain": 2 * explainers} for explainers in (4, 4, 13))
-WITH_GPC["explain"] += 2  # classic features on depth frames
+
+
+def jobs(*rules, **counts):
+    """How many jobs of each rule: one of each that is named alone."""
+    return Counter(rules) + Counter(counts)
+
+
+TABLES1 = jobs("table1_single_baselines", "table1_extended", "table2_per_concept")
+COLLECTORS = jobs("metrics", "timings", "table1_extended", "fig_attribution_confusions")
+TABLES3 = jobs("table3_active_learning", "table3_extended", "table3_stream")
+LEARNED = jobs("active_learning", "active_learning_curves") + TABLES3
+TABLES5 = jobs("table5_learners", "table5_shift", "table5_claims")
+DIAGNOSED = jobs("diagnostics", "coverage_risk", "reliability", "uncertainty_vs_distance", fit_learners=2) + TABLES5
+TABLES4 = jobs("table4_kernels", "table4_grid")
+KERNELS = jobs("fit_kernel_grid", "kernels", "kernel_learning_curves") + TABLES4
+METHOD = jobs("fig2_overview", "fig4_pipeline")
+FRAMES = jobs("real_world", "table6_backbones", "confusion_real_world")
+PICTURES = jobs("fig5_real_world_example", "real_world_failures")
+RUNTIME = jobs("time_stages", "table7_runtime", "runtime")
+MODEL = jobs("model") + RUNTIME
+RECOVERY_FIGURES = jobs("recovery_rates", "fig6_mitigation", "fig1_recovery_example")
+RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
+# GP-CA on the two reductions of Table VI, and what shows it.
+BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
+# Explainers times two sources: four with a GPC (classic features on the frames too), four on embeddings, 13 on
+# uncertainties.
+WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 4 + 2, 2 * 4, 2 * 13))
 
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
@@ -32,46 +46,46 @@ def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project)
     smoke = ("--configfile", "config/smoke.yaml")
     planned = project.dry_run("results/smoke/tables/table2_per_concept.md", *smoke)
     assert planned.jobs == {
-        "objects": 2, "registrations": 4, "encoder": 4, "embeddings": 4, "explain": 4, "table": 1
+        "sample_objects": 2, "register": 4, "train_encoder": 4, "embed": 4, "attribute": 4, "table2_per_concept": 1
     }  # fmt: skip
     assert not [path for path in planned.outputs if "lazy" in path or "figures" in path]
     table1 = project.dry_run("results/smoke/tables/table1_single_baselines.md", *smoke)
-    assert table1.jobs["explain"] == 8
-    assert table1.jobs["uncertainty"] == 2
+    assert table1.jobs["attribute"] == 8
+    assert table1.jobs["run_icp"] == 2
     assert not [path for path in table1.outputs if "lazy" in path or "removal" in path or "figures" in path]
 
 
 def test_table3_needs_no_uncertainty_and_no_explainer(planned):
     assert planned.before("results/smoke/tables/table3_active_learning.md") == {
-        "objects": 2, "registrations": 4, "encoder": 4, "embeddings": 4, "embeddings_without": 4, "active_learning": 4,
-        "active_learning_metrics": 1, "learning_table": 1,
+        "sample_objects": 2, "register": 4, "train_encoder": 4, "embed": 4, "embed_without": 4, "learn_actively": 4,
+        "active_learning": 1, "table3_active_learning": 1,
     }  # fmt: skip
 
 
 def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
     assert planned.before("results/smoke/tables/table4_kernels.md") == {
-        "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "kernels": 1, "kernel_table": 1,
+        "sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "fit_kernel_grid": 1, "table4_kernels": 1,
     }  # fmt: skip
     assert planned.before("results/smoke/tables/table5_learners.md") == {
-        "objects": 2, "registrations": 4, "encoder": 4, "embeddings": 4, "shift": 2, "learn": 2, "diagnostics": 1,
-        "learner_table": 1,
+        "sample_objects": 2, "register": 4, "train_encoder": 4, "embed": 4, "shift": 2, "fit_learners": 2,
+        "diagnostics": 1, "table5_learners": 1,
     }  # fmt: skip
 
 
 def test_table6_needs_the_frames_alone(planned):
     assert planned.before("results/smoke/tables/table6_backbones.md") == {
-        "scenes": 1, "instances": 1, "frame_registrations": 2, "encoder": 2, "embeddings": 2, "reduced_embeddings": 1,
-        "explain": 2, "explain_with_backbone": 2, "real_world_metrics": 1, "table6_backbones": 1,
+        "render_scenes": 1, "instances": 1, "register_frames": 2, "train_encoder": 2, "embed": 2,
+        "reduce_embeddings": 1, "attribute": 4, "real_world": 1, "table6_backbones": 1,
     }  # fmt: skip
 
 
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
-        "scenes": 1, "instances": 1, "frame_registrations": 1, "encoder": 1, "embeddings": 1, "model": 1, "runtime": 1,
-        "table7_runtime": 1,
+        "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
+        "time_stages": 1, "table7_runtime": 1,
     }  # fmt: skip
     assert planned.before("results/smoke/tables/table8_recovery.md") == {
-        "recover": 2, "recovery_metrics": 1, "table8_recovery": 1,
+        "recover": 2, "recovery": 1, "table8_recovery": 1,
     }  # fmt: skip
 
 
@@ -81,47 +95,37 @@ def test_a_finished_run_has_nothing_to_do(finished):
 
 
 EDITS = {
-    "gpca/classifier/gpc.py": WITH_GPC | COLLECTORS | {"active_learning": 4} | LEARNED | DIAGNOSED | KERNELS | BACKBONES
-    | MODEL | RECOVERY | METHOD,
-    "gpca/shift/samples.py": {"shift": 2} | DIAGNOSED,
+    "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
+    + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD,
+    "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
-    "gpca/reporting/figures/kernel_grid.py": {"kernel_learning_curves": 1},
-    "gpca/active_learning/acquisition.py": {"active_learning": 4, "fig4_pipeline": 1} | LEARNED | RUNTIME,
-    "gpca/active_learning/stream.py": {"active_learning": 4, "fig4_pipeline": 1} | LEARNED | RUNTIME,
-    "gpca/reporting/figures/active_learning.py": {"active_learning_curves": 1, "fig4_pipeline": 1},
+    "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
+    "gpca/active_learning/acquisition.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + RUNTIME,
+    "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + RUNTIME,
+    "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
-    "gpca/alignment/icp_kernels.py": (
-        {"uncertainty": 12} | ON_UNCERTAINTY | COLLECTORS | {"table": 2} | RUNTIME | RECOVERY
-    ),
-    "baselines/softmax_head.py": {"explain": 2} | COLLECTORS | {"table": 1} | RECOVERY,
-    "gpca/reporting/figures/contact_sheet.py": {"objects_figure": 2},
-    "gpca/reporting/figures/concepts.py": {"fig3_concepts": 1, "fig5_real_world_example": 1} | METHOD,
+    "gpca/alignment/icp_kernels.py":
+        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + RUNTIME + RECOVERY,
+    "baselines/softmax_head.py": jobs(attribute=2) + COLLECTORS + RECOVERY,
+    "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
+    "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
     # Not the pictures: they show an encoder without reduction.
-    "gpca/encoders/reduction.py": {
-        "reduced_embeddings": 1, "explain_with_backbone": 1, "real_world_metrics": 1, "table6_backbones": 1,
-        "confusion_real_world": 1,
-    },
-    "gpca/frames/occlusion.py": {
-        "frame_registrations": 2, "encoder": 2, "embeddings": 2, "reduced_embeddings": 1, "explain": 2,
-    } | BACKBONES | MODEL,
-    "gpca/frames/bop.py": {
-        "instances": 1, "frame_registrations": 2, "encoder": 2, "embeddings": 2, "reduced_embeddings": 1, "explain": 2,
-    } | BACKBONES | MODEL | RECOVERY,
-    "gpca/recovery/policy.py": MODEL | RECOVERY,
-    "gpca/reporting/tables/explainers.py": {
-        "table": 3, "learning_table": 3, "learner_table": 3, "kernel_table": 2, "kernel_learning_curves": 1,
-    },
-    "gpca/reporting/figures/confusions.py": {"fig_attribution_confusions": 1, "confusion_real_world": 1},
-    "gpca/encoders/dgcnn.py": {
-        "encoder": 6, "embeddings": 6, "embeddings_without": 4, "active_learning": 4, "shift": 2,
-        "reduced_embeddings": 1,
-    } | BACKBONES | ON_EMBEDDINGS | COLLECTORS | LEARNED | DIAGNOSED | KERNELS | MODEL | RECOVERY
-    | METHOD,
-    "gpca/objects/uw_rgbd.py": {},
-    "gpca/objects/shapes/cups.py": {
-        "objects": 1, "registrations": 2, "encoder": 2, "embeddings": 2, "uncertainty": 6, "explain": 19,
-        "objects_figure": 1, "fig3_concepts": 1, "embeddings_without": 2, "active_learning": 2, "shift": 2,
-    } | COLLECTORS | LEARNED | DIAGNOSED | METHOD,
+    "gpca/encoders/reduction.py": jobs("reduce_embeddings", "attribute") + FRAMES,
+    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_encoder=2, embed=2, attribute=2)
+    + BACKBONES + MODEL,
+    "gpca/frames/bop.py":
+        jobs("reduce_embeddings", "instances", register_frames=2, train_encoder=2, embed=2, attribute=2)
+        + BACKBONES + MODEL + RECOVERY,
+    "gpca/recovery/policy.py": MODEL + RECOVERY,
+    "gpca/reporting/tables/explainers.py": TABLES1,
+    "gpca/reporting/figures/confusions.py": jobs("fig_attribution_confusions", "confusion_real_world"),
+    "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
+    + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
+    + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD,
+    "gpca/objects/uw_rgbd.py": jobs(),
+    "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
+    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=6)
+    + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD,
 }  # fmt: skip
 
 
@@ -167,10 +171,33 @@ def test_a_touched_but_unchanged_module_reruns_nothing(finished):
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert without_ends(planned.jobs) == {"explain": 2} | COLLECTORS | DIAGNOSED | BACKBONES | MODEL | RECOVERY | METHOD
+    assert without_ends(planned.jobs) == (
+        jobs("table1_single_baselines", "table2_per_concept", attribute=2)
+        + COLLECTORS + DIAGNOSED + BACKBONES + MODEL + RECOVERY + METHOD
+    )  # fmt: skip
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"source": "ycb"}}))
-    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == {"fig3_concepts": 1, "page": 1} | METHOD
+    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == jobs("fig3_concepts", "page") + METHOD
+
+
+def test_every_table_figure_and_stage_is_a_target_by_name(project):
+    def planned(target):
+        return project.dry_run(target, "--configfile", "config/smoke.yaml").outputs
+
+    assert "results/smoke/tables/table5_learners.md" in planned("table5")
+    assert "results/smoke/figures/reliability.pdf" in planned("reliability")
+    assert planned("objects") == {f"results/smoke/objects/{name}.npz" for name in ("coffee_cup", "ycb")}
+    paper = planned("paper")
+    figures = {Path(path).stem for path in paper if "/figures/" in path}
+    assert sorted(name.split("_")[0] for name in figures) == [f"fig{n}" for n in range(1, 7)]
+    assert not [path for path in paper if "extended" in path or "table8" in path or "index.html" in path]
+
+
+def test_a_misspelt_target_is_answered_by_the_nearest_names(project):
+    done = project.snakemake("-n", "tabel2", "--configfile", "config/smoke.yaml", check=False)
+    assert done.returncode != 0
+    assert "gpca: target 'tabel2': there is no such table, figure or stage; did you mean table2 or" in done.stderr
+    assert "Traceback" not in done.stderr
