@@ -71,7 +71,7 @@ class Model:
             "title": self.title,
             "stand_in": self.stand_in,
         }
-        # Given a path, torch.save writes its name, here one with the process id, into the file.
+        # Given a path, torch.save writes its name, here the temporary one, into the file.
         with whole_file(path) as partial, partial.open("wb") as file:
             torch.save(content, file)
 

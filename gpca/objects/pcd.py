@@ -1,6 +1,8 @@
 """Point Cloud Data (PCD 0.6, 0.7): ascii, binary and binary_compressed.
 
 Format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html
+Open3D's reader (0.19) does not serve here: it takes a cut ascii file, a short row, a header without WIDTH or with an
+unknown TYPE for whole ones and fills the gaps with whatever the memory holds, and it reads a double after bytes as 0.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def run(options: Namespace) -> None:
     checkpoint = options.out.with_suffix(".checkpoint")
     with record_provenance([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
         model, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
-        # Given a path, torch.save writes its name, here one with the process id, into the file.
+        # Given a path, torch.save writes its name, here the temporary one, into the file.
         with whole_file(options.out) as partial, partial.open("wb") as file:
             torch.save(model.state_dict(), file)
         with whole_file(options.curve) as partial:
