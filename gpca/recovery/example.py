@@ -16,7 +16,8 @@ from gpca.frames.shots import Shot
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action
 from gpca.recovery.cases import Attempt
-from gpca.recovery.loop import Episode, LoopSettings
+from gpca.recovery.episodes import Episode
+from gpca.recovery.settings import LoopSettings
 
 if TYPE_CHECKING:
     import pandas as pd

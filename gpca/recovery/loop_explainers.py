@@ -12,7 +12,7 @@ from baselines.registry import explainer_entry
 from gpca.attribution.scores import Attribution
 from gpca.encoders.training import EncoderSettings, embed, train_encoder
 from gpca.pairs.dataset import Registrations
-from gpca.recovery.loop import Explain
+from gpca.recovery.answers import Explain
 from gpca.uncertainty.evaluation import evaluate_design
 from gpca.uncertainty.spread import UncertaintySettings
 
