@@ -16,7 +16,7 @@ import numpy as np
 from gpca.attribution.scores import Attribution
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 
 
@@ -67,8 +67,8 @@ class AnalyticalGPC:
 
 
 EXPLAINERS = {
-    "analytical_gpc": Entry("Analytical features (GPC)", AnalyticalGPC),
-    "analytical_gpc_no_counts": Entry(
+    "analytical_gpc": ExplainerEntry("Analytical features (GPC)", AnalyticalGPC),
+    "analytical_gpc_no_counts": ExplainerEntry(
         "Analytical features without point counts (GPC)", partial(AnalyticalGPC, point_count=False)
     ),
 }

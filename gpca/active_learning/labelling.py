@@ -105,7 +105,9 @@ class Session:
         strategy: str = "bald_kmeans",
         seed: int = 0,
     ) -> None:
-        self.keys, self.labels, self._strategy = keys, labels, strategy
+        self.keys = keys
+        self.labels = labels
+        self._strategy = strategy
         self._rows = {key: row for row, key in enumerate(keys)}
         self._random = generator("label", seed)
         self._start = dict(start)

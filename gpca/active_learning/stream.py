@@ -95,7 +95,8 @@ def run_stream(
     asked: list[int] = []
     steps = [_row(task, gpc, right, asked, stream)]
     for row in arrival_order(task, stream, *axes):
-        h, concept = task.pool.h[[row]], task.pool.concept_N[row]
+        h = task.pool.h[[row]]
+        concept = task.pool.concept_N[row]
         scores_1_C, _, bald_1 = gpc.attribute(h)
         right.append(gpc.classes[int(scores_1_C.argmax())] == concept)
         if _asks(manager, bald_1):

@@ -43,7 +43,8 @@ def make_covariance(name: str, n_classes: int, lengthscale: float) -> gpytorch.k
 
 def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
     """Return k_c(a, b), (C, A, B), of kernels of batch shape (C,); of those without a form here by gpytorch itself."""
-    base, scale_C_1_1 = kernel.base_kernel, kernel.outputscale[:, None, None]
+    base = kernel.base_kernel
+    scale_C_1_1 = kernel.outputscale[:, None, None]
     if isinstance(base, ScaledPolynomialKernel):
         inner_A_B = a_A_d @ b_B_d.T / a_A_d.shape[1]
         return scale_C_1_1 * (inner_A_B + base.offset[:, :, None]).square()
@@ -59,7 +60,8 @@ def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tenso
 
 def variance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
     """Return k_c(a, a), (C, A)."""
-    base, scale_C_1 = kernel.base_kernel, kernel.outputscale[:, None]
+    base = kernel.base_kernel
+    scale_C_1 = kernel.outputscale[:, None]
     if isinstance(base, ScaledPolynomialKernel):
         return scale_C_1 * (a_A_d.square().mean(dim=1) + base.offset).square()
     return scale_C_1.expand(-1, len(a_A_d)) if base.is_stationary else kernel(a_A_d, diag=True)

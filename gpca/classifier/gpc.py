@@ -85,7 +85,8 @@ class GPC:
         around_R_d = h_N_d if around_R_d is None else around_R_d
         self._scaler = StandardScaler().fit(around_R_d)
         starts_R_d = self._scaled(around_R_d)
-        inputs_N_d, targets_N = self._scaled(h_N_d), self._targets(labels_N)
+        inputs_N_d = self._scaled(h_N_d)
+        targets_N = self._targets(labels_N)
         random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
         kernel = make_covariance(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
         model = SparseGPs(kernel, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
@@ -96,8 +97,11 @@ class GPC:
             (-model.elbo(inputs_N_d, torch.from_numpy(targets_N))).backward()
             optimiser.step()
             if done in stops:
-                self._prior, self._latents = Prior.of(model), model.latents()
-                self._labelled, self._targets_N, self._sites = self.project(h_N_d), targets_N, None
+                self._prior = Prior.of(model)
+                self._latents = model.latents()
+                self._labelled = self.project(h_N_d)
+                self._targets_N = targets_N
+                self._sites = None
                 yield done
 
     def elbo(self) -> float:
@@ -194,7 +198,8 @@ class GPC:
         kernel.load_state_dict(state["kernel"])
         gpc._prior = Prior(kernel, state["inducing"])
         gpc._latents = Latents(state["mean"].numpy(), state["covariance"].numpy())
-        gpc._labelled, gpc._targets_N = gpc._prior.project(state["labelled"]), state["targets"].numpy()
+        gpc._labelled = gpc._prior.project(state["labelled"])
+        gpc._targets_N = state["targets"].numpy()
         return gpc
 
     def _targets(self, labels_N: np.ndarray) -> np.ndarray:

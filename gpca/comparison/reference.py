@@ -92,7 +92,8 @@ def read_means(path: Path) -> dict[tuple[str, ...], Mean]:
         InputError: empty, unreadable, neither tidy nor a table, something that is not a number.
     """
     table = read_csv(path, ())
-    heads, rows = list(table), table.to_dict("records")
+    heads = list(table)
+    rows = table.to_dict("records")
     if tuple(heads) == TIDY:
         means = _of_tidy(path, rows)
     elif "mean" in heads[1:]:

@@ -69,7 +69,8 @@ class GroupMLP(nn.Module):
         return z_S_F.view(*neighbours_B_M_k.shape, -1).amax(dim=2)
 
     def _layers(self) -> list[tuple[nn.Linear, BatchNorm]]:
-        linears, norms = cast("list[nn.Linear]", list(self.linears)), cast("list[BatchNorm]", list(self.norms))
+        linears = cast("list[nn.Linear]", list(self.linears))
+        norms = cast("list[BatchNorm]", list(self.norms))
         return list(zip(linears, norms, strict=True))
 
     def _first_layer(self, weight: torch.Tensor, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:

@@ -20,7 +20,8 @@ class SetAbstraction(nn.Module):
 
     def __init__(self, in_features: int, out_features: int, radius: float, neighbours: int) -> None:
         super().__init__()
-        self.radius, self.neighbours = radius, neighbours
+        self.radius = radius
+        self.neighbours = neighbours
         self.layers = GroupMLP(in_features, (out_features // 2, out_features), last_relu=False)
         self.skip = nn.Linear(in_features, out_features)
 

@@ -86,7 +86,9 @@ class Autoencoder:
         import torch
         from torch import nn
 
-        d, hidden, batch_size = z_train_N_d.shape[1], 256, 32
+        d = z_train_N_d.shape[1]
+        hidden = 256
+        batch_size = 32
         z_N_d = torch.from_numpy(z_train_N_d.astype(np.float32))
         with _one_thread(torch), torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed_of(*axes, "autoencoder"))

@@ -3,7 +3,7 @@
 An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
 ``EXPLAINERS`` by the name under which the config switches it on::
 
-    EXPLAINERS = {"my_explainer": Entry("My explainer", MyExplainer)}
+    EXPLAINERS = {"my_explainer": ExplainerEntry("My explainer", MyExplainer)}
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class ConceptExplainer(Protocol):
 
 
 @dataclass(frozen=True)
-class Entry:
+class ExplainerEntry:
     """An explainer by name.
 
     Attributes:

@@ -99,14 +99,16 @@ def agreement(
     Args:
         points_m: measured points (P, 3) in the world. model_m, normals: (Q, 3) in the object's frame.
     """
-    placed_m, facing_out = transform(T_world_object, model_m), normals @ T_world_object[:3, :3].T
+    placed_m = transform(T_world_object, model_m)
+    facing_out = normals @ T_world_object[:3, :3].T
     reach_m = NEAR * diameter_m
     on_model = np.mean(cKDTree(placed_m).query(points_m, distance_upper_bound=reach_m)[0] < reach_m)
     explained = visible = 0
     for shot in shots:
         v, u, depth_m = shot.project(placed_m)
         facing = np.sum(facing_out * (placed_m - shot.T_world_camera[:3, 3]), axis=1) < 0
-        measured_m, mine = shot.depth_m[v, u], shot.mask[v, u]
+        measured_m = shot.depth_m[v, u]
+        mine = shot.mask[v, u]
         seen = facing & (v >= 0) & (measured_m > 0) & (mine | (measured_m > depth_m - reach_m))
         visible += seen.sum()
         explained += (seen & mine & (np.abs(measured_m - depth_m) < reach_m)).sum()

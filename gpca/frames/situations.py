@@ -18,7 +18,7 @@ from gpca.frames.shots import Shot, median_depth
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
-from gpca.pairs.perturbation import Severities, move
+from gpca.pairs.perturbation import Severities, misplace
 from gpca.seeds import generator, seed_of
 
 COARSE = 4  # the factor by which the image is thinned where only shares of pixels count
@@ -169,7 +169,9 @@ class Situations:
     """
 
     def __init__(self, shelf: Shelf, settings: SituationSettings, part: tuple) -> None:
-        self._shelf, self._settings, self._part = shelf, settings, part
+        self._shelf = shelf
+        self._settings = settings
+        self._part = part
         self._alone: dict[int, MeshScene] = {}
         self._tables: dict[int, list[Placed]] = {}
 
@@ -196,7 +198,8 @@ class Situations:
         standing = list(self._tables[number])
         standing.insert(0, standing.pop(int(random.integers(len(standing)))))
         T_world_object = standing[0].T_world_object
-        azimuth, elevation = random.uniform(0, 2 * np.pi), np.deg2rad(random.uniform(*scenes.elevation_deg))
+        azimuth = random.uniform(0, 2 * np.pi)
+        elevation = np.deg2rad(random.uniform(*scenes.elevation_deg))
         toward = np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
         centre_m = T_world_object[:3, 3]
         situation = Situation(
@@ -226,7 +229,7 @@ class Situations:
             scale = settings.scenes.noise.scale * random.uniform(*settings.noise_scale)
             return replace(clean, noise=replace(clean.noise, scale=scale), cause=cause)
         if cause == "pose":
-            T_error = move(np.zeros((1, 3)), settings.severities, random).T_target_source_true
+            T_error = misplace(np.zeros((1, 3)), settings.severities, random).T_target_source_true
             return replace(clean, T_object_estimated=scale_translation(T_error, clean.diameter_m), cause=cause)
         if cause == "overlap":
             occluder = self._occluder(clean, random)
@@ -254,7 +257,8 @@ class Situations:
             return None
         model = int(random.choice(free))
         T_world_object = rest(*self._shelf.resting[model], random)
-        mine, target_m = self._shelf.outline(Placed(model, T_world_object)), clean.T_world_object[:2, 3]
+        mine = self._shelf.outline(Placed(model, T_world_object))
+        target_m = clean.T_world_object[:2, 3]
         turn = np.deg2rad(random.uniform(-OCCLUDER_TURN_DEG, OCCLUDER_TURN_DEG))
         along = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
         way = along @ (clean.T_world_camera[:2, 3] - target_m)

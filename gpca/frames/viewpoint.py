@@ -66,7 +66,8 @@ def expected_surface(
         seen_Q = cKDTree(measured_m).query(placed_m, distance_upper_bound=reach_m)[0] < reach_m
     around = occupy(np.concatenate([shot.other_points_m() for shot in shots]))
     meshes = [(transform(T_world_object, vertices_m), faces), table(), *([around] if around else [])]
-    scene, shown_n_Q = MeshScene(meshes), []
+    scene = MeshScene(meshes)
+    shown_n_Q = []
     for T_world_camera in poses_n:
         view = scene.look(camera, T_world_camera)
         v, u, depth_m = Shot(camera, T_world_camera, view.depth_m, view.mesh == 0).project(placed_m)
@@ -76,5 +77,6 @@ def expected_surface(
 
 def best_viewpoint(seen_Q: np.ndarray, shown_n_Q: np.ndarray) -> int:
     """Return the viewpoint after which most of the surface was seen; of equals, the one that shows most by itself."""
-    together_n, alone_n = (seen_Q | shown_n_Q).sum(axis=1), shown_n_Q.sum(axis=1)
+    together_n = (seen_Q | shown_n_Q).sum(axis=1)
+    alone_n = shown_n_Q.sum(axis=1)
     return int(np.lexsort((-alone_n, -together_n))[0])

@@ -20,7 +20,7 @@ from gpca.alignment.rigid import require_rigid, transform
 from gpca.attribution.scores import entropy
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
-from gpca.model.explanation import Explanation, Spread
+from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.file import Model, model_path
 from gpca.objects.canonical import estimate_normals
 from gpca.recovery.policy import RecoveryPolicy
@@ -125,7 +125,8 @@ class Explainer:
         the same.
         """
         settings = self.model.encoder_settings
-        draws, n = (1 if len(aligned) == settings.points else settings.draws), settings.points
+        draws = 1 if len(aligned) == settings.points else settings.draws
+        n = settings.points
         repeated = len(aligned) < n
         rows_D_N = [
             generator("explanation", "draw", draw).choice(len(aligned), n, replace=repeated, shuffle=False)
@@ -154,10 +155,10 @@ def _require_like_sizes(source: np.ndarray, target: np.ndarray) -> None:
 
 def _spread(
     icp: BatchedICP, source: np.ndarray, T_icp: np.ndarray, settings: UncertaintySettings, diameter: float
-) -> Spread:
+) -> PoseSpread:
     xi_n_6 = generator("explanation", "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
     runs = run_from_starts(icp, thin(source, settings.points, "spread"), np.eye(4), xi_n_6)
-    return Spread(runs.covariance(T_icp), settings.starts, diameter)
+    return PoseSpread(runs.covariance(T_icp), settings.starts, diameter)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ WORDS = {  # of the branches, for a reader
 
 
 @dataclass(frozen=True)
-class Spread:
+class PoseSpread:
     """How far poses scatter when ICP starts elsewhere: Σ (6, 6) of twists in radians and diameters, over n starts."""
 
     covariance_6_6: np.ndarray
@@ -64,7 +64,7 @@ class Explanation:
     concept: str
     action: str
     reason: str
-    spread: Spread | None
+    spread: PoseSpread | None
     unit: str
     seconds: dict[str, float]
     notes: tuple[str, ...] = ()

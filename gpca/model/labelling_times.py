@@ -26,5 +26,7 @@ def time_labelling(
     left = np.arange(len(task.pool))
     chosen, elapsed = timed(lambda: select(STRATEGY, pool_of(task, gpc, left, []), settings.batch, random))
     yield ("bald", "CPU"), elapsed
-    more, labels, known = task.pool.h[chosen], task.pool.concept_N[chosen], copy(gpc)
+    more = task.pool.h[chosen]
+    labels = task.pool.concept_N[chosen]
+    known = copy(gpc)
     yield ("retraining", "CPU"), timed(lambda: known.update(more, labels, settings.iterations, settings.tolerance))[1]

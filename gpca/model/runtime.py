@@ -14,7 +14,7 @@ from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.labelling_times import time_labelling
 from gpca.model.runtime_file import COMPONENTS, RUNTIME_COLUMNS
-from gpca.model.stage_times import Pair, time_explanations, time_stages
+from gpca.model.stage_times import CloudPair, time_explanations, time_stages
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.dataset import Registrations
 from gpca.progress import progress
@@ -81,7 +81,7 @@ def measure(
     )
 
 
-def _pair(registrations: Registrations, row: int) -> Pair:
+def _pair(registrations: Registrations, row: int) -> CloudPair:
     """Return source and target of a registration before ICP, in diameters."""
     T_source_target = inverse(registrations.T_target_source("icp", row))
     return transform(T_source_target, registrations.cloud(row).astype(float)), registrations.target(row).astype(float)

@@ -18,7 +18,7 @@ from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 
 Result = TypeVar("Result")
-Pair = tuple[np.ndarray, np.ndarray]  # source and target (N, 3), in diameters
+CloudPair = tuple[np.ndarray, np.ndarray]  # source and target (N, 3), in diameters
 Times = Iterator[tuple[tuple[str, str], float]]  # (component, device) and its seconds
 
 
@@ -29,7 +29,9 @@ def timed(work: Callable[[], Result]) -> tuple[Result, float]:
     return result, perf_counter() - started
 
 
-def time_stages(explainers: Mapping[str, Explainer], model: Model, pair: Pair, random: np.random.Generator) -> Times:
+def time_stages(
+    explainers: Mapping[str, Explainer], model: Model, pair: CloudPair, random: np.random.Generator
+) -> Times:
     """Measure ICP, feature extraction, posterior sampling and the scores.
 
     Args:
@@ -50,7 +52,7 @@ def time_stages(explainers: Mapping[str, Explainer], model: Model, pair: Pair, r
     yield ("scores", "CPU"), timed(lambda: summarise_draws(logits))[1]
 
 
-def time_explanations(explainers: Mapping[str, Explainer], pairs: Mapping[str, Pair]) -> Times:
+def time_explanations(explainers: Mapping[str, Explainer], pairs: Mapping[str, CloudPair]) -> Times:
     """Measure one explanation of each pair, component -> pair, on every device."""
     frame = CanonicalFrame(np.zeros(3), 1.0)
     for device, explainer in explainers.items():

@@ -73,7 +73,8 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
         InputError: no points, NaN, zero area, too small a cloud, or a diameter that no declared unit would give.
     """
     subject = f"{source}: object '{surface.name}'"
-    vertices_m, faces = np.asarray(surface.vertices_m, dtype=np.float64), surface.faces
+    vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
+    faces = surface.faces
     require_points(vertices_m, subject)
     if faces is None:
         if len(vertices_m) < FEWEST_CLOUD_POINTS:

@@ -73,7 +73,9 @@ def _parse_header(content: bytes) -> tuple[_Header, bytes]:
     for key in ("FIELDS", "SIZE", "TYPE", "WIDTH", "HEIGHT", "POINTS"):
         if not values.get(key):
             raise ValueError(f"wrong header: no line {key}")
-    fields, sizes, types = values["FIELDS"], values["SIZE"], values["TYPE"]
+    fields = values["FIELDS"]
+    sizes = values["SIZE"]
+    types = values["TYPE"]
     counts = values.get("COUNT", ["1"] * len(fields))
     if not len(fields) == len(sizes) == len(types) == len(counts):
         raise ValueError("wrong header: FIELDS, SIZE, TYPE and COUNT differ in length")

@@ -104,7 +104,8 @@ def new_view(
     from gpca.frames.viewpoint import best_viewpoint, candidates, expected_surface
 
     # About what was measured, not the estimated centre, which may be anywhere.
-    centre_m, first = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0), holding.shots[0]
+    centre_m = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0)
+    first = holding.shots[0]
     distance_m = float(np.linalg.norm(centre_m - first.T_world_camera[:3, 3]))
     poses_n = candidates(centre_m, distance_m, azimuths, elevations_deg)
     points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
@@ -130,7 +131,8 @@ def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None
 
     Poses are compared by :func:`gpca.frames.shots.agreement`, which needs no truth.
     """
-    d, step = robot.diameter_m, max(1, len(robot.points_m) // MODEL_POINTS)
+    d = robot.diameter_m
+    step = max(1, len(robot.points_m) // MODEL_POINTS)
     cloud_m = fuse(holding.shots, d, holding.filtered)
     cloud_m = cloud_m[:: max(1, len(cloud_m) // CLOUD_POINTS)]
     if not len(cloud_m):

@@ -44,8 +44,10 @@ class Answers:
     def __init__(
         self, episodes: Sequence[Episode], explain: Mapping[str, Explain], actions: Sequence[str], budget: int
     ) -> None:
-        self._episodes, self._explain = episodes, explain
-        self._actions, self._budget = list(actions), budget
+        self._episodes = episodes
+        self._explain = explain
+        self._actions = list(actions)
+        self._budget = budget
         self._answers: dict[CaseKey, Answer] = {}
 
     def ask(self, wanted: Iterable[CaseKey]) -> None:

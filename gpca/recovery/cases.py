@@ -43,11 +43,14 @@ class RobotIn:
 
     def __init__(self, situation: Situation, axes: tuple = ()) -> None:
         shelf, model = situation.shelf, situation.model
-        self.points_m, self.normals = shelf.objects.points(model), shelf.objects.normals(model)
-        self.vertices_m, self.faces = shelf.surfaces[model].vertices_m, shelf.surfaces[model].faces
+        self.points_m = shelf.objects.points(model)
+        self.normals = shelf.objects.normals(model)
+        self.vertices_m = shelf.surfaces[model].vertices_m
+        self.faces = shelf.surfaces[model].faces
         self.diameter_m = situation.diameter_m
         self.camera_seconds = 0.0
-        self._situation, self._axes = situation, axes
+        self._situation = situation
+        self._axes = axes
 
     def shoot(self, T_world_camera: np.ndarray, frames: int) -> Shot:
         """Measure from a viewpoint; the noise is named by what was done before and by the viewpoint."""
@@ -100,7 +103,9 @@ def register_held(
 ) -> Attempt | None:
     """Align the object's fused points to its model by ICP, from the initial pose."""
     started = perf_counter()
-    objects, model, d = situation.shelf.objects, situation.model, situation.diameter_m
+    objects = situation.shelf.objects
+    model = situation.model
+    d = situation.diameter_m
     cloud_m = fuse(holding.shots, d, holding.filtered)
     if len(cloud_m) < FEWEST_POINTS:
         return None

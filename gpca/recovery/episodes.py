@@ -28,13 +28,16 @@ class Episode:
     """
 
     def __init__(self, number: int, situation: Situation, start: Attempt, tries: int) -> None:
-        self.number, self.situation, self.tries = number, situation, tries
+        self.number = number
+        self.situation = situation
+        self.tries = tries
         self.outcomes: dict[tuple[str, ...], Attempt] = {(): start}
 
     def take(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> Attempt:
         """Return the outcome after these actions, of which all but the last were taken."""
         if actions not in self.outcomes:
-            before, action = self.outcomes[actions[:-1]], known[actions[-1]]
+            before = self.outcomes[actions[:-1]]
+            action = known[actions[-1]]
             outcome = register_after(self.situation, before, action, actions, settings.points, settings.icp)
             self.outcomes[actions] = outcome
         return self.outcomes[actions]

@@ -54,7 +54,8 @@ def save_example(
     shown = shown[shown["policy"] == "gpca"].iloc[0] if (shown["policy"] == "gpca").any() else shown.iloc[0]
     before, after = episode.outcomes[()], episode.take((ACTION,), actions, settings)
     new = after.holding.shots[-1]
-    objects, model = episode.situation.shelf.objects, episode.situation.model
+    objects = episode.situation.shelf.objects
+    model = episode.situation.model
     arrays = {
         "camera_3_3": new.camera.matrix_3_3,
         "model_m": objects.points(model)[:SHOWN_POINTS],

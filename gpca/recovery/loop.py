@@ -41,8 +41,11 @@ class Loop:
         settings: LoopSettings,
         axes: tuple,
     ) -> None:
-        self.episodes, self._actions = episodes, actions
-        self._policy, self._settings, self._axes = policy, settings, axes
+        self.episodes = episodes
+        self._actions = actions
+        self._policy = policy
+        self._settings = settings
+        self._axes = axes
         self._answers = Answers(episodes, explain, tuple(actions), settings.budget)
 
     def run(self, policies: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:

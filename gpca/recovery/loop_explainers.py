@@ -54,15 +54,18 @@ def learn_explainers(
         most_remedied: training samples whose remedies are run, at most; Monte-Carlo ICP is slow.
     """
     train, held_out = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
-    explain, model = {}, None
+    explain = {}
+    model = None
     for name in names:
         entry = explainer_entry(name)
         explainer = entry.make(source, seed, **(settings.get(name) or {}))
         if entry.reads == "embeddings":
             model = model or train_encoder(registrations, source, seed, encoder)[0]
-            attach, learnt = _embedding(model, source, seed, encoder), train
+            attach = _embedding(model, source, seed, encoder)
+            learnt = train
         else:
-            attach, learnt = _remedies(source, seed, uncertainty), train.subset(np.arange(len(train))[:most_remedied])
+            attach = _remedies(source, seed, uncertainty)
+            learnt = train.subset(np.arange(len(train))[:most_remedied])
         explainer.fit(attach(learnt))
         explain[name] = _timed(explainer, attach)
     calibration = {name: of_name(held_out.without_labels()) for name, of_name in explain.items()}

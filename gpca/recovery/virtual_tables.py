@@ -25,7 +25,8 @@ PARTS = ("train", "test", "failures")
 
 def lay_tables(settings: RecoverySettings, source: str, seed: int) -> dict[str, Situations]:
     """Return the situations of every part; source and seed name all that is random in them."""
-    families, recovery = settings.situation.scenes.families, settings.section
+    families = settings.situation.scenes.families
+    recovery = settings.section
     surfaces = [surface for family in families for surface in procedural.surfaces(family)]
     shelf = Shelf(surfaces, source, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
     return {part: Situations(shelf, settings.situation, (source, seed, part)) for part in PARTS}

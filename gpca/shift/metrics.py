@@ -44,7 +44,7 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     """Return (source, learner, seed) -> rows of predictions, with the uncertainties `SCORES`, higher where less sure.
 
     Args:
-        prediction_files: named `…/{source}/{learner}/seed{seed}.csv`, as the step ``learn`` writes them.
+        prediction_files: named `…/{source}/{learner}/seed{seed}.csv`, as the step ``learners`` writes them.
         set_files: named `…/{source}/seed{seed}.npz`; their `DISTANCES` become columns of the rows.
 
     Raises:

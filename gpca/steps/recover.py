@@ -37,7 +37,8 @@ def run(options: Namespace) -> None:
     """Learn the classifier, find failures and let every policy act on them."""
     torch.set_num_threads(options.threads)
     settings = RecoverySettings.from_sections(options.settings)
-    recovery, loop = settings.section, settings.loop
+    recovery = settings.section
+    loop = settings.loop
     actions = {name: action_of(name, given or {}) for name, given in recovery["actions"].items()}
     explainers_read = [policy_entry(name, tuple(actions)).explainer for name in recovery["policies"]]
     outputs = [options.out, options.timings, options.policy, options.example]

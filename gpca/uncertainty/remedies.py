@@ -54,8 +54,10 @@ class RemedyRuns:
     ) -> None:
         self._xi_n_6 = xi_n_6
         self._settings = settings
-        self._T_init, self._T_icp = T_target_source_init, T_target_source_icp
-        self._source, self._target = source[random.permutation(len(source))], target
+        self._T_init = T_target_source_init
+        self._T_icp = T_target_source_icp
+        self._source = source[random.permutation(len(source))]
+        self._target = target
 
     def __call__(self, remedies: Remedies) -> Outcome:
         """Evaluate one combination; what several share is worked out, and charged, once."""

@@ -25,8 +25,8 @@ WITH_GPC["explain"] += 2  # classic features on depth frames
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
     (project.folder / "baselines/lazy.py").write_text(
-        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import Entry\n"
-        "EXPLAINERS = {'lazy': Entry('Lazy', GPCA)}\n"
+        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import ExplainerEntry\n"
+        "EXPLAINERS = {'lazy': ExplainerEntry('Lazy', GPCA)}\n"
     )
     project.append("config/smoke.yaml", "  lazy: {}\n")
     smoke = ("--configfile", "config/smoke.yaml")

@@ -7,7 +7,7 @@ rule kernels:
             f"results/{{{{run}}}}/embeddings/{{{{source}}}}/{EMBEDDING}/seed{{seed}}.npz",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.kernels"),
+        code=code_files("gpca.steps.kernel_grid"),
     output:
         collect("results/{{run}}/kernels/{{source}}/seed{seed}.csv", seed=SEEDS),
     log:
@@ -25,7 +25,7 @@ rule kernels:
         settings=settings("kernels"),
         seeds=SEEDS,
     shell:
-        "python -m gpca kernels --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "python -m gpca kernel_grid --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
         "--registrations {input.registrations} --embeddings {input.embeddings} "
         "--settings {params.settings:q} --out {output} 2> {log}"
 
@@ -72,7 +72,7 @@ rule shift:
 rule learn:
     input:
         sets=collect("results/{{run}}/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
-        code=code_files("gpca.steps.learn", *map(explainer_module, config["learners"])),
+        code=code_files("gpca.steps.learners", *map(explainer_module, config["learners"])),
     output:
         collect(
             "results/{{run}}/learners/{{source}}/{learner}/seed{seed}.csv",
@@ -95,7 +95,7 @@ rule learn:
         learners=list(LEARNER_SETTINGS),
         seeds=SEEDS,
     shell:
-        "python -m gpca learn --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "python -m gpca learners --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
         "--learners {params.learners} --settings {params.settings:q} --sets {input.sets} "
         "--out {output} 2> {log}"
 

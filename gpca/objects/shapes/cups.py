@@ -75,7 +75,8 @@ def build(cup: Cup) -> trimesh.Trimesh:
     """Mesh of one cup in metres, foot at z = 0, first handle towards +x."""
     radii, heights = np.array(cup.profile).T
     outline = PchipInterpolator(heights, radii)
-    top, lip = heights[-1], 0.45 * cup.wall
+    top = heights[-1]
+    lip = 0.45 * cup.wall
     z = _heights(0, cup.fillet, top, lip)
     outer = outline(z) - _inset(z, cup.fillet) - _inset(top - z, lip)
     body = revolve([(0, 0), *zip(outer, z, strict=True), (0, top)])

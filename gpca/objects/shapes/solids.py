@@ -100,7 +100,8 @@ def tube(
     steps_unit /= np.linalg.norm(steps_unit, axis=1, keepdims=True)
     tangents = np.concatenate([steps_unit[:1], steps_unit[:-1] + steps_unit[1:], steps_unit[-1:]])
     angles = np.linspace(0, 2 * np.pi, segments, endpoint=False)
-    across, rings = np.asarray(side, float), []
+    across = np.asarray(side, float)
+    rings = []
     for centre, radius, tangent in zip(path_K_3, radii_K, tangents, strict=True):
         tangent = tangent / np.linalg.norm(tangent)
         across = across - (across @ tangent) * tangent  # carried along the path, so that the circle never twists
