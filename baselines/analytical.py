@@ -27,8 +27,8 @@ class AnalyticalGPC:
         source, seed: name the draws.
         point_count: whether the point-count ratio is among the features.
         points: source points at which local shape is measured, drawn by split and sample; all where there are fewer.
-        neighbours: of a point, itself included, that make its local shape.
-        settings: of the GPC, as GP-CA's.
+        neighbours: how many points, itself included, make a point's local shape.
+        settings: those of the GPC, as for GP-CA.
     """
 
     def __init__(

@@ -28,7 +28,7 @@ class DirichletGP:
 
     Args:
         alpha: α_ε; small is confident.
-        iterations, learning_rate: of Adam on the marginal likelihood.
+        iterations, learning_rate: how Adam climbs the marginal likelihood.
         draws: M.
     """
 

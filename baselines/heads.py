@@ -30,9 +30,10 @@ class Heads:
     Args:
         axes: name the random numbers.
         heads: E.
-        rate: of the dropout before the last layer.
+        rate: that of the dropout before the last layer.
         hidden: units.
-        steps, learning_rate, weight_decay: of AdamW on the cross-entropy of random batches; the rate falls as a cosine.
+        steps, learning_rate, weight_decay: how AdamW lowers the cross-entropy of random batches; the rate falls as a
+            cosine.
     """
 
     def __init__(

@@ -90,8 +90,8 @@ def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:
     """Make scikit-learn's Gaussian process classifier: one against the rest, Laplace's approximation, RBF kernel.
 
     Args:
-        lengthscale: in units of √(2 d), the expected distance of two standardised embeddings. It stays fixed:
-            scikit-learn's optimiser takes minutes.
+        lengthscale: in units of √(2 d), the expected distance of two standardised embeddings. It stays fixed,
+            since scikit-learn's optimiser takes minutes.
     """
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel

@@ -16,7 +16,7 @@ from baselines.values import KnobValues, LearnedValues, ScaledValues
 from gpca.explainers.interface import ExplainerEntry
 
 ONE_AT_A_TIME = [0, 1, 2, 4]  # the corners with none or one of the three features present
-STEPS = [0, 8, 9, 10]  # of design ``additive``: untouched, and a small step of each knob
+STEPS = [0, 8, 9, 10]  # the conditions of design ``additive`` that are untouched or a small step of one knob
 
 
 def local_derivatives(uncertainty_N_K: np.ndarray) -> np.ndarray:

@@ -18,7 +18,10 @@ from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
-WORTHS = ("uncertainty", "residual")  # of a condition: KL in nats, or log distance from the target to the source
+WORTHS = (
+    "uncertainty",
+    "residual",
+)  # a condition's worth: KL in nats, or log distance from the target to the source
 
 
 class KnobValues:
@@ -34,7 +37,7 @@ class KnobValues:
         self._conditions = conditions
 
     def fit(self, registrations: Registrations) -> None:
-        """Nothing is learned."""
+        """Do nothing, since nothing is learned."""
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration by the values of its uncertainty."""

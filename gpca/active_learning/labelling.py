@@ -88,8 +88,8 @@ class Session:
         keys: split and number of each.
         start: labels that were known before anybody was asked.
         labels: the file of answers; those that it holds are learnt at once.
-        settings: of the classifier.
-        strategy: of :mod:`gpca.active_learning.acquisition`.
+        settings: how the classifier is fitted.
+        strategy: which one of :mod:`gpca.active_learning.acquisition` asks.
 
     Raises:
         InputError: fewer than two concepts are labelled.
@@ -124,7 +124,7 @@ class Session:
 
     @property
     def answered(self) -> dict[Key, str]:
-        """The answers that name a concept."""
+        """What was answered by naming a concept."""
         return {key: concept for key, concept in self.labels.labels.items() if concept != SKIPPED}
 
     def retrain(self) -> int:

@@ -74,7 +74,7 @@ def run_stream(
 
     Args:
         task: projected by `gpc`.
-        gpc: of :func:`gpca.active_learning.rounds.initial_gpc`; it is left as it is.
+        gpc: what :func:`gpca.active_learning.rounds.initial_gpc` returns; it is not changed.
 
     Returns:
         every so many arrivals: ``arrived``; ``present``, whether the quiet time is over; ``labels``

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ALL = "all"  # stands for every concept together in the column `concept`
 TIDY_COLUMNS = ("table", "source", "method", "metric", "concept", "seed", "value")
 PREDICTED_AS, ABSTAINED = "predicted_as_", "abstained"  # metrics of the confusion: predicted_as_<concept or abstained>
-CAUSAL_QUANTILE = 0.95  # of the clean uncertainties: what lies above is not the scatter of clean registrations
+CAUSAL_QUANTILE = 0.95  # above this quantile of the clean uncertainties begins what is not their scatter
 _CAUSAL_COLUMNS = ("sample", "split", "uncertainty_observed", "uncertainty_clean")
 
 

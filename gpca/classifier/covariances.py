@@ -50,7 +50,7 @@ def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tenso
         return scale_C_1_1 * (inner_A_B + base.offset[:, :, None]).square()
     squared_A_B = squared_distances(a_A_d, b_B_d)
     if isinstance(base, gpytorch.kernels.MaternKernel):
-        # Not zero under the root, where its derivative would be infinite.
+        # The root of zero has an infinite derivative, so the squares stay above it.
         scaled_C_A_B = squared_A_B.clamp_min(1e-15).sqrt() * (math.sqrt(3) / base.lengthscale)
         return scale_C_1_1 * (1 + scaled_C_A_B) * torch.exp(-scaled_C_A_B)
     if isinstance(base, gpytorch.kernels.RBFKernel):

@@ -32,7 +32,7 @@ class GPCSettings:
 
     Attributes:
         kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
-        learning_rate, iterations: of Adam on the ELBO of the whole training set.
+        learning_rate, iterations: how Adam climbs the ELBO of the whole training set.
         inducing: number of shared inducing inputs N_Z.
         draws: M, posterior draws per explanation.
     """
@@ -216,7 +216,7 @@ def _inducing_inputs(inputs_N_d: torch.Tensor, settings: GPCSettings, axes: tupl
 
 
 def _median_distance(inputs_N_d: torch.Tensor, axes: tuple, most: int = 1000) -> float:
-    """Median of the distances between distinct points (the median heuristic), at most `most` points drawn."""
+    """Return the median distance between distinct points (the median heuristic), of at most `most` drawn ones."""
     order = generator(*axes, "median").permutation(len(inputs_N_d))[:most]
     median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
     return median if median > 0 else 1.0

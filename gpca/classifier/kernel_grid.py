@@ -30,7 +30,7 @@ class KernelGrid:
     Attributes:
         kernels, learning_rates: every kernel is fitted at every rate.
         iterations: counts at which the classifier is judged; it is fitted up to the largest.
-        inducing, draws: as of :class:`gpca.classifier.gpc.GPCSettings`.
+        inducing, draws: see :class:`gpca.classifier.gpc.GPCSettings`.
     """
 
     kernels: tuple[str, ...] = ("rbf", "matern32", "polynomial")

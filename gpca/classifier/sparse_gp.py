@@ -19,7 +19,7 @@ from gpca.classifier.latents import Latents
 # gpytorch's in single precision: added to variances of the prior; the least variance of a latent.
 JITTER, LEAST_VARIANCE = 1e-4, 1e-6
 LIKELIHOOD_DRAWS = 10
-MEAN_DEVIATION = 1e-3  # of the variational mean at the start
+MEAN_DEVIATION = 1e-3  # the variational mean starts with this standard deviation
 
 
 class SparseGPs(nn.Module):
@@ -28,7 +28,7 @@ class SparseGPs(nn.Module):
     Args:
         kernel: a ``ScaleKernel`` of batch shape (C,).
         inducing_M_d: where the inducing inputs start; they are learnt too.
-        random: of the start of the mean, and of the draws for the likelihood.
+        random: it draws the start of the mean and the samples of the likelihood.
     """
 
     def __init__(self, kernel: gpytorch.kernels.ScaleKernel, inducing_M_d: Tensor, random: torch.Generator) -> None:

@@ -54,7 +54,7 @@ def check_reference(run: Path, reference: Path, tolerances: Mapping[str, float],
 
     Args:
         run, reference: folders.
-        tolerances: of each kind in `KINDS`, the largest difference of two means.
+        tolerances: the largest difference of two means, for each kind in `KINDS`.
         half_widths: a mean may also differ by so many half-widths of the reference's 95 % interval.
 
     Raises:

@@ -72,9 +72,9 @@ def compare(
         numbers: printed ones.
         results: file name -> its rows, as :func:`read_results` reads them.
         objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
-        tolerances: of each unit.
-        reasons: of what was not reached.
-        hardware: that times were measured on, where their file does not say.
+        tolerances: one for each unit.
+        reasons: why printed numbers were not reached.
+        hardware: what times were measured on, where their file does not say.
 
     Raises:
         InputError: a unit without tolerance.

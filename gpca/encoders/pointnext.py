@@ -42,8 +42,8 @@ class PointNeXt(nn.Module):
     the features that enter the stem, so every stage sees the frame and not only the shape within its balls.
 
     Args:
-        width: of the stem, 32 as published.
-        radius: of the first stage's balls, in units of the object's diameter.
+        width: that of the stem, 32 as published.
+        radius: that of the first stage's balls, in units of the object's diameter.
         neighbours: points of a ball, at most.
 
     Attributes:

@@ -31,11 +31,11 @@ class ExplainerEntry:
     """An explainer by name.
 
     Attributes:
-        title: as tables head its column.
-        make: called with source, seed and the settings of the config.
+        title: what tables call it.
+        make: what makes it from source, seed and the settings of the config.
         reads: what it needs attached: ``embeddings`` those of the encoder, ``uncertainty/<design>`` the outcomes of
             that design (:mod:`gpca.uncertainty.designs`); ``registrations`` nothing.
-        oracle: it is told the truth about what it explains; an upper bound, to be labelled so in its title.
+        oracle: whether it is told the truth about what it explains: an upper bound, which its title has to say.
     """
 
     title: str

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.environment import require_open3d
 
-NOTHING = -1  # of a pixel that sees no mesh
+NOTHING = -1  # the mesh of a pixel that sees none
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ class InitialPoseSettings:
     Attributes:
         form: ``results`` of an estimator, ``true_pose`` with an error, or ``global_registration``.
         rotation_deg, translation: largest error of ``true_pose``, the angle and in diameters, drawn uniformly.
-        voxel: of the features of ``global_registration``, in diameters.
+        voxel: the size at which ``global_registration`` computes features, in diameters.
         tries: random starts of RANSAC, of which the best is taken.
     """
 

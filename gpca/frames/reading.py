@@ -29,10 +29,10 @@ class Dataset:
     Attributes:
         name: seeds its draws and names its objects.
         folders: the dataset's, or those that its archives were unpacked in.
-        unit: of the models' vertices.
-        split: whose frames are read.
+        unit: the unit of the models' vertices.
+        split: the split whose frames are read.
         results: a BOP results file with initial poses, or None.
-        most_frames: as many frames are drawn where there are more.
+        most_frames: where there are more frames, so many are drawn.
     """
 
     name: str
@@ -175,8 +175,8 @@ class _Objects:
         if self._settings.form == "true_pose":
             return displace(seen["T_camera_object_true"], diameter_m, self._settings, generator(*axes))
         if number not in self._registration:
-            model = (self._objects.points(i), self._objects.normals(i))
-            self._registration[number] = GlobalRegistration(*model, diameter_m, self._settings)
+            points_m, normals = self._objects.points(i), self._objects.normals(i)
+            self._registration[number] = GlobalRegistration(points_m, normals, diameter_m, self._settings)
         return self._registration[number].register(seen["points_m"], seed_of(*axes))
 
     def _is_symmetric(self, number: int) -> bool:

@@ -13,8 +13,8 @@ from gpca.environment import require_open3d
 from gpca.frames.bop import back_project
 from gpca.frames.camera import Camera
 
-NEIGHBOURS, OUTLIER_RATIO = 20, 2.0  # of statistical outlier removal: Open3D's usual ones
-NEAR = 0.05  # of the diameter: a measured point that near lies on the model
+NEIGHBOURS, OUTLIER_RATIO = 20, 2.0  # Open3D's usual values for the removal of statistical outliers
+NEAR = 0.05  # diameters; a measured point that is so near lies on the model
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 OCCLUDER, HALF_SPACE = "occluder", "half_space"
-JUDGED_POINTS = 1000  # of the model, by which a pose error is measured
+JUDGED_POINTS = 1000  # so many points of the model measure a pose error
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class FrameSettings:
     """How instances become registrations.
 
     Attributes:
-        test_share: of the instances, in frames that training does not see.
+        test_share: the share of the instances that is in frames that training does not see.
         occluders: share of the overlap samples whose points an occluder takes; a half-space takes the others'.
         registration: numbers of samples, points, severities, ICP.
     """

@@ -12,7 +12,7 @@ from gpca.frames.camera import Camera, MeshScene, look_at
 from gpca.frames.rgbd_scene import table
 from gpca.frames.shots import NEAR, Shot
 
-VOXEL_M = 0.012  # of what else was measured, each as a box that hides what is behind it
+VOXEL_M = 0.012  # whatever else was measured becomes boxes of this size, which hide what is behind them
 ON_TABLE_M = 0.008  # what lies lower is the table
 _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 _SIDES = ([0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3])  # around each
@@ -54,9 +54,10 @@ def expected_surface(
     nobody has seen yet counts as free.
 
     Args:
-        vertices_m, faces: of the model. points_m: (Q, 3) on its surface. Both in the object's frame.
+        vertices_m, faces: the model, in its own frame.
+        points_m: (Q, 3) on its surface.
         T_world_object: the estimate.
-        camera: of few pixels, with which the candidates look.
+        camera: what the candidates look with; few pixels suffice.
     """
     placed_m = transform(T_world_object, points_m)
     reach_m = NEAR * diameter_m

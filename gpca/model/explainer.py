@@ -27,16 +27,16 @@ from gpca.recovery.policy import RecoveryPolicy
 from gpca.seeds import generator
 from gpca.uncertainty.spread import UncertaintySettings, run_from_starts
 
-LARGEST_RATIO = 8.0  # of the extents of source and target, either way; in the wrong unit it is 10 or more
+LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
 
 class Explainer:
     """GP-CA with a trained model.
 
     Args:
-        model: by default that of :func:`gpca.model.file.model_path`.
-        policy: from scores to what to do; by default the model's own.
-        device: of the encoder; by default a GPU where torch finds one.
+        model: by default the one that :func:`gpca.model.file.model_path` finds.
+        policy: what turns scores into an action; by default the model's own.
+        device: where the encoder runs; by default a GPU where torch finds one.
     """
 
     def __init__(
@@ -66,8 +66,8 @@ class Explainer:
         Args:
             source_points, target_points: (N, 3) what was observed, and the reference that it is aligned to.
             T_target_source_init: (4, 4) where ICP starts; the identity by default.
-            unit: of points and pose: ``m``, ``cm`` or ``mm``.
-            frame: of the target, where it is known already; by default measured on its points.
+            unit: that of points and pose: ``m``, ``cm`` or ``mm``.
+            frame: the target's, where it is known already; by default it is measured on its points.
             uncertainty: how the spread of the pose is measured; by default it is not.
 
         Raises:

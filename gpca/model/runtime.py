@@ -43,9 +43,9 @@ def measure(
     meets all of them.
 
     Args:
-        task: of active learning, not projected yet: its pool is what BALD selects from.
-        settings: of active learning.
-        axes: names of the draws (source, seed).
+        task: an experiment of active learning, not projected yet; BALD selects from its pool.
+        settings: those of active learning.
+        axes: the names of the draws (source, seed).
     """
     import pandas as pd
     import torch

@@ -35,8 +35,8 @@ def time_stages(
     """Measure ICP, feature extraction, posterior sampling and the scores.
 
     Args:
-        explainers: by device; each extracts features on its own.
-        pair: before ICP.
+        explainers: one per device, which extracts features there.
+        pair: the clouds before ICP.
     """
     source, target = pair
     start = np.eye(4)

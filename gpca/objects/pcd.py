@@ -35,7 +35,7 @@ class _Header:
 
 
 def parse(content: bytes, subject: object) -> np.ndarray:
-    """Points of a PCD file.
+    """Return the points of a PCD file.
 
     Args:
         content: the whole file.
@@ -132,7 +132,7 @@ _DECODERS = {"ascii": _ascii, "binary": _binary, "binary_compressed": _binary_co
 
 
 def _lzf_decompress(data: bytes) -> bytes:
-    """LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write."""
+    """Undo LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write."""
     out = bytearray()
     i = 0
     while i < len(data):

@@ -106,7 +106,7 @@ def data_files(entry: dict) -> list[Path]:
 
 
 def _unpacked(file: Path) -> Path:
-    # Named by content: an archive that was fetched anew is unpacked anew.
+    # The folder is named by content, so an archive that was fetched anew is unpacked anew.
     return archive.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
 
 

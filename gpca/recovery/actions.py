@@ -16,10 +16,10 @@ from gpca.alignment.rigid import inverse, scale_translation
 from gpca.errors import InputError
 from gpca.frames.shots import Shot, agreement, fuse
 
-LOOSER = 2.0  # the correspondence distance of the broader search, in that of ICP
-JUDGED = 8  # results of the search that the shots are compared with
+LOOSER = 2.0  # the broader search has so many times ICP's correspondence distance
+JUDGED = 8  # so many results of the search are compared with the shots
 MODEL_POINTS, CLOUD_POINTS = 512, 256
-BEHIND = (0.1, 0.25)  # diameters from the middle of the measured side to the object's centre, in turn
+BEHIND = (0.1, 0.25)  # the centre is tried so many diameters behind the middle of the measured side
 
 
 class Robot(Protocol):
@@ -43,10 +43,11 @@ class Holding:
     """What a robot has of a case.
 
     Attributes:
-        shots: by viewpoint.
-        T_world_object_init: the pose that ICP starts from. T_world_object: what it ended at.
-        frames: that are taken at a viewpoint.
-        filtered: statistical outliers are removed.
+        shots: one per viewpoint.
+        T_world_object_init: the pose that ICP starts from.
+        T_world_object: the pose that ICP ended at.
+        frames: how many are taken at a viewpoint.
+        filtered: whether statistical outliers are removed.
     """
 
     shots: tuple[Shot, ...]
@@ -103,7 +104,7 @@ def new_view(
     from gpca.frames.situations import coarse
     from gpca.frames.viewpoint import best_viewpoint, candidates, expected_surface
 
-    # About what was measured, not the estimated centre, which may be anywhere.
+    # The viewpoints surround what was measured, since the estimated centre may be anywhere.
     centre_m = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0)
     first = holding.shots[0]
     distance_m = float(np.linalg.norm(centre_m - first.T_world_camera[:3, 3]))
@@ -120,7 +121,8 @@ def new_view(
 
 def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames: int = 10) -> Holding:
     """Take several frames at every viewpoint and average them, and remove statistical outliers, from now on."""
-    frames += holding.frames * holding.filtered
+    if holding.filtered:  # it was taken before, and its frames count too
+        frames += holding.frames
     shots = tuple(robot.shoot(shot.T_world_camera, frames) for shot in holding.shots)
     measured = replace(holding, shots=shots, frames=frames, filtered=True)
     return best_start(measured, robot, [robot.estimate(shot, True) for shot in shots])

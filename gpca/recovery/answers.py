@@ -35,10 +35,10 @@ class Answers:
     """The answers so far.
 
     Args:
-        episodes: at the place of their number.
-        explain: explainer -> what attributes registrations; of those that the policies read.
-        actions: names of all.
-        budget: actions for each episode, at most.
+        episodes: each stands at the place of its number.
+        explain: for each explainer that the policies read, the function that attributes registrations.
+        actions: the names of all.
+        budget: how many actions an episode may take.
     """
 
     def __init__(

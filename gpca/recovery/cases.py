@@ -17,8 +17,8 @@ from gpca.pairs.synthesis import align_pair
 from gpca.recovery.actions import Action, Holding
 from gpca.seeds import generator
 
-FEWEST_POINTS = 64  # of the object in all shots; with fewer there is nothing to register
-JUDGED_POINTS = 1000  # of the model, by which a pose error is measured
+FEWEST_POINTS = 64  # with fewer points of the object in all shots there is nothing to register
+JUDGED_POINTS = 1000  # so many points of the model measure a pose error
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Attempt:
     """A registration: what the robot holds, the columns of its row, the truth about it.
 
     Attributes:
-        holding: with the pose that ICP ended at.
-        record: as :func:`gpca.pairs.synthesis.align_pair` returns it, less sample and split.
+        holding: what the robot has, with the pose that ICP ended at.
+        record: what :func:`gpca.pairs.synthesis.align_pair` returns, which lacks sample and split.
         error: ADD, or ADD-S of symmetric objects, relative to the diameter. Never shown to a policy.
-        seconds: of ICP and of the action before it, without the camera's.
+        seconds: what ICP and the action before it took, without the camera.
     """
 
     holding: Holding

@@ -22,7 +22,7 @@ from gpca.recovery.settings import LoopSettings
 if TYPE_CHECKING:
     import pandas as pd
 
-ACTION = "new_view"  # that the figure shows
+ACTION = "new_view"  # the figure shows this one
 SHOWN_POINTS = 3000
 
 

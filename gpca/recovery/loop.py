@@ -27,8 +27,8 @@ class Loop:
 
     Args:
         episodes: the failures.
-        actions: by name.
-        explain: explainer -> what attributes registrations; of those that the policies read.
+        actions: each by its name.
+        explain: for each explainer that the policies read, the function that attributes registrations.
         policy: the robot's thresholds and treatments.
     """
 

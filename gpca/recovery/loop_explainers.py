@@ -1,4 +1,4 @@
-"""The explainers that policies of recovery read, learnt from registrations of other scenes of the same camera."""
+"""The explainers that policies of recovery read. They learn from other scenes of the same camera."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class LoopExplainers:
     """Explainers by name, and how well each does on the calibration samples.
 
     Attributes:
-        explain: by name, of registrations without labels.
-        calibration: by name, what it says of the calibration samples.
-        concepts: (N,) the truth of those.
+        explain: for each name the function that attributes registrations without labels.
+        calibration: for each name what it says of the calibration samples.
+        concepts: (N,) the truth about those.
     """
 
     explain: Mapping[str, Explain]
@@ -49,7 +49,7 @@ def learn_explainers(
     """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration.
 
     Args:
-        names: of explainers (:mod:`gpca.explainers.interface`) that read embeddings or the design ``removal``.
+        names: explainers (:mod:`baselines.registry`) that read embeddings or the design ``removal``.
         settings: explainer -> its settings.
         most_remedied: training samples whose remedies are run, at most; Monte-Carlo ICP is slow.
     """
@@ -77,7 +77,7 @@ def _timed(explainer, attach) -> Explain:
         started = perf_counter()
         attached = attach(registrations)
         attribution = explainer.explain(attached)
-        # Divided evenly, as the encoder sees many at once; what remedies took is in the explainer's own seconds too.
+        # All get the same, as the encoder sees many at once; the explainer's own seconds hold what remedies took too.
         each = (perf_counter() - started) / len(registrations)
         return replace(attribution, seconds_N=np.full(len(registrations), each))
 

@@ -17,10 +17,10 @@ from gpca.recovery.policy import QUEUE
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLE = "recovery"  # what `table` and `source` of the tidy rows read
+TABLE = "recovery"  # `table` and `source` of the tidy rows read this
 RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "recovered", "tries")
 SECONDS = ("explanation_seconds", "action_seconds")
-FIRST = "first_"  # metrics of the confusion: first_<action or queue>
+FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
 
 
 def collect_recovery(files: Iterable[str | Path], treatments: Mapping[str, str], budget: int) -> pd.DataFrame:

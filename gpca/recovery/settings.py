@@ -29,8 +29,9 @@ class LoopSettings:
     """How the closed loop runs.
 
     Attributes:
-        failures: wanted for each cause. tries: registrations made for them, at most, for each cause.
-        budget: actions for each failure, at most.
+        failures: how many are wanted for each cause.
+        tries: how many registrations may be made to find them, for each cause.
+        budget: how many actions each failure may take.
         points: of source and target.
         icp: how ICP runs.
     """
@@ -50,7 +51,8 @@ class RecoverySettings:
         section: the config's section ``recovery``, for all that it hands on as it is.
         loop: how the loop runs.
         situation: what disturbs the registrations, and on which scenes.
-        encoder, uncertainty: of the explainers. explainers: explainer -> its own settings.
+        encoder, uncertainty: what the explainers share.
+        explainers: the settings of each explainer by its name.
     """
 
     section: Mapping

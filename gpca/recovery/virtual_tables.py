@@ -40,7 +40,7 @@ def register_situations(
     Samples 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
 
     Args:
-        situations: of ``train`` and ``test``, which share no table.
+        situations: those of ``train`` and ``test``, which share no table.
 
     Returns:
         the registrations, and which of them failed (S,).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-PRINCIPAL_COMPONENTS = 16  # of an embedding, in which its distances are measured
+PRINCIPAL_COMPONENTS = 16  # distances between embeddings are measured in so many
 
 
 def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int = 10) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Making samples unlike those of the training: severities beyond it, another source, objects never seen."""
+"""Makes samples unlike those of the training: severities beyond it, another source, objects never seen."""
 
 from __future__ import annotations
 

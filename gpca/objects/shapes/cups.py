@@ -107,7 +107,7 @@ def _heights(bottom: float, fillet: float, top: float, lip: float) -> np.ndarray
 
 
 def _inset(distance: np.ndarray, radius: float) -> np.ndarray:
-    """How far a fillet of this radius draws the wall in at a distance from the end."""
+    """Return how far a fillet of this radius draws the wall in at a distance from the end."""
     beyond = np.clip(radius - distance, 0, radius)
     return radius - np.sqrt(radius**2 - beyond**2)
 
