@@ -30,7 +30,7 @@ class ActiveLearningSettings:
         labels: L, the budget of queries.
         batch: B, labels per round.
         iterations, tolerance: the most passes over the labels in a retraining, and when it ends before.
-        gpc: the classifier that knows two concepts; its kernel and inducing inputs stay from then on.
+        gpc: the classifier that knows two concepts; its covariance and inducing inputs stay from then on.
     """
 
     initial: int = 120
@@ -65,7 +65,7 @@ class Task(Generic[Inputs]):
     test: Samples
 
     def project(self, gpc: GPC) -> Task[Projection]:
-        """Return the task with every embedding as the GPC's kernel sees it."""
+        """Return the task with every embedding as the GPC's covariance sees it."""
         parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
         return Task(self.held_out, *parts)
 
