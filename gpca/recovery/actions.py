@@ -110,11 +110,17 @@ def new_view(
     distance_m = float(np.linalg.norm(centre_m - first.T_world_camera[:3, 3]))
     poses_n = candidates(centre_m, distance_m, azimuths, elevations_deg)
     points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
-    mesh = (robot.vertices_m, robot.faces)
-    expected = expected_surface(
-        holding.shots, *mesh, points_m, holding.T_world_object, robot.diameter_m, poses_n, coarse(first.camera)
+    together_n, alone_n = expected_surface(
+        holding.shots,
+        robot.vertices_m,
+        robot.faces,
+        points_m,
+        holding.T_world_object,
+        robot.diameter_m,
+        poses_n,
+        coarse(first.camera),
     )
-    shot = robot.shoot(poses_n[best_viewpoint(*expected)], holding.frames)
+    shot = robot.shoot(poses_n[best_viewpoint(together_n, alone_n)], holding.frames)
     looked = replace(holding, shots=(*holding.shots, shot))
     return best_start(looked, robot, [robot.estimate(shot, looked.filtered)])
 
@@ -139,9 +145,10 @@ def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None
     cloud_m = cloud_m[:: max(1, len(cloud_m) // CLOUD_POINTS)]
     if not len(cloud_m):
         return holding
-    model = (robot.points_m[::step].astype(np.float64), robot.normals[::step])
+    model_m = robot.points_m[::step].astype(np.float64)
+    normals = robot.normals[::step]
     known = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
-    shares = [agreement(holding.shots, cloud_m, *model, T, d) for T in known]
+    shares = [agreement(holding.shots, cloud_m, model_m, normals, T, d) for T in known]
     return replace(holding, T_world_object_init=known[int(np.argmax(shares))])
 
 
