@@ -16,7 +16,7 @@ import numpy as np
 from gpca.attribution.scores import Attribution
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 
 
@@ -27,8 +27,8 @@ class AnalyticalGPC:
         source, seed: name the draws.
         point_count: whether the point-count ratio is among the features.
         points: source points at which local shape is measured, drawn by split and sample; all where there are fewer.
-        neighbours: of a point, itself included, that make its local shape.
-        settings: of the GPC, as GP-CA's.
+        neighbours: how many points, itself included, make a point's local shape.
+        settings: those of the GPC, as for GP-CA.
     """
 
     def __init__(
@@ -67,8 +67,8 @@ class AnalyticalGPC:
 
 
 EXPLAINERS = {
-    "analytical_gpc": Entry("Analytical features (GPC)", AnalyticalGPC),
-    "analytical_gpc_no_counts": Entry(
+    "analytical_gpc": ExplainerEntry("Analytical features (GPC)", AnalyticalGPC),
+    "analytical_gpc_no_counts": ExplainerEntry(
         "Analytical features without point counts (GPC)", partial(AnalyticalGPC, point_count=False)
     ),
 }

@@ -15,7 +15,7 @@ from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -68,4 +68,4 @@ class ConceptVectors:
         return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
 
 
-EXPLAINERS = {"concept_vectors": Entry("Concept activation vectors", ConceptVectors, reads="embeddings")}
+EXPLAINERS = {"concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, reads="embeddings")}

@@ -15,7 +15,7 @@ import numpy as np
 from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
 from gpca.attribution.scores import Attribution, summarise_marginals
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
@@ -28,7 +28,7 @@ class DirichletGP:
 
     Args:
         alpha: α_ε; small is confident.
-        iterations, learning_rate: of Adam on the marginal likelihood.
+        iterations, learning_rate: how Adam climbs the marginal likelihood.
         draws: M.
     """
 
@@ -42,7 +42,10 @@ class DirichletGP:
         draws: int = 1000,
     ) -> None:
         self._axes = (source, seed, "dirichlet")
-        self._alpha, self._iterations, self._learning_rate, self._draws = alpha, iterations, learning_rate, draws
+        self._alpha = alpha
+        self._iterations = iterations
+        self._learning_rate = learning_rate
+        self._draws = draws
 
     def fit(self, registrations: Registrations) -> None:
         """Fit to the labelled embeddings; fewer than two concepts among the labels raise an InputError."""
@@ -61,7 +64,8 @@ class DirichletGP:
         likelihood = DirichletClassificationLikelihood(
             targets_N, alpha_epsilon=self._alpha, num_classes=len(CONCEPTS), dtype=torch.float64
         )
-        values_C_N, noise_C_N = likelihood.transformed_targets, likelihood.noise_covar.noise.detach()
+        values_C_N = likelihood.transformed_targets
+        noise_C_N = likelihood.noise_covar.noise.detach()
         median = float(squared_N_N.median()) ** 0.5
         self._log_lengthscale_C = torch.full((len(CONCEPTS),), np.log(median if median > 0 else 1.0)).double()
         self._log_scale_C = values_C_N.var(dim=1).log()
@@ -119,4 +123,4 @@ class DirichletGP:
         return torch.from_numpy(self._scaler.transform(h_N_d))
 
 
-EXPLAINERS = {"learner_dirichlet_gp": Entry("Dirichlet exact GP", DirichletGP, reads="embeddings")}
+EXPLAINERS = {"learner_dirichlet_gp": ExplainerEntry("Dirichlet exact GP", DirichletGP, reads="embeddings")}

@@ -16,7 +16,7 @@ import numpy as np
 from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
 from gpca.attribution.scores import Attribution, summarise_draws
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
@@ -30,9 +30,10 @@ class Heads:
     Args:
         axes: name the random numbers.
         heads: E.
-        rate: of the dropout before the last layer.
+        rate: that of the dropout before the last layer.
         hidden: units.
-        steps, learning_rate, weight_decay: of AdamW on the cross-entropy of random batches; the rate falls as a cosine.
+        steps, learning_rate, weight_decay: how AdamW lowers the cross-entropy of random batches; the rate falls as a
+            cosine.
     """
 
     def __init__(
@@ -45,8 +46,13 @@ class Heads:
         learning_rate: float = 2e-3,
         weight_decay: float = 1e-2,
     ) -> None:
-        self._axes, self._heads, self._rate, self._hidden = axes, heads, rate, hidden
-        self._steps, self._learning_rate, self._weight_decay = steps, learning_rate, weight_decay
+        self._axes = axes
+        self._heads = heads
+        self._rate = rate
+        self._hidden = hidden
+        self._steps = steps
+        self._learning_rate = learning_rate
+        self._weight_decay = weight_decay
 
     def fit(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
         """Train on standardised embeddings and the numbers of their concepts."""
@@ -54,7 +60,8 @@ class Heads:
         from sklearn.preprocessing import StandardScaler
 
         self._scaler = StandardScaler().fit(h_N_d)
-        inputs_N_d, targets_N = self._inputs(h_N_d), torch.from_numpy(target_N)
+        inputs_N_d = self._inputs(h_N_d)
+        targets_N = torch.from_numpy(target_N)
         random = torch.Generator().manual_seed(seed_of(*self._axes))
         widths = (h_N_d.shape[1], self._hidden, len(CONCEPTS))
         self._layers = []
@@ -150,7 +157,8 @@ class Dropout(HeadLearner):
 
     def __init__(self, source: str, seed: int, rate: float = 0.5, passes: int = 100, **training) -> None:
         super().__init__(source, seed, rate=rate, **training)
-        self._rate, self._passes = rate, passes
+        self._rate = rate
+        self._passes = passes
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
         hidden_1_N_H = self._heads.hidden(h_N_d)
@@ -159,6 +167,6 @@ class Dropout(HeadLearner):
 
 
 EXPLAINERS = {
-    "learner_ensemble": Entry("Deep ensemble of heads", Ensemble, reads="embeddings"),
-    "learner_dropout": Entry("MC dropout of the head", Dropout, reads="embeddings"),
+    "learner_ensemble": ExplainerEntry("Deep ensemble of heads", Ensemble, reads="embeddings"),
+    "learner_dropout": ExplainerEntry("MC dropout of the head", Dropout, reads="embeddings"),
 }

@@ -7,7 +7,7 @@ import numpy as np
 from baselines.heads import HeadLearner
 from gpca.attribution.diagnostics import negative_log_likelihood
 from gpca.attribution.scores import summarise_draws
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 
@@ -29,7 +29,8 @@ class LastLayerLaplace(HeadLearner):
 
     def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
         order_N = generator(*self._axes, "validation").permutation(len(target_N))
-        validation, rest = order_N[::5], np.delete(order_N, np.s_[::5])
+        validation = order_N[::5]
+        rest = np.delete(order_N, np.s_[::5])
         precision = self.PRECISIONS[0]
         if len(rest):
             super()._train(h_N_d[rest], target_N[rest])
@@ -43,14 +44,16 @@ class LastLayerLaplace(HeadLearner):
         self._approximate(h_N_d, target_N, precision)
 
     def _approximate(self, h_N_d: np.ndarray, target_N: np.ndarray, precision: float) -> None:
-        features_N_F, wanted_N_C = self._features(h_N_d), np.eye(len(CONCEPTS))[target_N]
+        features_N_F = self._features(h_N_d)
+        wanted_N_C = np.eye(len(CONCEPTS))[target_N]
         self._weights_F_C = _regularised_weights(features_N_F, wanted_N_C, precision)
         p_N_C = np.exp(_log_softmax(features_N_F @ self._weights_F_C))
         eigenvalues, self._vectors = np.linalg.eigh(_gauss_newton(features_N_F, p_N_C))
         self._deviations = 1 / np.sqrt(np.maximum(eigenvalues, 0) + precision)
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
-        features_N_F, n_classes = self._features(h_N_d), len(CONCEPTS)
+        features_N_F = self._features(h_N_d)
+        n_classes = len(CONCEPTS)
         # W (C·F, K) with covariance W Wᵀ of the weights; that of a sample's logits is then R Rᵀ with R (C, K).
         roots_C_F_K = (self._vectors * self._deviations).reshape(n_classes, features_N_F.shape[1], -1)
         roots_C_N_K = features_N_F @ roots_C_F_K
@@ -95,5 +98,5 @@ def _log_softmax(logits_N_C: np.ndarray) -> np.ndarray:
 
 
 EXPLAINERS = {
-    "learner_laplace_head": Entry("Last-layer Laplace of the head", LastLayerLaplace, reads="embeddings"),
+    "learner_laplace_head": ExplainerEntry("Last-layer Laplace of the head", LastLayerLaplace, reads="embeddings"),
 }

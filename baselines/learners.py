@@ -14,7 +14,7 @@ from baselines.attached import attached
 from baselines.concept_classifier import ConceptClassifier, standardised_regression
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -90,8 +90,8 @@ def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:
     """Make scikit-learn's Gaussian process classifier: one against the rest, Laplace's approximation, RBF kernel.
 
     Args:
-        lengthscale: in units of √(2 d), the expected distance of two standardised embeddings. It stays fixed:
-            scikit-learn's optimiser takes minutes.
+        lengthscale: in units of √(2 d), the expected distance of two standardised embeddings. It stays fixed,
+            since scikit-learn's optimiser takes minutes.
     """
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
@@ -115,10 +115,10 @@ def _standardised(*steps):
 
 
 EXPLAINERS = {
-    "learner_forest": Entry("Random forest on the embedding", forest, reads="embeddings"),
-    "learner_linear_svm": Entry("Linear SVM on the embedding", linear_svm, reads="embeddings"),
-    "learner_rbf_svm": Entry("RBF SVM on the embedding", rbf_svm, reads="embeddings"),
-    "learner_logistic": Entry("Logistic regression on the embedding", logistic, reads="embeddings"),
-    "learner_nearest": Entry("k nearest embeddings", nearest, reads="embeddings"),
-    "learner_laplace_gpc": Entry("Laplace GPC on the embedding", laplace_gpc, reads="embeddings"),
+    "learner_forest": ExplainerEntry("Random forest on the embedding", forest, reads="embeddings"),
+    "learner_linear_svm": ExplainerEntry("Linear SVM on the embedding", linear_svm, reads="embeddings"),
+    "learner_rbf_svm": ExplainerEntry("RBF SVM on the embedding", rbf_svm, reads="embeddings"),
+    "learner_logistic": ExplainerEntry("Logistic regression on the embedding", logistic, reads="embeddings"),
+    "learner_nearest": ExplainerEntry("k nearest embeddings", nearest, reads="embeddings"),
+    "learner_laplace_gpc": ExplainerEntry("Laplace GPC on the embedding", laplace_gpc, reads="embeddings"),
 }

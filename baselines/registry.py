@@ -9,15 +9,15 @@ from inspect import signature
 
 import baselines
 from gpca.errors import InputError
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 
 
-def explainers() -> dict[str, Entry]:
+def explainers() -> dict[str, ExplainerEntry]:
     """Return all explainers by name: GP-CA itself and those of every file in ``baselines/``."""
     return {name: entry for entries in _by_module().values() for name, entry in entries.items()}
 
 
-def explainer_entry(name: str) -> Entry:
+def explainer_entry(name: str) -> ExplainerEntry:
     """Return the explainer of that name; an unknown one raises an InputError that lists the known."""
     found = explainers()
     if name not in found:
@@ -39,6 +39,6 @@ def explainer_module(name: str) -> str:
     return next(module for module, entries in _by_module().items() if name in entries)
 
 
-def _by_module() -> dict[str, dict[str, Entry]]:
+def _by_module() -> dict[str, dict[str, ExplainerEntry]]:
     rivals = sorted(f"baselines.{module.name}" for module in pkgutil.iter_modules(baselines.__path__))
     return {name: getattr(import_module(name), "EXPLAINERS", {}) for name in ("gpca.explainers.gpca", *rivals)}

@@ -14,7 +14,7 @@ import numpy as np
 from baselines.attached import attached
 from baselines.concept_classifier import ConceptClassifier, standardised_regression
 from gpca.attribution.scores import Attribution
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
@@ -98,6 +98,8 @@ def residuals_forest(source: str, seed: int, trees: int = 200, floor: float = FL
 
 
 EXPLAINERS = {
-    "residuals_logistic": Entry("Residuals (logistic regression)", residuals_logistic, reads="uncertainty/removal"),
-    "residuals_forest": Entry("Residuals (random forest)", residuals_forest, reads="uncertainty/removal"),
+    "residuals_logistic": ExplainerEntry(
+        "Residuals (logistic regression)", residuals_logistic, reads="uncertainty/removal"
+    ),
+    "residuals_forest": ExplainerEntry("Residuals (random forest)", residuals_forest, reads="uncertainty/removal"),
 }

@@ -13,10 +13,10 @@ from functools import partial
 import numpy as np
 
 from baselines.values import KnobValues, LearnedValues, ScaledValues
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 
 ONE_AT_A_TIME = [0, 1, 2, 4]  # the corners with none or one of the three features present
-STEPS = [0, 8, 9, 10]  # of design ``additive``: untouched, and a small step of each knob
+STEPS = [0, 8, 9, 10]  # the conditions of design ``additive`` that are untouched or a small step of one knob
 
 
 def local_derivatives(uncertainty_N_K: np.ndarray) -> np.ndarray:
@@ -35,7 +35,8 @@ def partial_rank_correlations(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -
     from scipy.stats import rankdata
 
     values_N_3 = np.zeros((len(outputs_N_K), inputs_K_3.shape[1]))
-    ranks_K_3, ranks_N_K = rankdata(inputs_K_3, axis=0), rankdata(outputs_N_K, axis=1)
+    ranks_K_3 = rankdata(inputs_K_3, axis=0)
+    ranks_N_K = rankdata(outputs_N_K, axis=1)
     for i, rank_K in enumerate(ranks_K_3.T):
         others = np.column_stack([np.ones(len(rank_K)), np.delete(ranks_K_3, i, axis=1)])
         basis, _ = np.linalg.qr(others)
@@ -102,10 +103,12 @@ def sa_supervised(source: str, seed: int, inverse_regularisation: float = 1.0) -
 
 
 EXPLAINERS = {
-    "sa_local_additive": Entry("SA", sa_local_additive, reads="uncertainty/additive"),
-    "sa_prcc_additive": Entry("SA, PRCC", sa_prcc_additive, reads="uncertainty/latin"),
-    "sa_sobol_additive": Entry("SA, Sobol", sa_sobol_additive, reads="uncertainty/saltelli"),
-    "sa_local_removal": Entry("SA, remedies", sa_local_removal, reads="uncertainty/removal"),
-    "sa_local_removal_residual": Entry("SA, remedies, residual", sa_local_removal, reads="uncertainty/removal"),
-    "sa_supervised": Entry("SA, remedies, learned", sa_supervised, reads="uncertainty/removal"),
+    "sa_local_additive": ExplainerEntry("SA", sa_local_additive, reads="uncertainty/additive"),
+    "sa_prcc_additive": ExplainerEntry("SA, PRCC", sa_prcc_additive, reads="uncertainty/latin"),
+    "sa_sobol_additive": ExplainerEntry("SA, Sobol", sa_sobol_additive, reads="uncertainty/saltelli"),
+    "sa_local_removal": ExplainerEntry("SA, remedies", sa_local_removal, reads="uncertainty/removal"),
+    "sa_local_removal_residual": ExplainerEntry(
+        "SA, remedies, residual", sa_local_removal, reads="uncertainty/removal"
+    ),
+    "sa_supervised": ExplainerEntry("SA, remedies, learned", sa_supervised, reads="uncertainty/removal"),
 }

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.values import KnobValues, LearnedValues, ScaledValues
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 
 ALL_CORNERS = list(range(8))
 
@@ -48,9 +48,9 @@ def shap_supervised(source: str, seed: int, inverse_regularisation: float = 1.0)
 
 
 EXPLAINERS = {
-    "shap_additive": Entry("SHAP", shap_over_knobs, reads="uncertainty/additive"),
-    "shap_oracle": Entry("SHAP (oracle)", shap_over_knobs, reads="uncertainty/oracle", oracle=True),
-    "shap_removal": Entry("SHAP, remedies", shap_removal, reads="uncertainty/removal"),
-    "shap_removal_residual": Entry("SHAP, remedies, residual", shap_removal, reads="uncertainty/removal"),
-    "shap_supervised": Entry("SHAP, remedies, learned", shap_supervised, reads="uncertainty/removal"),
+    "shap_additive": ExplainerEntry("SHAP", shap_over_knobs, reads="uncertainty/additive"),
+    "shap_oracle": ExplainerEntry("SHAP (oracle)", shap_over_knobs, reads="uncertainty/oracle", oracle=True),
+    "shap_removal": ExplainerEntry("SHAP, remedies", shap_removal, reads="uncertainty/removal"),
+    "shap_removal_residual": ExplainerEntry("SHAP, remedies, residual", shap_removal, reads="uncertainty/removal"),
+    "shap_supervised": ExplainerEntry("SHAP, remedies, learned", shap_supervised, reads="uncertainty/removal"),
 }

@@ -6,7 +6,7 @@ from time import perf_counter
 
 from baselines.attached import attached
 from gpca.attribution.scores import Attribution
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -29,4 +29,4 @@ class SoftmaxHead:
         return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
 
 
-EXPLAINERS = {"softmax_head": Entry("Softmax head", SoftmaxHead, reads="embeddings")}
+EXPLAINERS = {"softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, reads="embeddings")}

@@ -18,7 +18,10 @@ from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
-WORTHS = ("uncertainty", "residual")  # of a condition: KL in nats, or log distance from the target to the source
+WORTHS = (
+    "uncertainty",
+    "residual",
+)  # a condition's worth: KL in nats, or log distance from the target to the source
 
 
 class KnobValues:
@@ -30,10 +33,11 @@ class KnobValues:
     """
 
     def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int] | None = None) -> None:
-        self._values, self._conditions = values, conditions
+        self._values = values
+        self._conditions = conditions
 
     def fit(self, registrations: Registrations) -> None:
-        """Nothing is learned."""
+        """Do nothing, since nothing is learned."""
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration by the values of its uncertainty."""
@@ -55,12 +59,15 @@ class ScaledValues:
     def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], worth: str) -> None:
         if worth not in WORTHS:
             raise InputError("setting 'worth'", f"unknown '{worth}'", f"known are {', '.join(WORTHS)}")
-        self._values, self._conditions, self._worth = values, conditions, worth
+        self._values = values
+        self._conditions = conditions
+        self._worth = worth
 
     def fit(self, registrations: Registrations) -> None:
         """Learn mean and standard deviation of each value."""
         values_N_3 = self._values(-corners(registrations, self._worth))
-        self._mean_3, self._deviation_3 = values_N_3.mean(axis=0), np.maximum(values_N_3.std(axis=0), 1e-9)
+        self._mean_3 = values_N_3.mean(axis=0)
+        self._deviation_3 = np.maximum(values_N_3.std(axis=0), 1e-9)
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration by its scaled values."""
@@ -76,7 +83,8 @@ class LearnedValues:
     def __init__(
         self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], inverse_regularisation: float
     ) -> None:
-        self._values, self._conditions = values, conditions
+        self._values = values
+        self._conditions = conditions
         self._classifier = ConceptClassifier(standardised_regression(inverse_regularisation))
 
     def fit(self, registrations: Registrations) -> None:

@@ -90,11 +90,11 @@ def blobs(n: int, width: int):
 def plain_form(gpc, h_N_d, labels_N):
     """Return a call that fits gpytorch's form from where the GPC's fit started; its result is then its `model`."""
     import torch
-    from tests.gpytorch_form import fit
 
     from gpca.classifier.covariances import make_covariance
     from gpca.classifier.gpc import _inducing_inputs, _median_distance
     from gpca.seeds import seed_of
+    from tests.classifier.gpytorch_form import fit
 
     inputs_N_d, targets_N, settings = gpc._scaled(h_N_d), torch.from_numpy(gpc._targets(labels_N)), gpc.settings
     inducing_M_d = _inducing_inputs(inputs_N_d, settings, gpc._axes)

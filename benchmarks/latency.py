@@ -129,15 +129,15 @@ class PlainComposition:
         from copy import deepcopy
 
         import torch
-        from tests.gpytorch_form import LatentGPs
 
         from benchmarks.edge_conv import per_edge_form
+        from tests.classifier.gpytorch_form import LatentGPs
 
         self._model = model
         self._encoder = per_edge_form(model.encoder).eval()
         state = model.gpc.state()
         self._mean, self._scale = state["scaler_mean"], state["scaler_scale"]
-        self._gps = LatentGPs(deepcopy(model.gpc._prior.kernel), state["inducing"].clone())
+        self._gps = LatentGPs(deepcopy(model.gpc._prior.covariance), state["inducing"].clone())
         strategy, posterior = self._gps.strategy, self._gps.strategy._variational_distribution
         posterior.variational_mean.data = state["mean"].float()
         posterior.chol_variational_covar.data = torch.linalg.cholesky(state["covariance"]).float()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,15 +22,13 @@ if TYPE_CHECKING:
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success it is renamed to `path`, on failure removed.
 
-    A reader therefore never sees half a file, and a killed run leaves the old one in place; the half that it may leave
-    beside it is removed by whoever writes the file next.
+    A reader therefore never sees half a file, and a killed run leaves the old one in place. The half that it may leave
+    beside it has a fixed name, so whoever writes the file next replaces it; no two jobs of a workflow write one file.
     The temporary name keeps the suffix, because several writers choose their format by it.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    for left in _left_by_the_killed(path.parent, f".{path.stem}.", f".partial{path.suffix}"):
-        left.unlink(missing_ok=True)
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:
         yield partial
         partial.replace(path)
@@ -43,37 +40,15 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 def whole_folder(path: str | Path) -> Iterator[Path]:
     """Yield a temporary folder beside `path`; on success it takes the place of `path`, on failure it is removed."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    for left in _left_by_the_killed(path.parent, f".{path.name}.", ".partial"):
-        shutil.rmtree(left, ignore_errors=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    partial.mkdir()
+    partial = path.with_name(f".{path.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)  # what a killed run left
+    partial.mkdir(parents=True)
     try:
         yield partial
         shutil.rmtree(path, ignore_errors=True)
         partial.replace(path)
     finally:
         shutil.rmtree(partial, ignore_errors=True)
-
-
-def _left_by_the_killed(folder: Path, before: str, after: str) -> list[Path]:
-    """Return the temporary paths with such a beginning and end whose process, named between, runs no more."""
-    found = []
-    for path in folder.iterdir():
-        process = path.name.removeprefix(before).removesuffix(after)
-        if path.name == f"{before}{process}{after}" and process.isdecimal() and not _runs(int(process)):
-            found.append(path)
-    return found
-
-
-def _runs(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        pass  # it runs, and belongs to somebody else
-    return True
 
 
 def sha256_of_file(path: str | Path) -> str:

@@ -77,7 +77,7 @@ STEP_OPTIONS = {
         "--embeddings-without": "without.npz", "--strategies": ["random", "bald_kmeans", "stream_bald"],
         "--out": ["random.csv", "bald_kmeans.csv", "stream_bald.csv"],
     },
-    "kernels": COMMON | {
+    "kernel_grid": COMMON | {
         "--settings": {"kernels": ["rbf", "polynomial"], "iterations": [2, 4], "inducing": 6, "draws": 20},
         "--seeds": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "grid.csv",
     },
@@ -87,7 +87,7 @@ STEP_OPTIONS = {
         "--other-registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--encoders": "weights.pt",
         "--out": "shifted.npz",
     },
-    "learn": COMMON | {
+    "learners": COMMON | {
         "--settings": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "learner_nearest": {}}, "--seeds": 0,
         "--learners": ["gpca", "learner_nearest"], "--sets": "shifted.npz", "--out": ["learnt.csv", "nearest.csv"],
     },
@@ -183,9 +183,9 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
         "attribute",
         "without",
         "active_learning",
-        "kernels",
+        "kernel_grid",
         "shift",
-        "learn",
+        "learners",
     ):
         assert main(arguments(step)) == 0
     for name in (
@@ -365,11 +365,11 @@ FAULTS = {
         (untouched, {"--strategies": ["random", "bald", "oracle"]}, r"strategy 'oracle': unknown; known are random"),
         (untouched, {"--strategies": ["random"]}, r"--out: 3 file\(s\) for 1 strategies"),
     ],
-    "kernels": [
+    "kernel_grid": [
         (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
         (arrays_changed("embeddings.npz", h=lambda h: h * np.nan), {}, r"embeddings.npz: array 'h' holds NaN"),
-        (untouched, settings("kernels", kernels=["cubic"]), r"setting kernels.0: 'cubic' is not one of"),
-        (untouched, settings("kernels", iterations=[0]), r"setting iterations.0: 0 is less than the minimum"),
+        (untouched, settings("kernel_grid", kernels=["cubic"]), r"setting kernels.0: 'cubic' is not one of"),
+        (untouched, settings("kernel_grid", iterations=[0]), r"setting iterations.0: 0 is less than the minimum"),
         (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\)"),
     ],
     "shift": [
@@ -380,12 +380,12 @@ FAULTS = {
         (untouched, settings("shift", shifts={}), r"setting shifts: unknown; known are shift, registrations, encoder"),
         (untouched, {"--other-registrations": ["registrations.npz"] * 2}, r"--other-registrations: 2 file\(s\) for 1"),
     ],
-    "learn": [
+    "learners": [
         (removed("shifted.npz"), {}, r"shifted.npz: no such file; make it with 'python -m gpca shift'"),
         (arrays_changed("shifted.npz", h=lambda h: h * np.nan), {}, r"shifted.npz: array 'h' holds NaN"),
         (arrays_changed("shifted.npz", concept=lambda c: np.full_like(c, "pose")),
          {"--learners": ["learner_nearest", "gpca"]}, r"fewer than two concepts"),
-        (untouched, settings("learn", gpca={"iteration": 5}), r"explainer 'gpca': .*iteration|setting iteration"),
+        (untouched, settings("learners", gpca={"iteration": 5}), r"explainer 'gpca': .*iteration|setting iteration"),
         (untouched, {"--learners": ["gpca", "learner_oracle"]}, r"explainer 'learner_oracle': unknown"),
         (untouched, {"--learners": ["gpca", "residuals_forest"]}, r"'residuals_forest': does not read embeddings"),
         (untouched, {"--learners": ["gpca"]}, r"--out: 2 file\(s\), not 1; give one per learner and seed"),

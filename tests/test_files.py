@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.files import load_arrays, save_arrays, whole_file, whole_folder
 
+ROOT = Path(__file__).resolve().parents[1]
 SHAPES = {"points": ("P", 3), "labels": ("P",)}
 GOOD = {"points": np.arange(12.0).reshape(4, 3), "labels": np.array(["a", "b", "a", "b"])}
 
@@ -111,19 +113,29 @@ def test_faulty_files_are_refused_in_one_line(tmp_path, write, expected):
     assert "\n" not in line
 
 
-@pytest.mark.parametrize("whole", [whole_file, whole_folder])
-def test_the_half_that_a_killed_process_left_is_removed_and_that_of_a_running_one_is_not(whole, tmp_path):
-    ended = subprocess.Popen([sys.executable, "-c", ""])
-    ended.wait()
-    path = tmp_path / ("seed0.checkpoint" if whole is whole_file else "scenes")
-    left, running, other = (
-        path.with_name(f".{stem}.{process}.partial{path.suffix}" if path.suffix else f".{stem}.{process}.partial")
-        for stem, process in ((path.stem, ended.pid), (path.stem, os.getppid()), ("seed01", ended.pid))
-    )
-    for half in (left, running, other):
-        half.touch() if whole is whole_file else half.mkdir()
+HALF = """
+import sys, time
+from gpca.files import whole_file, whole_folder
+whole = {"file": whole_file, "folder": whole_folder}[sys.argv[1]]
+with whole(sys.argv[2]) as partial:
+    (partial / "two" if partial.is_dir() else partial).write_text("half of what was killed")
+    print("half", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize(("kind", "whole"), [("file", whole_file), ("folder", whole_folder)])
+def test_what_a_killed_run_leaves_is_hidden_and_gone_after_the_next_one(kind, whole, tmp_path):
+    path = tmp_path / ("seed0.checkpoint" if kind == "file" else "scenes")
+    of_another = tmp_path / (".seed01.partial.checkpoint" if kind == "file" else ".scenes2.partial")
+    of_another.touch()
+    with subprocess.Popen([sys.executable, "-c", HALF, kind, str(path)], stdout=subprocess.PIPE, cwd=ROOT) as killed:
+        assert killed.stdout.readline() == b"half\n"
+        killed.kill()
+    assert not path.exists()
+    (left,) = set(tmp_path.iterdir()) - {of_another}
+    assert left.name.startswith(".")
     with whole(path) as partial:
-        (partial if whole is whole_file else partial / "one").write_text("whole")
-    assert not left.exists()
-    assert running.exists()
-    assert other.exists()
+        (partial if kind == "file" else partial / "one").write_text("whole")
+    assert set(tmp_path.iterdir()) == {path, of_another}
+    assert [file.read_text() for file in ([path] if kind == "file" else path.iterdir())] == ["whole"]

@@ -39,7 +39,7 @@ class Strategy:
     """A strategy by name.
 
     Attributes:
-        title: as tables and figures name it.
+        title: what tables and figures call it.
         choose: called with pool, batch size and generator; may return fewer rows, or one twice.
         oracle: it is told the truth about the pool.
         needs_scores: it reads what the classifier makes of the pool.
@@ -85,7 +85,7 @@ def random_rows(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarr
 def random_stratified(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
     """Draw as many of each true class as can be: what random drawing does with luck."""
     order = random.permutation(len(pool.h_N_d))
-    place_N = np.empty(len(order))  # of each row within its class, in random order
+    place_N = np.empty(len(order))  # each row's place within its class, in random order
     for name in np.unique(pool.truth_N):
         of_class = order[pool.truth_N[order] == name]
         place_N[of_class] = np.arange(len(of_class))
@@ -141,7 +141,7 @@ def bald_stochastic(pool: Pool, batch: int, random: np.random.Generator) -> np.n
 
 
 def badge(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """k-means++ over the gradients of the last layer for the predicted label (Ash et al. 2020)."""
+    """Run k-means++ over the gradients of the last layer for the predicted label (Ash et al. 2020)."""
     from skactiveml.base import SkactivemlClassifier
     from skactiveml.pool import Badge
 
@@ -172,7 +172,7 @@ def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray
     strategy = TypiClust(random_state=int(random.integers(2**31)), cluster_algo_dict=options)
     try:
         return _with_labelled(strategy, pool, batch)
-    except UnboundLocalError:  # of scikit-activeml 1.0.1, where every cluster holds a labelled sample
+    except UnboundLocalError:  # scikit-activeml 1.0.1 raises it where every cluster holds a labelled sample
         return np.array([], dtype=int)
 
 

@@ -88,8 +88,8 @@ class Session:
         keys: split and number of each.
         start: labels that were known before anybody was asked.
         labels: the file of answers; those that it holds are learnt at once.
-        settings: of the classifier.
-        strategy: of :mod:`gpca.active_learning.acquisition`.
+        settings: how the classifier is fitted.
+        strategy: which one of :mod:`gpca.active_learning.acquisition` asks.
 
     Raises:
         InputError: fewer than two concepts are labelled.
@@ -105,7 +105,9 @@ class Session:
         strategy: str = "bald_kmeans",
         seed: int = 0,
     ) -> None:
-        self.keys, self.labels, self._strategy = keys, labels, strategy
+        self.keys = keys
+        self.labels = labels
+        self._strategy = strategy
         self._rows = {key: row for row, key in enumerate(keys)}
         self._random = generator("label", seed)
         self._start = dict(start)
@@ -122,7 +124,7 @@ class Session:
 
     @property
     def answered(self) -> dict[Key, str]:
-        """The answers that name a concept."""
+        """What was answered by naming a concept."""
         return {key: concept for key, concept in self.labels.labels.items() if concept != SKIPPED}
 
     def retrain(self) -> int:

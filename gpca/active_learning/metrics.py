@@ -12,7 +12,7 @@ from gpca.attribution.metrics import source_method_seed, tidy
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLE = "active_learning/"  # and the setting: what `table` of the tidy rows reads
+TABLE = "active_learning/"  # `table` of the tidy rows reads this and the setting
 RANDOM = "random"  # the strategy that the others are compared with, seed by seed
 # A count that ended with the budget where the share beside it is below 1: its mean is a lower bound then.
 CENSORED_BY = {"labels_to_target": "reached", "epochs_to_target": "reached", "delay": "recognised"}

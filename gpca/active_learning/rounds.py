@@ -30,7 +30,7 @@ class ActiveLearningSettings:
         labels: L, the budget of queries.
         batch: B, labels per round.
         iterations, tolerance: the most passes over the labels in a retraining, and when it ends before.
-        gpc: the classifier that knows two concepts; its kernel and inducing inputs stay from then on.
+        gpc: the classifier that knows two concepts; its covariance and inducing inputs stay from then on.
     """
 
     initial: int = 120
@@ -65,7 +65,7 @@ class Task(Generic[Inputs]):
     test: Samples
 
     def project(self, gpc: GPC) -> Task[Projection]:
-        """Return the task with every embedding as the GPC's kernel sees it."""
+        """Return the task with every embedding as the GPC's covariance sees it."""
         parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
         return Task(self.held_out, *parts)
 
@@ -80,7 +80,7 @@ def make_task(
     """Split the training samples into those labelled at the start and the pool, which holds all the rest.
 
     Args:
-        registrations: with embeddings attached.
+        registrations: they carry their embeddings.
         held_out: the concept of which no sample is labelled at the start.
         axes: names of the draw (source, seed).
         new_share: share, below 1, of the pool that is of that concept, or as much of it as there is; by default all of
@@ -130,8 +130,8 @@ def run_rounds(
 
     Args:
         task: projected by `gpc`.
-        gpc: of :func:`initial_gpc`; it is left as it is.
-        axes: names of the draws (source, seed, …).
+        gpc: what :func:`initial_gpc` returns; it is not changed.
+        axes: the names of the draws (source, seed, …).
 
     Returns:
         a step per round, the first before any label: ``labels`` spent, ``new_labels`` of the concept held out,
@@ -156,7 +156,11 @@ def run_rounds(
 def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
     """Return what a strategy chooses from: the rows `left` of the pool, and what the GPC makes of them."""
     h = task.pool.h[left]
-    scores_N_C, _, bald_N = gpc.attribute(h) if needs_scores else (np.empty((len(left), 0)), None, np.empty(len(left)))
+    if needs_scores:
+        scores_N_C, _, bald_N = gpc.attribute(h)
+    else:
+        scores_N_C = np.empty((len(left), 0))
+        bald_N = np.empty(len(left))
     labelled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labelled, task.pool.concept_N[left])
 

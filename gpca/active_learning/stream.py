@@ -74,7 +74,7 @@ def run_stream(
 
     Args:
         task: projected by `gpc`.
-        gpc: of :func:`gpca.active_learning.rounds.initial_gpc`; it is left as it is.
+        gpc: what :func:`gpca.active_learning.rounds.initial_gpc` returns; it is not changed.
 
     Returns:
         every so many arrivals: ``arrived``; ``present``, whether the quiet time is over; ``labels``
@@ -95,7 +95,8 @@ def run_stream(
     asked: list[int] = []
     steps = [_row(task, gpc, right, asked, stream)]
     for row in arrival_order(task, stream, *axes):
-        h, concept = task.pool.h[[row]], task.pool.concept_N[row]
+        h = task.pool.h[[row]]
+        concept = task.pool.concept_N[row]
         scores_1_C, _, bald_1 = gpc.attribute(h)
         right.append(gpc.classes[int(scores_1_C.argmax())] == concept)
         if _asks(manager, bald_1):

@@ -11,7 +11,7 @@ from gpca.objects.canonical import FEWEST_CLOUD_POINTS, diameter, require_points
 from gpca.objects.mesh_folder import metres_per
 from gpca.seeds import generator
 
-MEASURED_POINTS = 10_000  # by which the frame of a larger cloud is measured: all of them may lie on its hull
+MEASURED_POINTS = 10_000  # so many measure the frame of a larger cloud, since all of them may lie on its hull
 
 
 @dataclass(frozen=True)

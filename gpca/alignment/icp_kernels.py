@@ -35,7 +35,7 @@ class Target(NamedTuple):
 
     Attributes:
         points: (P, 3) in the order of their cells; a neighbour is a row of it.
-        starts: of each cell's points, and the end of the last.
+        starts: where each cell's points start, and where the last one's end.
         low: (3,) corner of the cells; the voxels begin `distance` before it.
         cell, cells: edge of a cell, number along each axis.
         voxel, voxels: the same of the voxels.
@@ -67,7 +67,7 @@ def make_target(points: np.ndarray, distance: float) -> Target:
     extent = max(float((high - low).max()), 1e-9)
     # The points lie on a surface: their number grows with the square of the extent, not with its cube.
     spacing = extent / np.sqrt(len(points))
-    # Not far smaller than the distance, however small the cloud: the searches widen cell by cell.
+    # A cell must not be far smaller than the distance, however small the cloud: the searches widen cell by cell.
     cell = max(1.5 * spacing, distance / 128)
     cells = np.floor((high - low) / cell).astype(np.int64) + 1
     cell_P = np.ravel_multi_index(tuple(np.floor((points - low) / cell).astype(np.int64).T), tuple(cells))
@@ -257,7 +257,7 @@ def _points_of(starts, cells, i, j, k_low, k_high):
 
 @njit(**OPTIONS)
 def _reached(low, cell, x, y, z, window):
-    """Everything outside the window is at least so far away: its cells, and the way to the own cell's nearest wall."""
+    """Return how far away everything outside the window is at least: its cells, and the way to the own nearest wall."""
     a, b, c = (x - low[0]) % cell, (y - low[1]) % cell, (z - low[2]) % cell
     wall = min(min(min(a, cell - a), min(b, cell - b)), min(c, cell - c))
     return window * cell + wall
@@ -269,7 +269,9 @@ def align_all(source, target, poses, fitness, rmse, max_iterations):
     room = np.empty(LISTED)
     moments, matrices = np.empty((4, 4)), np.empty((8, 4))
     neighbour = np.empty(len(source), np.int64)
-    held = np.zeros((len(source), 4))  # where a point's neighbour was searched, and the square of the radius around it
+    held = np.zeros(
+        (len(source), 4)
+    )  # where each point's neighbour was searched, and the square of the radius around it
     for n in range(len(poses)):
         pose = poses[n]
         held[:, 3] = -1.0  # nothing was searched yet

@@ -6,7 +6,7 @@ import numpy as np
 
 from gpca.alignment.rigid import transform
 
-CORRECT = 0.1  # of the diameter: the usual limit of a correct pose
+CORRECT = 0.1  # diameters: the usual limit of a correct pose
 
 
 def add_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarray) -> float:

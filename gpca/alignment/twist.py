@@ -22,7 +22,7 @@ def log(T_n: np.ndarray) -> np.ndarray:
 
 
 def _left_jacobian(rotation_n_3: np.ndarray) -> np.ndarray:
-    """J = I + (1 - cos θ)/θ² [ω] + (θ - sin θ)/θ³ [ω]² (Barfoot 2017, Eq. 7.37)."""
+    """Return J = I + (1 - cos θ)/θ² [ω] + (θ - sin θ)/θ³ [ω]² (Barfoot 2017, Eq. 7.37)."""
     theta_n = np.linalg.norm(rotation_n_3, axis=1)
     small_n = theta_n < 1e-4
     theta = np.where(small_n, 1.0, theta_n)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-BINS = 15  # of the calibration errors (Guo et al. 2017)
+BINS = 15  # calibration errors are measured over so many (Guo et al. 2017)
 
 
 def risk_coverage(confidence_S: np.ndarray, wrong_S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ALL = "all"  # stands for every concept together in the column `concept`
 TIDY_COLUMNS = ("table", "source", "method", "metric", "concept", "seed", "value")
 PREDICTED_AS, ABSTAINED = "predicted_as_", "abstained"  # metrics of the confusion: predicted_as_<concept or abstained>
-CAUSAL_QUANTILE = 0.95  # of the clean uncertainties: what lies above is not the scatter of clean registrations
+CAUSAL_QUANTILE = 0.95  # above this quantile of the clean uncertainties begins what is not their scatter
 _CAUSAL_COLUMNS = ("sample", "split", "uncertainty_observed", "uncertainty_clean")
 
 
@@ -114,11 +114,10 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
         InputError: no files, a name of another form, a file that :func:`read_predictions` or :func:`read_causal`
             refuses or that has no test rows, a test sample that the causal file of its source and seed lacks.
     """
-    causal = {
-        (source, seed): (path, read_causal(path))
-        for path in causal_files
-        for source, _, seed in [source_method_seed(path)]
-    }
+    causal = {}
+    for path in causal_files:
+        source, _, seed = source_method_seed(path)
+        causal[source, seed] = (path, read_causal(path))
     records = []
     for path in prediction_files:
         source, method, seed = source_method_seed(path)

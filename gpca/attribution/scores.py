@@ -59,7 +59,7 @@ class Attribution:
 
     @property
     def predicted_N(self) -> np.ndarray:
-        """The concept with the largest score (Eq. 6), the first of equals; empty where abstained."""
+        """The concept with the largest score (Eq. 6), the first of equals; empty if it abstained."""
         predicted = np.array(self.concepts)[self.scores_N_C.argmax(axis=1)]
         return np.where(self.abstained_N, "", predicted)
 

@@ -1,7 +1,7 @@
-"""Kernels by name, and their covariances: of C kernels of one kind, one per latent GP, over the same inputs.
+"""Covariances by name (the kernels of the paper): C of one kind, one per latent GP, over the same inputs.
 
-The parameters and their constraints are gpytorch's. The covariances are computed here, because gpytorch measures the
-distances once per kernel, although the kernels differ in scale alone: most of the time of a fit.
+The parameters and their constraints are gpytorch's. The values are computed here, because gpytorch measures the
+distances once per latent, although the covariances differ in scale alone; that takes most of the time of a fit.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import torch
 from torch import Tensor
 
 
-class ScaledPolynomialKernel(gpytorch.kernels.PolynomialKernel):
-    """(xᵀx' / d + c)²: inputs divided by √d, as with inner products of some hundred dimensions nothing is learnt."""
+class ScaledPolynomial(gpytorch.kernels.PolynomialKernel):
+    """The covariance (xᵀx' / d + c)², since nothing is learnt from plain inner products of some hundred dimensions."""
 
     def __init__(self, **options) -> None:
         super().__init__(power=2, **options)
@@ -28,41 +28,43 @@ class ScaledPolynomialKernel(gpytorch.kernels.PolynomialKernel):
 COVARIANCES = {
     "rbf": gpytorch.kernels.RBFKernel,
     "matern32": lambda **options: gpytorch.kernels.MaternKernel(nu=1.5, **options),
-    "polynomial": ScaledPolynomialKernel,
+    "polynomial": ScaledPolynomial,
 }
 
 
 def make_covariance(name: str, n_classes: int, lengthscale: float) -> gpytorch.kernels.ScaleKernel:
-    """Return C kernels, each with a scale of its own; the polynomial one has an offset and no lengthscale."""
+    """Return C covariances, each with a scale of its own; the polynomial one has an offset and no lengthscale."""
     batch = torch.Size([n_classes])
-    kernel = gpytorch.kernels.ScaleKernel(COVARIANCES[name](batch_shape=batch), batch_shape=batch)
-    if kernel.base_kernel.has_lengthscale:
-        kernel.base_kernel.lengthscale = lengthscale
-    return kernel
+    covariance = gpytorch.kernels.ScaleKernel(COVARIANCES[name](batch_shape=batch), batch_shape=batch)
+    if covariance.base_kernel.has_lengthscale:
+        covariance.base_kernel.lengthscale = lengthscale
+    return covariance
 
 
-def covariance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
-    """Return k_c(a, b), (C, A, B), of kernels of batch shape (C,); of those without a form here by gpytorch itself."""
-    base, scale_C_1_1 = kernel.base_kernel, kernel.outputscale[:, None, None]
-    if isinstance(base, ScaledPolynomialKernel):
+def cross_covariance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
+    """Return k_c(a, b), (C, A, B), of batch shape (C,); gpytorch computes those that have no form here."""
+    base = covariance.base_kernel
+    scale_C_1_1 = covariance.outputscale[:, None, None]
+    if isinstance(base, ScaledPolynomial):
         inner_A_B = a_A_d @ b_B_d.T / a_A_d.shape[1]
         return scale_C_1_1 * (inner_A_B + base.offset[:, :, None]).square()
     squared_A_B = squared_distances(a_A_d, b_B_d)
     if isinstance(base, gpytorch.kernels.MaternKernel):
-        # Not zero under the root, where its derivative would be infinite.
+        # The root of zero has an infinite derivative, so the squares stay above it.
         scaled_C_A_B = squared_A_B.clamp_min(1e-15).sqrt() * (math.sqrt(3) / base.lengthscale)
         return scale_C_1_1 * (1 + scaled_C_A_B) * torch.exp(-scaled_C_A_B)
     if isinstance(base, gpytorch.kernels.RBFKernel):
         return scale_C_1_1 * torch.exp(squared_A_B * (-0.5 / base.lengthscale.square()))
-    return kernel(a_A_d, b_B_d).to_dense()
+    return covariance(a_A_d, b_B_d).to_dense()
 
 
-def variance(kernel: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
+def variance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
     """Return k_c(a, a), (C, A)."""
-    base, scale_C_1 = kernel.base_kernel, kernel.outputscale[:, None]
-    if isinstance(base, ScaledPolynomialKernel):
+    base = covariance.base_kernel
+    scale_C_1 = covariance.outputscale[:, None]
+    if isinstance(base, ScaledPolynomial):
         return scale_C_1 * (a_A_d.square().mean(dim=1) + base.offset).square()
-    return scale_C_1.expand(-1, len(a_A_d)) if base.is_stationary else kernel(a_A_d, diag=True)
+    return scale_C_1.expand(-1, len(a_A_d)) if base.is_stationary else covariance(a_A_d, diag=True)
 
 
 def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:

@@ -1,8 +1,8 @@
 """Multi-class Gaussian process classification by sparse variational inference (paper Sec. III-B).
 
 One latent GP per concept, inducing inputs shared by all, Cholesky variational posterior, softmax likelihood
-(Hensman et al. 2015). A class of the label space without a label yet has its GP already. A fit learns kernel, inducing
-inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels then move the posterior alone
+(Hensman et al. 2015). A class of the label space without a label yet has its GP already. A fit learns covariance,
+inducing inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels then move the posterior alone
 (:mod:`gpca.classifier.latents`).
 """
 
@@ -32,7 +32,7 @@ class GPCSettings:
 
     Attributes:
         kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
-        learning_rate, iterations: of Adam on the ELBO of the whole training set.
+        learning_rate, iterations: how Adam climbs the ELBO of the whole training set.
         inducing: number of shared inducing inputs N_Z.
         draws: M, posterior draws per explanation.
     """
@@ -64,7 +64,7 @@ class GPC:
         self._sites: Sites | None = None  # what the labels say of the latents, once they were refined
 
     def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
-        """Maximise the ELBO (variational parameters, inducing inputs, kernel parameters).
+        """Maximise the ELBO (variational parameters, inducing inputs, covariance parameters).
 
         Inputs are standardised, inducing inputs start at k-means centres and the lengthscale at the median distance:
         with gpytorch's default lengthscale an RBF kernel on some hundred dimensions stays at chance.
@@ -85,10 +85,11 @@ class GPC:
         around_R_d = h_N_d if around_R_d is None else around_R_d
         self._scaler = StandardScaler().fit(around_R_d)
         starts_R_d = self._scaled(around_R_d)
-        inputs_N_d, targets_N = self._scaled(h_N_d), self._targets(labels_N)
+        inputs_N_d = self._scaled(h_N_d)
+        targets_N = self._targets(labels_N)
         random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
-        kernel = make_covariance(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
-        model = SparseGPs(kernel, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
+        covariance = make_covariance(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
+        model = SparseGPs(covariance, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
         optimiser = torch.optim.Adam(model.parameters(), lr=self.settings.learning_rate)
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
@@ -96,8 +97,11 @@ class GPC:
             (-model.elbo(inputs_N_d, torch.from_numpy(targets_N))).backward()
             optimiser.step()
             if done in stops:
-                self._prior, self._latents = Prior.of(model), model.latents()
-                self._labelled, self._targets_N, self._sites = self.project(h_N_d), targets_N, None
+                self._prior = Prior.of(model)
+                self._latents = model.latents()
+                self._labelled = self.project(h_N_d)
+                self._targets_N = targets_N
+                self._sites = None
                 yield done
 
     def elbo(self) -> float:
@@ -107,7 +111,7 @@ class GPC:
     def update(
         self, h_L_d: np.ndarray | Projection, labels_L: np.ndarray, iterations: int = 100, tolerance: float = 1e-3
     ) -> int:
-        """Learn further labels at fixed kernel and inducing inputs; those of before count as much as ever.
+        """Learn further labels at fixed covariance and inducing inputs; those of before count as much as ever.
 
         Args:
             h_L_d: their embeddings, or what :meth:`project` returned for them.
@@ -122,7 +126,7 @@ class GPC:
         return self.refine(iterations, tolerance)
 
     def refine(self, iterations: int = 100, tolerance: float = 1e-3) -> int:
-        """Move the posterior to the best one for the labels, kernel and inducing inputs; see :meth:`update`.
+        """Move the posterior to the best one for the labels, covariance and inducing inputs; see :meth:`update`.
 
         It starts from the posterior of the call before, or from the prior where there was none.
         """
@@ -132,14 +136,14 @@ class GPC:
         return done
 
     def level(self) -> None:
-        """Give classes without a label the mean kernel of the others, and refit the posterior."""
+        """Give classes without a label the mean covariance of the others, and refit the posterior."""
         known_C = np.isin(np.arange(len(self.classes)), self._targets_N)
         self._set_prior(self._prior.level(known_C))
 
     def grow(self, name: str) -> None:
-        """Add a class that the label space never had; its kernel is the geometric mean of the others'.
+        """Add a class that the label space never had; its covariance is the geometric mean of the others'.
 
-        The other classes keep kernels, labels and posterior; the new one learns what it is not.
+        The other classes keep covariances, labels and posterior; the new one learns what it is not.
         """
         if not name or name in self.classes:
             raise InputError(f"concept '{name}'", "is empty or known already", f"known are {', '.join(self.classes)}")
@@ -152,7 +156,7 @@ class GPC:
         self.refine()
 
     def project(self, h_N_d: np.ndarray | Projection) -> Projection:
-        """Return what the kernel says of the embeddings, to be computed once where they are asked about repeatedly."""
+        """Return what the covariance says of the embeddings, to be computed once where they are asked about often."""
         return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
 
     def posterior(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray]:
@@ -176,7 +180,7 @@ class GPC:
             "axes": list(self._axes),
             "scaler_mean": torch.from_numpy(self._scaler.mean_),
             "scaler_scale": torch.from_numpy(self._scaler.scale_),
-            "kernel": self._prior.kernel.state_dict(),
+            "kernel": self._prior.covariance.state_dict(),
             "inducing": self._prior.inducing_M_d,
             "mean": torch.from_numpy(self._latents.mean_C_M),
             "covariance": torch.from_numpy(self._latents.covariance_C_M_M),
@@ -190,11 +194,12 @@ class GPC:
         gpc = cls(tuple(state["classes"]), GPCSettings(**state["settings"]), *state["axes"])
         gpc._scaler = StandardScaler()
         gpc._scaler.mean_, gpc._scaler.scale_ = state["scaler_mean"].numpy(), state["scaler_scale"].numpy()
-        kernel = make_covariance(gpc.settings.kernel, len(gpc.classes), lengthscale=1.0).requires_grad_(False)
-        kernel.load_state_dict(state["kernel"])
-        gpc._prior = Prior(kernel, state["inducing"])
+        covariance = make_covariance(gpc.settings.kernel, len(gpc.classes), lengthscale=1.0).requires_grad_(False)
+        covariance.load_state_dict(state["kernel"])
+        gpc._prior = Prior(covariance, state["inducing"])
         gpc._latents = Latents(state["mean"].numpy(), state["covariance"].numpy())
-        gpc._labelled, gpc._targets_N = gpc._prior.project(state["labelled"]), state["targets"].numpy()
+        gpc._labelled = gpc._prior.project(state["labelled"])
+        gpc._targets_N = state["targets"].numpy()
         return gpc
 
     def _targets(self, labels_N: np.ndarray) -> np.ndarray:
@@ -211,7 +216,7 @@ def _inducing_inputs(inputs_N_d: torch.Tensor, settings: GPCSettings, axes: tupl
 
 
 def _median_distance(inputs_N_d: torch.Tensor, axes: tuple, most: int = 1000) -> float:
-    """Median of the distances between distinct points (the median heuristic), at most `most` points drawn."""
+    """Return the median distance between distinct points (the median heuristic), of at most `most` drawn ones."""
     order = generator(*axes, "median").permutation(len(inputs_N_d))[:most]
     median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
     return median if median > 0 else 1.0

@@ -30,7 +30,7 @@ class KernelGrid:
     Attributes:
         kernels, learning_rates: every kernel is fitted at every rate.
         iterations: counts at which the classifier is judged; it is fitted up to the largest.
-        inducing, draws: as of :class:`gpca.classifier.gpc.GPCSettings`.
+        inducing, draws: see :class:`gpca.classifier.gpc.GPCSettings`.
     """
 
     kernels: tuple[str, ...] = ("rbf", "matern32", "polynomial")
@@ -57,7 +57,8 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
     train, test = registrations.rows("train"), registrations.rows("test")
     if not len(train) or not len(test):
         raise InputError(f"registrations of {source}, seed {seed}", "lack a split", "give training and test samples")
-    h_S_d, concept_S = registrations.embedding, registrations.concept
+    h_S_d = registrations.embedding
+    concept_S = registrations.concept
     target_N = np.array([CONCEPTS.index(concept) for concept in concept_S[test]])
     rows = []
     for kernel in grid.kernels:

@@ -12,7 +12,7 @@ from gpca.classifier.kernel_grid import MEASURES, read_grids
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLE = "kernels"  # what `table` of the tidy rows reads
+TABLE = "kernels"  # `table` of the tidy rows reads this
 
 
 def collect_grids(files: Iterable[str | Path]) -> pd.DataFrame:
@@ -21,7 +21,7 @@ def collect_grids(files: Iterable[str | Path]) -> pd.DataFrame:
     Their `method` is as :func:`setting_name` has it.
 
     Raises:
-        InputError: as :func:`read_grids`.
+        InputError: where :func:`read_grids` raises one.
     """
     records = [
         (TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations), measure, ALL, row.seed, value)

@@ -1,4 +1,4 @@
-"""The prior of a fitted sparse GP classifier: kernels and inducing inputs, and how they see an input."""
+"""The prior of a fitted sparse GP classifier: covariances and inducing inputs, and how they see an input."""
 
 from __future__ import annotations
 
@@ -11,40 +11,40 @@ import torch
 from linear_operator.utils.cholesky import psd_safe_cholesky
 from scipy.linalg import solve_triangular
 
-from gpca.classifier.covariances import covariance, variance
+from gpca.classifier.covariances import cross_covariance, variance
 from gpca.classifier.latents import Projection
 from gpca.classifier.sparse_gp import JITTER, SparseGPs
 
 
 @dataclass(frozen=True)
 class Prior:
-    """C kernels over shared inducing inputs, fixed from here on.
+    """C covariances over shared inducing inputs, fixed from here on.
 
     Attributes:
-        kernel: a ``ScaleKernel`` of batch shape (C,).
+        covariance: a ``ScaleKernel`` of batch shape (C,).
         inducing_M_d: shared inducing inputs Z, standardised.
     """
 
-    kernel: gpytorch.kernels.ScaleKernel
+    covariance: gpytorch.kernels.ScaleKernel
     inducing_M_d: torch.Tensor
     _cholesky_C_M_M: np.ndarray = field(init=False, repr=False)
 
     @classmethod
     def of(cls, model: SparseGPs) -> Prior:
-        """Take kernel and inducing inputs from a trained model, detached from it."""
-        return cls(deepcopy(model.kernel).requires_grad_(False), model.inducing_M_d.detach().clone())
+        """Take covariance and inducing inputs from a trained model, detached from it."""
+        return cls(deepcopy(model.covariance).requires_grad_(False), model.inducing_M_d.detach().clone())
 
     def __post_init__(self) -> None:
         with torch.no_grad():
-            K_C_M_M = covariance(self.kernel, self.inducing_M_d, self.inducing_M_d)
+            K_C_M_M = cross_covariance(self.covariance, self.inducing_M_d, self.inducing_M_d)
             cholesky_C_M_M = psd_safe_cholesky((K_C_M_M + JITTER * torch.eye(len(self.inducing_M_d))).double())
         object.__setattr__(self, "_cholesky_C_M_M", cholesky_C_M_M.numpy())
 
     def project(self, inputs_N_d: torch.Tensor) -> Projection:
         """Return weights L⁻¹ k(Z, x) and residual variance k(x, x) - |weights|² of standardised inputs."""
         with torch.no_grad():
-            K_C_M_N = covariance(self.kernel, self.inducing_M_d, inputs_N_d).double().numpy()
-            variance_C_N = variance(self.kernel, inputs_N_d).double().numpy() + JITTER
+            K_C_M_N = cross_covariance(self.covariance, self.inducing_M_d, inputs_N_d).double().numpy()
+            variance_C_N = variance(self.covariance, inputs_N_d).double().numpy() + JITTER
         weights_C_M_N = np.stack(
             [solve_triangular(L, K, lower=True) for L, K in zip(self._cholesky_C_M_M, K_C_M_N, strict=True)]
         )
@@ -52,13 +52,13 @@ class Prior:
         return Projection(inputs_N_d.numpy(), np.swapaxes(weights_C_M_N, 1, 2), np.maximum(residual_C_N, 0))
 
     def grow(self) -> Prior:
-        """Return the prior with one more kernel, its parameters the geometric means of the others'."""
+        """Return the prior with one more covariance, its parameters the geometric means of the others'."""
         return self._with_parameters(lambda values_C: torch.cat([values_C, _geometric_mean(values_C)]))
 
     def level(self, known_C: np.ndarray) -> Prior:
-        """Return the prior in which the kernels of unknown classes have the geometric means of the known ones'.
+        """Return the prior in which the covariances of unknown classes have the geometric means of the known ones'.
 
-        Without a label, a class's kernel has learnt only how best to be wrong.
+        Without a label, a class's covariance has learnt only how best to be wrong.
         """
         is_known_C = torch.from_numpy(known_C)
 
@@ -70,15 +70,15 @@ class Prior:
         return self._with_parameters(with_known_mean)
 
     def _with_parameters(self, change) -> Prior:
-        """Return the prior with each kernel parameter (C, …), as it acts, replaced by `change` of it."""
-        kernel = deepcopy(self.kernel)
-        for part in (kernel, kernel.base_kernel):
+        """Return the prior with each covariance parameter (C, …), as it acts, replaced by `change` of it."""
+        covariance = deepcopy(self.covariance)
+        for part in (covariance, covariance.base_kernel):
             for name, raw_C in list(part.named_parameters(recurse=False)):
                 constraint = part.constraint_for_parameter_name(name)
                 raw_C = constraint.inverse_transform(change(constraint.transform(raw_C)))
                 setattr(part, name, torch.nn.Parameter(raw_C, requires_grad=False))
                 part.batch_shape = raw_C.shape[:1]
-        return Prior(kernel, self.inducing_M_d)
+        return Prior(covariance, self.inducing_M_d)
 
 
 def _geometric_mean(values_C: torch.Tensor) -> torch.Tensor:

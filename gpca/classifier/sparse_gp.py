@@ -13,28 +13,28 @@ import torch
 from linear_operator.utils.cholesky import psd_safe_cholesky
 from torch import Tensor, nn
 
-from gpca.classifier.covariances import covariance, variance
+from gpca.classifier.covariances import cross_covariance, variance
 from gpca.classifier.latents import Latents
 
 # gpytorch's in single precision: added to variances of the prior; the least variance of a latent.
 JITTER, LEAST_VARIANCE = 1e-4, 1e-6
 LIKELIHOOD_DRAWS = 10
-MEAN_DEVIATION = 1e-3  # of the variational mean at the start
+MEAN_DEVIATION = 1e-3  # the variational mean starts with this standard deviation
 
 
 class SparseGPs(nn.Module):
-    """C independent GPs with shared inducing inputs, kernels of their own and whitened posteriors N(mean, R Rᵀ).
+    """C independent GPs with shared inducing inputs, covariances of their own and whitened posteriors N(mean, R Rᵀ).
 
     Args:
-        kernel: a ``ScaleKernel`` of batch shape (C,).
+        covariance: a ``ScaleKernel`` of batch shape (C,).
         inducing_M_d: where the inducing inputs start; they are learnt too.
-        random: of the start of the mean, and of the draws for the likelihood.
+        random: it draws the start of the mean and the samples of the likelihood.
     """
 
-    def __init__(self, kernel: gpytorch.kernels.ScaleKernel, inducing_M_d: Tensor, random: torch.Generator) -> None:
+    def __init__(self, covariance: gpytorch.kernels.ScaleKernel, inducing_M_d: Tensor, random: torch.Generator) -> None:
         super().__init__()
-        shape = (len(kernel.outputscale), len(inducing_M_d))
-        self.kernel = kernel
+        shape = (len(covariance.outputscale), len(inducing_M_d))
+        self.covariance = covariance
         self.inducing_M_d = nn.Parameter(inducing_M_d.clone())
         self.mean_C_M = nn.Parameter(MEAN_DEVIATION * torch.randn(shape, generator=random))
         self.root_C_M_M = nn.Parameter(torch.eye(shape[1]).repeat(shape[0], 1, 1))  # its lower triangle counts
@@ -43,14 +43,14 @@ class SparseGPs(nn.Module):
     def marginals(self, inputs_N_d: Tensor) -> tuple[Tensor, Tensor]:
         """Return mean and variance (C, N) of the latents at standardised inputs."""
         jitter_M_M = JITTER * torch.eye(len(self.inducing_M_d))
-        K_C_M_M = covariance(self.kernel, self.inducing_M_d, self.inducing_M_d) + jitter_M_M
+        K_C_M_M = cross_covariance(self.covariance, self.inducing_M_d, self.inducing_M_d) + jitter_M_M
         cholesky_C_M_M = psd_safe_cholesky(K_C_M_M.double()).float()
-        K_C_M_N = covariance(self.kernel, self.inducing_M_d, inputs_N_d)
+        K_C_M_N = cross_covariance(self.covariance, self.inducing_M_d, inputs_N_d)
         weights_C_M_N = torch.linalg.solve_triangular(cholesky_C_M_M, K_C_M_N, upper=False)
         mean_C_N = (self.mean_C_M[:, None] @ weights_C_M_N)[:, 0]
         spread_C_N = (self.root_C_M_M.tril().mT @ weights_C_M_N).square().sum(dim=1)
         explained_C_N = weights_C_M_N.square().sum(dim=1)
-        return mean_C_N, variance(self.kernel, inputs_N_d) + JITTER - explained_C_N + spread_C_N
+        return mean_C_N, variance(self.covariance, inputs_N_d) + JITTER - explained_C_N + spread_C_N
 
     def divergence(self) -> Tensor:
         """Return KL(q ‖ N(0, I)) in nats, the sum over the latents."""

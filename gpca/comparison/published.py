@@ -11,7 +11,7 @@ from pathlib import Path
 from gpca.errors import InputError
 
 PUBLISHED = Path(__file__).with_name("published.csv")
-HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # of the paper's times (Sec. IV-E)
+HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # on which the paper measured its times (Sec. IV-E)
 TEXT = "text"  # stands for the running text in the column `table`; its rows and columns are free
 FILES = ("metrics.csv", "timings.csv", "active_learning.csv", "kernels.csv", "diagnostics.csv", "real_world.csv",
          "runtime.csv", "recovery.csv")  # fmt: skip
@@ -107,13 +107,13 @@ class Counterpart:
     """Which value of a run stands beside a printed number.
 
     Attributes:
-        file: in ``results/{run}/``.
-        table: of its tidy rows; of ``runtime.csv`` always "components".
+        file: its CSV file in ``results/{run}/``.
+        table: what `table` of its tidy rows reads; "components" for ``runtime.csv``.
         sources: their mean is taken, seed by seed; of ``runtime.csv`` "model", what the model was trained on.
         methods: their sum is taken.
         metrics: one, or two of which the first is divided by the second.
-        concept: as in the tidy rows; of ``runtime.csv`` the device.
-        statistic: of the values over the seeds.
+        concept: what `concept` of the tidy rows reads; the device for ``runtime.csv``.
+        statistic: how the values over the seeds become one.
     """
 
     file: str
@@ -143,7 +143,7 @@ class Number:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Table, row and column, which name it."""
+        """What names it: table, row and column."""
         return self.table, self.row, self.column
 
     @property
@@ -154,7 +154,9 @@ class Number:
     def text(self) -> str:
         """Return the number as printed, without its unit."""
         digits = max(self.decimals, 0)
-        return f"{self.value:.{digits}f}" + f" to {self.upper:.{digits}f}" * (self.upper > self.value)
+        if self.upper > self.value:
+            return f"{self.value:.{digits}f} to {self.upper:.{digits}f}"
+        return f"{self.value:.{digits}f}"
 
 
 def read_published(path: str | Path = PUBLISHED) -> list[Number]:

@@ -36,7 +36,8 @@ def read_reasons(numbers: Iterable[Number], path: str | Path = REASONS) -> list[
     Raises:
         InputError: missing or unreadable file, other columns, a reason of no number, an empty one. It names the line.
     """
-    numbers, reasons = list(numbers), []
+    numbers = list(numbers)
+    reasons = []
     for line, fields in read_lines(path, REASON_COLUMNS):
         where = f"{path}, line {line}"
         reason = Reason(*fields.values())

@@ -54,7 +54,7 @@ def check_reference(run: Path, reference: Path, tolerances: Mapping[str, float],
 
     Args:
         run, reference: folders.
-        tolerances: of each kind in `KINDS`, the largest difference of two means.
+        tolerances: the largest difference of two means, for each kind in `KINDS`.
         half_widths: a mean may also differ by so many half-widths of the reference's 95 % interval.
 
     Raises:
@@ -92,7 +92,8 @@ def read_means(path: Path) -> dict[tuple[str, ...], Mean]:
         InputError: empty, unreadable, neither tidy nor a table, something that is not a number.
     """
     table = read_csv(path, ())
-    heads, rows = list(table), table.to_dict("records")
+    heads = list(table)
+    rows = table.to_dict("records")
     if tuple(heads) == TIDY:
         means = _of_tidy(path, rows)
     elif "mean" in heads[1:]:

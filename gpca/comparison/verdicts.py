@@ -72,9 +72,9 @@ def compare(
         numbers: printed ones.
         results: file name -> its rows, as :func:`read_results` reads them.
         objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
-        tolerances: of each unit.
-        reasons: of what was not reached.
-        hardware: that times were measured on, where their file does not say.
+        tolerances: one for each unit.
+        reasons: why printed numbers were not reached.
+        hardware: what times were measured on, where their file does not say.
 
     Raises:
         InputError: a unit without tolerance.
@@ -123,7 +123,9 @@ def verdict_of(number: Number, found: Reproduced, tolerance: Tolerance, deviatio
     near, far = (scale(bound) for bound in (tolerance.reproduced, tolerance.close))
     margin = number.rounding + deviation
     least, most = scale(number.value - margin), scale(number.upper + margin)
-    value, low, high = scale(found.value), scale(found.low), scale(found.high)
+    value = scale(found.value)
+    low = scale(found.low)
+    high = scale(found.high)
     distance = max(0.0, least - value, value - most)
     if found.at_least:
         return NOT_REPRODUCED if value - most > far else None
@@ -226,7 +228,8 @@ def _of_tidy(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
 def _deviation(value_R: np.ndarray) -> Reproduced:
     from scipy.stats import chi2
 
-    n, deviation = len(value_R), float(value_R.std(ddof=1))
+    n = len(value_R)
+    deviation = float(value_R.std(ddof=1))
     low, high = (deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
     return Reproduced(deviation, low, high, n)
 
@@ -239,7 +242,8 @@ def _of_runtime(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | No
     if not set(counterpart.methods) <= set(rows.index):
         return None
     rows = rows.loc[list(counterpart.methods)]
-    n, mean = int(rows["repeats"].min()), float(rows["mean_s"].sum())
+    n = int(rows["repeats"].min())
+    mean = float(rows["mean_s"].sum())
     if n < 2:
         return Reproduced(mean, math.nan, math.nan, n)
     half_width = float(student_t.ppf(0.975, n - 1) * math.sqrt((rows["deviation_s"] ** 2).sum() / n))

@@ -36,7 +36,8 @@ class DGCNN(nn.Module):
     def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
         """Return embeddings (B, d) of clouds in the target's frame, in units of the object's diameter."""
         batch, n, _ = points_B_N_3.shape
-        features, x_B_N_F = [], points_B_N_3
+        features = []
+        x_B_N_F = points_B_N_3
         for edge_conv in self.edge_convs:
             x_B_N_F = edge_conv(x_B_N_F)
             features.append(x_B_N_F)

@@ -31,7 +31,7 @@ def smallest_k(distances, k):
     """
     batch, n, columns = distances.shape
     rows = distances.reshape(batch * n, columns)
-    # Not np.empty: a row with NaN fills too few slots, and what is left must still be the index of a point.
+    # np.empty will not do: a row with NaN fills too few slots, and the rest must still be indices of points.
     chosen = np.zeros((batch * n, k), np.int32)
     for i in prange(batch * n):
         row = rows[i]
@@ -117,7 +117,7 @@ def _collect_with_ties(row, below, above, out):
 
 @njit(**_options)
 def gather_extreme_and_sums(ac, neighbours, gamma):
-    """One pass over all edges y_ij = A_j + C_i.
+    """Pass once over all edges y_ij = A_j + C_i.
 
     Returns:
         extreme (B, N, F): max_j y_ij where gamma >= 0, min_j y_ij elsewhere.
@@ -186,7 +186,7 @@ def normalise_activate(extreme, mean, inverse_std, gamma, beta, slope):
 
 @njit(**_options)
 def gather_max_affine(ac, neighbours, scale, shift, slope):
-    """Inference: max_j act(scale · (A_j + C_i) + shift), (B, N, F), in one pass and without statistics."""
+    """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), for inference: in one pass and without statistics."""
     batch, n, k = neighbours.shape
     features = ac.shape[2] // 2
     out = np.empty((batch, n, features), ac.dtype)
@@ -214,7 +214,7 @@ def gather_max_affine(ac, neighbours, scale, shift, slope):
 def edge_max_backward(
     grad_out, ac, neighbours, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope
 ):
-    """Gradients of :func:`normalise_activate` after :func:`gather_extreme_and_sums`.
+    """Return the gradients of :func:`normalise_activate` after :func:`gather_extreme_and_sums`.
 
     With g the gradient at the extreme edges and ŷ the normalised edges, batch norm over E edges gives
 

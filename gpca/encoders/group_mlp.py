@@ -29,8 +29,8 @@ class GroupMLP(nn.Module):
     """Layers of linear map, batch norm and ReLU on the slots of each group, then their maximum.
 
     Args:
-        in_features: of each point, beside its coordinates relative to the group's centre.
-        widths: of the layers.
+        in_features: how many a point has, beside its coordinates relative to the group's centre.
+        widths: one for each layer.
         last_relu: False leaves the ReLU after the last batch norm out, where a residual is to be added first.
     """
 
@@ -69,7 +69,8 @@ class GroupMLP(nn.Module):
         return z_S_F.view(*neighbours_B_M_k.shape, -1).amax(dim=2)
 
     def _layers(self) -> list[tuple[nn.Linear, BatchNorm]]:
-        linears, norms = cast("list[nn.Linear]", list(self.linears)), cast("list[BatchNorm]", list(self.norms))
+        linears = cast("list[nn.Linear]", list(self.linears))
+        norms = cast("list[BatchNorm]", list(self.norms))
         return list(zip(linears, norms, strict=True))
 
     def _first_layer(self, weight: torch.Tensor, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:
@@ -97,7 +98,7 @@ class _Edges:
 
     def __init__(self, groups: Groups, points_B_N_3: torch.Tensor) -> None:
         self.batch, n_points, _ = points_B_N_3.shape
-        # Contiguous all, or numba compiles the passes over them a second time.
+        # All must be contiguous, or numba compiles the passes over them a second time.
         neighbours, counts = (x.contiguous().numpy() for x in (groups.neighbours_B_M_k, groups.counts_B_M))
         self.slots = neighbours.size
         self.point, self.weight, self.ends = kernels.distinct_edges(neighbours, counts, n_points)

@@ -139,7 +139,7 @@ def normalise_max(y, scale, shift, ends, batch):
 
 @njit(**_options)
 def normalise_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud_ends):
-    """Gradients of :func:`normalise` where its scale and shift come from :func:`moments`.
+    """Return the gradients of :func:`normalise` where its scale and shift come from :func:`moments`.
 
     With g_e the gradient that reaches edge e through all of its w_e slots and ŷ the normalised edges, batch norm over
     W = Σ w slots gives
@@ -180,7 +180,7 @@ def normalise_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud
 
 @njit(**_options)
 def normalise_max_backward(grad_out, at, y, weight, mean, inverse_std, gamma, cloud_ends):
-    """Gradients of :func:`normalise_max`: those of :func:`normalise_backward` with g zero but at the maxima."""
+    """Return the gradients of :func:`normalise_max`: as :func:`normalise_backward`, with g zero but at the maxima."""
     features = y.shape[1]
     batch = len(cloud_ends) - 1
     groups = len(at) // batch

@@ -47,7 +47,7 @@ def ball_query(points, centres, radius, k):
     """Return neighbours (B, M, k) and counts (B, M); see :func:`gpca.encoders.grouping.ball_query`."""
     batch, n, _ = points.shape
     n_centres = centres.shape[1]
-    # Not np.empty: a centre of NaN has no neighbour at all, and what is left must still be the index of a point.
+    # np.empty will not do: a centre of NaN has no neighbour at all, and the slots must still be indices of points.
     neighbours = np.zeros((batch, n_centres, k), np.int32)
     counts = np.zeros((batch, n_centres), np.int32)
     limit = points.dtype.type(radius) * points.dtype.type(radius)

@@ -16,7 +16,7 @@ class PointNet(nn.Module):
     erase the pose concept, and the second aligns features after it. The cloud is used as it is.
 
     Args:
-        width: of the first three layers, 64 as published; the others grow with it.
+        width: that of the first three layers, 64 as published; the others grow with it.
 
     Attributes:
         embedding_size: d = 16 · width.

@@ -22,9 +22,9 @@ class PointNet2(nn.Module):
     does not do: beside coordinates ten times as large, training would start nearly blind to the shape within a ball.
 
     Args:
-        width: of the first layer, 64 as published; all others grow with it.
-        centroids: of the first level; the second has a quarter of them.
-        radius: of the first level's balls, in units of the object's diameter; the second's is twice as large.
+        width: that of the first layer, 64 as published; all others grow with it.
+        centroids: how many the first level has; the second has a quarter of them.
+        radius: that of the first level's balls, in units of the object's diameter; the second's is twice as large.
         neighbours: points of a ball on the first level, at most; twice as many on the second.
 
     Attributes:

@@ -20,7 +20,8 @@ class SetAbstraction(nn.Module):
 
     def __init__(self, in_features: int, out_features: int, radius: float, neighbours: int) -> None:
         super().__init__()
-        self.radius, self.neighbours = radius, neighbours
+        self.radius = radius
+        self.neighbours = neighbours
         self.layers = GroupMLP(in_features, (out_features // 2, out_features), last_relu=False)
         self.skip = nn.Linear(in_features, out_features)
 
@@ -41,8 +42,8 @@ class PointNeXt(nn.Module):
     the features that enter the stem, so every stage sees the frame and not only the shape within its balls.
 
     Args:
-        width: of the stem, 32 as published.
-        radius: of the first stage's balls, in units of the object's diameter.
+        width: that of the stem, 32 as published.
+        radius: that of the first stage's balls, in units of the object's diameter.
         neighbours: points of a ball, at most.
 
     Attributes:

@@ -39,7 +39,7 @@ class UMAP:
     Attributes:
         components: two to a hundred by its documentation, which has 10 for a clustering to read. More than a graph of
             some hundred samples can fill only adds noise, hence fewer than for the others.
-        neighbours: of a sample in the graph; 15 is its usual number.
+        neighbours: how many a sample has in the graph; 15 is usual.
     """
 
     components: int = 16
@@ -75,7 +75,7 @@ class UMAP:
 class Autoencoder:
     """Autoencoder (Hinton & Salakhutdinov 2006) d - 256 - components - 256 - d with GELU; the code itself is linear.
 
-    Trained by Adam (learning rate 1e-3, batches of 32) on the mean squared error of the standardised embeddings.
+    Adam trains it (learning rate 1e-3, batches of 32) on the mean squared error of the standardised embeddings.
     """
 
     components: int = 64
@@ -86,7 +86,9 @@ class Autoencoder:
         import torch
         from torch import nn
 
-        d, hidden, batch_size = z_train_N_d.shape[1], 256, 32
+        d = z_train_N_d.shape[1]
+        hidden = 256
+        batch_size = 32
         z_N_d = torch.from_numpy(z_train_N_d.astype(np.float32))
         with _one_thread(torch), torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed_of(*axes, "autoencoder"))

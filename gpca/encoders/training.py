@@ -97,7 +97,8 @@ def train_encoder(
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
             points_B_N_3 = draw_points(registrations, batch_rows, settings.points, source, seed, "epoch", epoch)
-            logits_B_C, labels_B = model(points_B_N_3.to(device)), labels_S[batch_rows].to(device)
+            logits_B_C = model(points_B_N_3.to(device))
+            labels_B = labels_S[batch_rows].to(device)
             loss = nn.functional.cross_entropy(logits_B_C, labels_B)
             optimiser.zero_grad()
             loss.backward()

@@ -21,7 +21,7 @@ def analytical_features(
         registrations: N of them.
         axes: name the draws.
         points: source points at which local shape is measured, drawn by split and sample; all where there are fewer.
-        neighbours: of a point, itself included, that make its local shape.
+        neighbours: how many points, itself included, make a point's local shape.
         point_count: whether the point-count ratio is among the features.
     """
     rows = []

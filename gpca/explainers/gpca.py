@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from gpca.attribution.scores import Attribution
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -46,6 +46,6 @@ class GPCA:
 
 
 EXPLAINERS = {
-    "gpca_paper": Entry("GP-CA (paper's setting)", GPCA, reads="embeddings"),
-    "gpca": Entry("GP-CA (trained longer)", GPCA, reads="embeddings"),
+    "gpca_paper": ExplainerEntry("GP-CA (paper's setting)", GPCA, reads="embeddings"),
+    "gpca": ExplainerEntry("GP-CA (trained longer)", GPCA, reads="embeddings"),
 }

@@ -3,7 +3,7 @@
 An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
 ``EXPLAINERS`` by the name under which the config switches it on::
 
-    EXPLAINERS = {"my_explainer": Entry("My explainer", MyExplainer)}
+    EXPLAINERS = {"my_explainer": ExplainerEntry("My explainer", MyExplainer)}
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ class ConceptExplainer(Protocol):
 
 
 @dataclass(frozen=True)
-class Entry:
+class ExplainerEntry:
     """An explainer by name.
 
     Attributes:
-        title: as tables head its column.
-        make: called with source, seed and the settings of the config.
+        title: what tables call it.
+        make: what makes it from source, seed and the settings of the config.
         reads: what it needs attached: ``embeddings`` those of the encoder, ``uncertainty/<design>`` the outcomes of
             that design (:mod:`gpca.uncertainty.designs`); ``registrations`` nothing.
-        oracle: it is told the truth about what it explains; an upper bound, to be labelled so in its title.
+        oracle: whether it is told the truth about what it explains: an upper bound, which its title has to say.
     """
 
     title: str

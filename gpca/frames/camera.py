@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.environment import require_open3d
 
-NOTHING = -1  # of a pixel that sees no mesh
+NOTHING = -1  # the mesh of a pixel that sees none
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,9 @@ class MeshScene:
 
     def __init__(self, meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
         o3d = require_open3d()
-        self._tensor, self._float, self._uint = o3d.core.Tensor, o3d.core.float32, o3d.core.uint32
+        self._tensor = o3d.core.Tensor
+        self._float = o3d.core.float32
+        self._uint = o3d.core.uint32
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
         for vertices_m, faces in meshes:
             self._scene.add_triangles(
@@ -79,7 +81,8 @@ class MeshScene:
         """Return what the camera sees from a pose."""
         rays_H_W_3 = camera.rays()
         hits = self._cast(rays_H_W_3, T_world_camera)
-        depth_m, mesh = hits["t_hit"].numpy(), hits["geometry_ids"].numpy().astype(np.int64)
+        depth_m = hits["t_hit"].numpy()
+        mesh = hits["geometry_ids"].numpy().astype(np.int64)
         mesh[~np.isfinite(depth_m)] = NOTHING
         normals = hits["primitive_normals"].numpy().astype(np.float64) @ T_world_camera[:3, :3]
         to_camera = -rays_H_W_3 / np.linalg.norm(rays_H_W_3, axis=-1, keepdims=True)

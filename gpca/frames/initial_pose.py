@@ -27,7 +27,7 @@ class InitialPoseSettings:
     Attributes:
         form: ``results`` of an estimator, ``true_pose`` with an error, or ``global_registration``.
         rotation_deg, translation: largest error of ``true_pose``, the angle and in diameters, drawn uniformly.
-        voxel: of the features of ``global_registration``, in diameters.
+        voxel: the size at which ``global_registration`` computes features, in diameters.
         tries: random starts of RANSAC, of which the best is taken.
     """
 
@@ -66,7 +66,8 @@ class GlobalRegistration:
         from gpca.environment import require_open3d
 
         self._o3d = require_open3d()
-        self._settings, self._voxel_m = settings, settings.voxel * diameter_m
+        self._settings = settings
+        self._voxel_m = settings.voxel * diameter_m
         self._model = self._features(self._cloud(points_m, normals))
 
     def register(self, points_m: np.ndarray, seed: int) -> np.ndarray:
@@ -74,13 +75,16 @@ class GlobalRegistration:
 
         The same seed gives the same pose where Open3D runs on one thread (``OMP_NUM_THREADS=1``).
         """
-        o3d, registration = self._o3d, self._o3d.pipelines.registration
+        o3d = self._o3d
+        registration = self._o3d.pipelines.registration
         cloud = self._cloud(points_m)
         cloud.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius=2 * self._voxel_m, max_nn=30))
         cloud.orient_normals_towards_camera_location(np.zeros(3))
         (source, source_features), (model, model_features) = self._features(cloud), self._model
         reach_m = 1.5 * self._voxel_m
-        tree, model_m, normals = cKDTree(source.points), np.asarray(model.points), np.asarray(model.normals)
+        tree = cKDTree(source.points)
+        model_m = np.asarray(model.points)
+        normals = np.asarray(model.normals)
         best, best_share = np.eye(4), -1.0
         for number in range(self._settings.tries):
             o3d.utility.random.seed((seed + number) % 2**31)
@@ -128,7 +132,7 @@ class GlobalRegistration:
         return thinned, self._o3d.pipelines.registration.compute_fpfh_feature(thinned, search)
 
 
-def read_results(path: str | Path, images: set[tuple[int, int]]) -> dict[tuple[int, int, int], list[np.ndarray]]:
+def read_bop_results(path: str | Path, images: set[tuple[int, int]]) -> dict[tuple[int, int, int], list[np.ndarray]]:
     """Read a results file of the BOP benchmark, as every method for it exports them.
 
     Args:

@@ -20,7 +20,7 @@ def occlude(
 
     Args:
         pixels_P_2: (u, v) of the points of instance i that are in question.
-        share: to be covered, of the pixels.
+        share: how much of the pixels is to be covered.
 
     Returns:
         None where no silhouette of the dataset can cover that share to within `TOLERANCE`.

@@ -12,7 +12,7 @@ import numpy as np
 from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, TooFewPoints, read_frames, visible_points
-from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace, nearest_to, read_results
+from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace, nearest_to, read_bop_results
 from gpca.frames.instances import Instances, groups_of_frames
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_centre
@@ -29,10 +29,10 @@ class Dataset:
     Attributes:
         name: seeds its draws and names its objects.
         folders: the dataset's, or those that its archives were unpacked in.
-        unit: of the models' vertices.
-        split: whose frames are read.
+        unit: the unit of the models' vertices.
+        split: the split whose frames are read.
         results: a BOP results file with initial poses, or None.
-        most_frames: as many frames are drawn where there are more.
+        most_frames: where there are more frames, so many are drawn.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Dataset:
 
 
 @dataclass(frozen=True)
-class Model:
+class CentredModel:
     """An object of a dataset, its surface moved so that the bounding box is centred, and by how much."""
 
     surface: Surface
@@ -69,7 +69,7 @@ class Model:
     listed_symmetries: dict | None
 
 
-def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, Model]:
+def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CentredModel]:
     """Return the models of the objects that the frames show, by id.
 
     Raises:
@@ -81,18 +81,19 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, Model]:
         raise InputError(
             f"{dataset.name}: object {unknown[0]}", f"there is no model of it in {folder}", "fetch the models anew"
         )
-    info, models = bop.read_models_info(folder / "models_info.json"), {}
+    info = bop.read_models_info(folder / "models_info.json")
+    models = {}
     for number, surface in zip(ids, bop.surfaces(folder, dataset.unit, ids), strict=True):
         T_model_object = np.eye(4)
         T_model_object[:3, 3] = bounding_centre(surface)
         name = f"{dataset.name} {info[number].get('name', surface.name)}"
         centred = Surface(name, surface.vertices_m - T_model_object[:3, 3], surface.faces)
-        models[number] = Model(centred, T_model_object, read_symmetries(info, number))
+        models[number] = CentredModel(centred, T_model_object, read_symmetries(info, number))
     return models
 
 
 def read_instances(
-    datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, Model]]],
+    datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, CentredModel]]],
     objects: ObjectClouds,
     settings: InitialPoseSettings,
     gap: int,
@@ -134,14 +135,20 @@ def read_instances(
 class _Objects:
     """The objects of one dataset, ready to be found in frames."""
 
-    def __init__(self, name: str, objects: ObjectClouds, models: dict[int, Model], settings: InitialPoseSettings):
-        self._name, self._objects, self._models, self._settings = name, objects, models, settings
+    def __init__(
+        self, name: str, objects: ObjectClouds, models: dict[int, CentredModel], settings: InitialPoseSettings
+    ):
+        self._name = name
+        self._objects = objects
+        self._models = models
+        self._settings = settings
         self._index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
         self._symmetric = {number: self._is_symmetric(number) for number in models}
         self._registration: dict[int, GlobalRegistration] = {}
 
     def in_frame(self, frame: Frame, estimates: Mapping) -> list[dict]:
-        depth_m, rows = frame.depth_m(), []
+        depth_m = frame.depth_m()
+        rows = []
         for n, annotation in enumerate(frame.annotations):
             number = annotation.object_id
             diameter_m = float(self._objects.diameters_m[self._index[number]])
@@ -168,12 +175,13 @@ class _Objects:
         if self._settings.form == "true_pose":
             return displace(seen["T_camera_object_true"], diameter_m, self._settings, generator(*axes))
         if number not in self._registration:
-            model = (self._objects.points(i), self._objects.normals(i))
-            self._registration[number] = GlobalRegistration(*model, diameter_m, self._settings)
+            points_m, normals = self._objects.points(i), self._objects.normals(i)
+            self._registration[number] = GlobalRegistration(points_m, normals, diameter_m, self._settings)
         return self._registration[number].register(seen["points_m"], seed_of(*axes))
 
     def _is_symmetric(self, number: int) -> bool:
-        listed, i = self._models[number].listed_symmetries, self._index[number]
+        listed = self._models[number].listed_symmetries
+        i = self._index[number]
         return bool(
             find_symmetries(self._objects.points(i)[:4096], self._objects.diameters_m[i]) if listed is None else listed
         )
@@ -188,7 +196,7 @@ def _estimates(dataset: Dataset, places: np.ndarray) -> Mapping:
         raise InputError(f"dataset {dataset.name}", "has no results file", "set results, or another initial pose")
     # Against all images, not only the drawn ones: a results file covers the whole dataset.
     images = {_place(frame) for frame in read_frames(dataset.folders, dataset.split)}
-    return read_results(dataset.results, images | {tuple(place) for place in places.tolist()})
+    return read_bop_results(dataset.results, images | {tuple(place) for place in places.tolist()})
 
 
 def points_on_model(instances: Instances, objects: ObjectClouds) -> np.ndarray:

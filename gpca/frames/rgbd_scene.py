@@ -54,7 +54,8 @@ class SceneSettings:
     def from_dict(cls, settings: dict) -> SceneSettings:
         """Build from the config's section ``real_world.scenes``."""
         settings = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
-        camera, noise = Camera(**settings.pop("camera", {})), DepthNoise(**settings.pop("noise", {}))
+        camera = Camera(**settings.pop("camera", {}))
+        noise = DepthNoise(**settings.pop("noise", {}))
         return cls(camera=camera, noise=noise, **settings)
 
     def __post_init__(self) -> None:
@@ -191,7 +192,8 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
     meshes = [
         (transform(p.T_world_object, surfaces[p.model].vertices_m), surfaces[p.model].triangles) for p in standing
     ]
-    scene, alone = MeshScene([*meshes, table()]), [MeshScene([mesh]) for mesh in meshes]
+    scene = MeshScene([*meshes, table()])
+    alone = [MeshScene([mesh]) for mesh in meshes]
     colours_M_3 = np.array([*(model_colour(p.model, len(surfaces)) for p in standing), TABLE_COLOUR])
     for name in ("depth", "rgb", "mask", "mask_visib"):
         (folder / name).mkdir(parents=True)
@@ -205,7 +207,8 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
             folder / f"depth/{image:06d}.png", np.rint(1e3 * depth_m / DEPTH_SCALE).clip(0, 65535).astype(np.uint16)
         )
         write_png(folder / f"rgb/{image:06d}.png", shade(view, colours_M_3, T_world_camera))
-        truth_json[image], info_json[image] = [], []
+        truth_json[image] = []
+        info_json[image] = []
         for n, object_ in enumerate(standing):
             whole = alone[n].silhouette(settings.camera, T_world_camera)
             visible = view.mesh == n
@@ -221,7 +224,8 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
 
 
 def _truth(object_id: int, T_camera_object: np.ndarray) -> dict:
-    rotation, translation_mm = T_camera_object[:3, :3].ravel().tolist(), (1e3 * T_camera_object[:3, 3]).tolist()
+    rotation = T_camera_object[:3, :3].ravel().tolist()
+    translation_mm = (1e3 * T_camera_object[:3, 3]).tolist()
     return {"obj_id": object_id, "cam_R_m2c": rotation, "cam_t_m2c": translation_mm}
 
 

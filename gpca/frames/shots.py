@@ -13,8 +13,8 @@ from gpca.environment import require_open3d
 from gpca.frames.bop import back_project
 from gpca.frames.camera import Camera
 
-NEIGHBOURS, OUTLIER_RATIO = 20, 2.0  # of statistical outlier removal: Open3D's usual ones
-NEAR = 0.05  # of the diameter: a measured point that near lies on the model
+NEIGHBOURS, OUTLIER_RATIO = 20, 2.0  # Open3D's usual values for the removal of statistical outliers
+NEAR = 0.05  # diameters; a measured point that is so near lies on the model
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,16 @@ def agreement(
     Args:
         points_m: measured points (P, 3) in the world. model_m, normals: (Q, 3) in the object's frame.
     """
-    placed_m, facing_out = transform(T_world_object, model_m), normals @ T_world_object[:3, :3].T
+    placed_m = transform(T_world_object, model_m)
+    facing_out = normals @ T_world_object[:3, :3].T
     reach_m = NEAR * diameter_m
     on_model = np.mean(cKDTree(placed_m).query(points_m, distance_upper_bound=reach_m)[0] < reach_m)
     explained = visible = 0
     for shot in shots:
         v, u, depth_m = shot.project(placed_m)
         facing = np.sum(facing_out * (placed_m - shot.T_world_camera[:3, 3]), axis=1) < 0
-        measured_m, mine = shot.depth_m[v, u], shot.mask[v, u]
+        measured_m = shot.depth_m[v, u]
+        mine = shot.mask[v, u]
         seen = facing & (v >= 0) & (measured_m > 0) & (mine | (measured_m > depth_m - reach_m))
         visible += seen.sum()
         explained += (seen & mine & (np.abs(measured_m - depth_m) < reach_m)).sum()

@@ -18,13 +18,13 @@ from gpca.frames.shots import Shot, median_depth
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
-from gpca.pairs.perturbation import Severities, move
+from gpca.pairs.perturbation import Severities, misplace
 from gpca.seeds import generator, seed_of
 
-COARSE = 4  # the factor by which the image is thinned where only shares of pixels count
-LEAST_VISIBLE = 0.7  # of the object, before anything is put in front of it
-REDRAWS = 40  # of a situation that has no room for its cause
-OCCLUDERS = 6  # that are tried in front of an object
+COARSE = 4  # images are thinned by this factor where only shares of pixels count
+LEAST_VISIBLE = 0.7  # so much of an object must be seen before anything is put in front of it
+REDRAWS = 40  # a situation without room for its cause is drawn anew so many times
+OCCLUDERS = 6  # so many are tried in front of an object
 OCCLUDER_TURN_DEG = 20.0  # the occluder stands so far off the line to the camera, at most
 
 
@@ -36,7 +36,7 @@ class SituationSettings:
         scenes: tables, cameras and the sensor's usual noise; its camera is the region of interest about the object.
         noise_scale: range of the factor on the sensor's noise, where noise is the cause.
         hidden: range of the share of the visible part that an occluder hides, where overlap is the cause.
-        severities: of the error of the estimated pose, where pose is the cause.
+        severities: how far off the estimated pose is, where pose is the cause.
     """
 
     scenes: SceneSettings = field(default_factory=SceneSettings)
@@ -82,8 +82,9 @@ class Shelf:
     def estimator(self, model: int) -> GlobalRegistration:
         """Return the pose estimator of an object."""
         if model not in self._estimators:
-            given = (*self.objects.clouds[model], float(self.objects.diameters_m[model]), self._settings)
-            self._estimators[model] = GlobalRegistration(*given)
+            points_m, normals = self.objects.clouds[model]
+            diameter_m = float(self.objects.diameters_m[model])
+            self._estimators[model] = GlobalRegistration(points_m, normals, diameter_m, self._settings)
         return self._estimators[model]
 
 
@@ -95,8 +96,8 @@ class Situation:
         shelf: the objects.
         standing: what is on the table, the object in question first.
         T_world_camera: where the case is seen from at first.
-        T_object_estimated: by how much the pose estimator is off, whatever it is shown: the cause pose.
-        camera, noise: of every shot.
+        T_object_estimated: how far the pose estimator is off, whatever it is shown: the cause pose.
+        camera, noise: those of every shot.
         cause: what disturbs the registration; empty for nothing.
         axes: names of its random numbers.
     """
@@ -169,7 +170,9 @@ class Situations:
     """
 
     def __init__(self, shelf: Shelf, settings: SituationSettings, part: tuple) -> None:
-        self._shelf, self._settings, self._part = shelf, settings, part
+        self._shelf = shelf
+        self._settings = settings
+        self._part = part
         self._alone: dict[int, MeshScene] = {}
         self._tables: dict[int, list[Placed]] = {}
 
@@ -196,7 +199,8 @@ class Situations:
         standing = list(self._tables[number])
         standing.insert(0, standing.pop(int(random.integers(len(standing)))))
         T_world_object = standing[0].T_world_object
-        azimuth, elevation = random.uniform(0, 2 * np.pi), np.deg2rad(random.uniform(*scenes.elevation_deg))
+        azimuth = random.uniform(0, 2 * np.pi)
+        elevation = np.deg2rad(random.uniform(*scenes.elevation_deg))
         toward = np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
         centre_m = T_world_object[:3, 3]
         situation = Situation(
@@ -226,7 +230,7 @@ class Situations:
             scale = settings.scenes.noise.scale * random.uniform(*settings.noise_scale)
             return replace(clean, noise=replace(clean.noise, scale=scale), cause=cause)
         if cause == "pose":
-            T_error = move(np.zeros((1, 3)), settings.severities, random).T_target_source_true
+            T_error = misplace(np.zeros((1, 3)), settings.severities, random).T_target_source_true
             return replace(clean, T_object_estimated=scale_translation(T_error, clean.diameter_m), cause=cause)
         if cause == "overlap":
             occluder = self._occluder(clean, random)
@@ -254,7 +258,8 @@ class Situations:
             return None
         model = int(random.choice(free))
         T_world_object = rest(*self._shelf.resting[model], random)
-        mine, target_m = self._shelf.outline(Placed(model, T_world_object)), clean.T_world_object[:2, 3]
+        mine = self._shelf.outline(Placed(model, T_world_object))
+        target_m = clean.T_world_object[:2, 3]
         turn = np.deg2rad(random.uniform(-OCCLUDER_TURN_DEG, OCCLUDER_TURN_DEG))
         along = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
         way = along @ (clean.T_world_camera[:2, 3] - target_m)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 OCCLUDER, HALF_SPACE = "occluder", "half_space"
-JUDGED_POINTS = 1000  # of the model, by which a pose error is measured
+JUDGED_POINTS = 1000  # so many points of the model measure a pose error
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class FrameSettings:
     """How instances become registrations.
 
     Attributes:
-        test_share: of the instances, in frames that training does not see.
+        test_share: the share of the instances that is in frames that training does not see.
         occluders: share of the overlap samples whose points an occluder takes; a half-space takes the others'.
         registration: numbers of samples, points, severities, ICP.
     """
@@ -77,12 +77,14 @@ def _register_one(
     instances: Instances, i: int, objects: ObjectClouds, concept: str, settings: FrameSettings, random
 ) -> tuple[dict, str]:
     index = int(instances.object_index[i])
-    diameter_m, given = float(objects.diameters_m[index]), settings.registration
+    diameter_m = float(objects.diameters_m[index])
+    given = settings.registration
     T_init_camera = inverse(instances.T_camera_object_init[i])
     rows = random.permutation(len(instances.cloud_m(i)))[: given.points]
     target_rows = random.permutation(len(objects.points(index)))[: given.points]
     points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
-    perturbed, lost_to = None, ""
+    perturbed = None
+    lost_to = ""
     if concept == "overlap":
         if random.random() < settings.occluders:
             share = random.uniform(*given.severities.crop)
@@ -97,7 +99,8 @@ def _register_one(
 
 
 def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict) -> dict:
-    model_m, symmetric = objects.points(record["object_index"])[:JUDGED_POINTS], bool(instances.symmetric[i])
+    model_m = objects.points(record["object_index"])[:JUDGED_POINTS]
+    symmetric = bool(instances.symmetric[i])
     T_source_target = inverse(record["T_target_source_true"])
     errors = {
         f"{name}_error": pose_error(model_m, record[f"T_target_source_{name}"] @ T_source_target, np.eye(4), symmetric)

@@ -12,7 +12,7 @@ from gpca.frames.camera import Camera, MeshScene, look_at
 from gpca.frames.rgbd_scene import table
 from gpca.frames.shots import NEAR, Shot
 
-VOXEL_M = 0.012  # of what else was measured, each as a box that hides what is behind it
+VOXEL_M = 0.012  # whatever else was measured becomes boxes of this size, which hide what is behind them
 ON_TABLE_M = 0.008  # what lies lower is the table
 _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 _SIDES = ([0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3])  # around each
@@ -54,9 +54,10 @@ def expected_surface(
     nobody has seen yet counts as free.
 
     Args:
-        vertices_m, faces: of the model. points_m: (Q, 3) on its surface. Both in the object's frame.
+        vertices_m, faces: the model, in its own frame.
+        points_m: (Q, 3) on its surface.
         T_world_object: the estimate.
-        camera: of few pixels, with which the candidates look.
+        camera: what the candidates look with; few pixels suffice.
     """
     placed_m = transform(T_world_object, points_m)
     reach_m = NEAR * diameter_m
@@ -66,7 +67,8 @@ def expected_surface(
         seen_Q = cKDTree(measured_m).query(placed_m, distance_upper_bound=reach_m)[0] < reach_m
     around = occupy(np.concatenate([shot.other_points_m() for shot in shots]))
     meshes = [(transform(T_world_object, vertices_m), faces), table(), *([around] if around else [])]
-    scene, shown_n_Q = MeshScene(meshes), []
+    scene = MeshScene(meshes)
+    shown_n_Q = []
     for T_world_camera in poses_n:
         view = scene.look(camera, T_world_camera)
         v, u, depth_m = Shot(camera, T_world_camera, view.depth_m, view.mesh == 0).project(placed_m)
@@ -76,5 +78,6 @@ def expected_surface(
 
 def best_viewpoint(seen_Q: np.ndarray, shown_n_Q: np.ndarray) -> int:
     """Return the viewpoint after which most of the surface was seen; of equals, the one that shows most by itself."""
-    together_n, alone_n = (seen_Q | shown_n_Q).sum(axis=1), shown_n_Q.sum(axis=1)
+    together_n = (seen_Q | shown_n_Q).sum(axis=1)
+    alone_n = shown_n_Q.sum(axis=1)
     return int(np.lexsort((-alone_n, -together_n))[0])

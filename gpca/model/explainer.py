@@ -20,23 +20,23 @@ from gpca.alignment.rigid import require_rigid, transform
 from gpca.attribution.scores import entropy
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
-from gpca.model.explanation import Explanation, Spread
+from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.file import Model, model_path
 from gpca.objects.canonical import estimate_normals
 from gpca.recovery.policy import RecoveryPolicy
 from gpca.seeds import generator
 from gpca.uncertainty.spread import UncertaintySettings, run_from_starts
 
-LARGEST_RATIO = 8.0  # of the extents of source and target, either way; in the wrong unit it is 10 or more
+LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
 
 class Explainer:
     """GP-CA with a trained model.
 
     Args:
-        model: by default that of :func:`gpca.model.file.model_path`.
-        policy: from scores to what to do; by default the model's own.
-        device: of the encoder; by default a GPU where torch finds one.
+        model: by default the one that :func:`gpca.model.file.model_path` finds.
+        policy: what turns scores into an action; by default the model's own.
+        device: where the encoder runs; by default a GPU where torch finds one.
     """
 
     def __init__(
@@ -66,8 +66,8 @@ class Explainer:
         Args:
             source_points, target_points: (N, 3) what was observed, and the reference that it is aligned to.
             T_target_source_init: (4, 4) where ICP starts; the identity by default.
-            unit: of points and pose: ``m``, ``cm`` or ``mm``.
-            frame: of the target, where it is known already; by default measured on its points.
+            unit: that of points and pose: ``m``, ``cm`` or ``mm``.
+            frame: the target's, where it is known already; by default it is measured on its points.
             uncertainty: how the spread of the pose is measured; by default it is not.
 
         Raises:
@@ -125,7 +125,8 @@ class Explainer:
         the same.
         """
         settings = self.model.encoder_settings
-        draws, n = (1 if len(aligned) == settings.points else settings.draws), settings.points
+        draws = 1 if len(aligned) == settings.points else settings.draws
+        n = settings.points
         repeated = len(aligned) < n
         rows_D_N = [
             generator("explanation", "draw", draw).choice(len(aligned), n, replace=repeated, shuffle=False)
@@ -154,10 +155,10 @@ def _require_like_sizes(source: np.ndarray, target: np.ndarray) -> None:
 
 def _spread(
     icp: BatchedICP, source: np.ndarray, T_icp: np.ndarray, settings: UncertaintySettings, diameter: float
-) -> Spread:
+) -> PoseSpread:
     xi_n_6 = generator("explanation", "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
     runs = run_from_starts(icp, thin(source, settings.points, "spread"), np.eye(4), xi_n_6)
-    return Spread(runs.covariance(T_icp), settings.starts, diameter)
+    return PoseSpread(runs.covariance(T_icp), settings.starts, diameter)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.recovery.policy import QUEUE
 
-WORDS = {  # of the branches, for a reader
+WORDS = {  # what a reader is told of each branch
     "reinitialise": "reinitialise ICP with a broader search",
     "new_view": "change the viewpoint",
     "denoise": "filter and check the sensor",
@@ -18,7 +18,7 @@ WORDS = {  # of the branches, for a reader
 
 
 @dataclass(frozen=True)
-class Spread:
+class PoseSpread:
     """How far poses scatter when ICP starts elsewhere: Σ (6, 6) of twists in radians and diameters, over n starts."""
 
     covariance_6_6: np.ndarray
@@ -43,14 +43,14 @@ class Explanation:
     Attributes:
         T_target_source: the pose (4, 4) by ICP, in the unit of the points.
         fitness, inlier_rmse: share of source points with a correspondence; RMSE over those, in the unit of the points.
-        scores, variances: by concept, over the posterior draws (Eqs. 4, 5).
-        bald, entropy: of the attribution in nats: Eq. 7, and H of the scores.
-        concept: that of the largest score (Eq. 6).
+        scores, variances: mean and variance over the posterior draws for each concept (Eqs. 4, 5).
+        bald, entropy: how uncertain the attribution is, in nats: Eq. 7, and the entropy of the scores.
+        concept: the one with the largest score (Eq. 6).
         action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`).
-        reason: of the action, in words.
-        spread: of the pose by Monte-Carlo ICP, where it was asked for.
-        unit: of all lengths.
-        seconds: by stage, and ``total``.
+        reason: why this action, in words.
+        spread: how far the pose scatters by Monte-Carlo ICP, where it was asked for.
+        unit: that of all lengths.
+        seconds: those of each stage, and ``total``.
         notes: what a reader has to know, such as points that were left out.
     """
 
@@ -64,7 +64,7 @@ class Explanation:
     concept: str
     action: str
     reason: str
-    spread: Spread | None
+    spread: PoseSpread | None
     unit: str
     seconds: dict[str, float]
     notes: tuple[str, ...] = ()

@@ -22,7 +22,7 @@ from gpca.files import whole_file
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 FORMAT, VERSION = "GP-CA model", 2
-VARIABLE = "GPCA_MODEL"  # of the environment: the file that is taken where none is named
+VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to take where no other is named
 RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
 BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
 REMEDY = "make one with 'make results', or alone with 'snakemake -j2 results/embedded/model.pt'"
@@ -71,7 +71,7 @@ class Model:
             "title": self.title,
             "stand_in": self.stand_in,
         }
-        # Given a path, torch.save writes its name, here one with the process id, into the file.
+        # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
         with whole_file(path) as partial, partial.open("wb") as file:
             torch.save(content, file)
 

@@ -12,7 +12,7 @@ from gpca.errors import InputError
 from gpca.objects import mesh_folder, pcd
 from gpca.objects.canonical import bounding_centre, canonical_cloud
 
-SAMPLED_POINTS = 16384  # on a mesh, as on the objects of the training
+SAMPLED_POINTS = 16384  # so many are drawn on a mesh, as on the objects of the training
 SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd")
 
 
@@ -20,7 +20,7 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
     """Return the points (N, 3) of a cloud, or drawn on a mesh, in the file's unit, and the frame that they span.
 
     Args:
-        unit: of the file: ``m``, ``cm`` or ``mm``.
+        unit: the file's: ``m``, ``cm`` or ``mm``.
 
     Raises:
         InputError: no such file, another format, unreadable, too few points, NaN, a mesh without area, or a diameter

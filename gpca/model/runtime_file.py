@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RUNTIME_COLUMNS = ("component", "device", "hardware", "threads", "repeats", "mean_s", "deviation_s", "median_s")
-COMPONENTS = {  # in the order of the table
+COMPONENTS = {  # what the table calls them, in its order
     "icp": "ICP alignment",
     "icp_open3d": "ICP alignment by Open3D",
     "features": "Feature extraction",

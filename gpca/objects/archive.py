@@ -122,7 +122,7 @@ def _zip_members(archive: zipfile.ZipFile, path: Path, largest_bytes: int) -> li
 
 def _stream(archive: tarfile.TarFile, info: tarfile.TarInfo) -> IO[bytes]:
     stream = archive.extractfile(info)
-    assert stream is not None  # as it is of links and folders alone
+    assert stream is not None  # only links and folders have none
     return stream
 
 
@@ -134,14 +134,14 @@ def _tar_members(archive: tarfile.TarFile, path: Path, largest_bytes: int) -> li
         if not (info.isreg() or info.isdir()):
             raise InputError(path, f"member '{info.name}' is a link or a device", REMEDY)
         total += info.size
-        _check_size(total, path, largest_bytes)  # before more of a bomb is decompressed to find the next header
+        _check_size(total, path, largest_bytes)  # now, before more of a bomb is decompressed to find the next header
         if info.isreg():
             members.append(Member(path, info.name, info.size, partial(_stream, archive, info)))
     # tarfile takes a tar that is cut between two members, or a damaged header, for the end: a whole one ends in zeros.
     archive.fileobj.seek(archive.offset)
     if archive.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
         raise tarfile.ReadError("no end mark")
-    while rest := archive.fileobj.read(1 << 20):  # to the end, where gzip keeps the checksum of all
+    while rest := archive.fileobj.read(1 << 20):  # read on to the end, where gzip keeps the checksum of all
         total += len(rest)
         _check_size(total, path, largest_bytes)
     return members

@@ -27,7 +27,7 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
 
     Args:
         folder: holds obj_*.ply itself, or models/ with them, as the data sets and their archives do.
-        unit: of the vertices; the format says mm.
+        unit: that of the vertices; the format says mm.
         objects: ids.
 
     Raises:

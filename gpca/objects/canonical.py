@@ -18,7 +18,7 @@ from gpca.objects.surface import Surface
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
 NORMAL_NEIGHBOURS = 30
-FEW_POINTS = 600  # whose distances take less time than their hull
+FEW_POINTS = 600  # up to so many, all distances take less time than the hull
 
 
 def require_points(points: np.ndarray, subject: object) -> None:
@@ -73,7 +73,8 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
         InputError: no points, NaN, zero area, too small a cloud, or a diameter that no declared unit would give.
     """
     subject = f"{source}: object '{surface.name}'"
-    vertices_m, faces = np.asarray(surface.vertices_m, dtype=np.float64), surface.faces
+    vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
+    faces = surface.faces
     require_points(vertices_m, subject)
     if faces is None:
         if len(vertices_m) < FEWEST_CLOUD_POINTS:
@@ -176,7 +177,7 @@ class ObjectClouds:
     """The canonical clouds of one source, as :func:`write_objects` wrote them.
 
     Attributes:
-        names: of the O objects.
+        names: those of the O objects.
         diameters_m: (O,) float64.
         clouds: for each object its points (P, 3) in metres and unit normals (P, 3), both float32.
     """

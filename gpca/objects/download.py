@@ -40,7 +40,7 @@ def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None
 
 
 def cached_path(url: str, folder: str | Path) -> Path:
-    """Where the cache keeps the file of `url`; InputError for an address that is not http or https."""
+    """Return where the cache keeps the file of `url`; InputError for an address that is not http or https."""
     parts = urlsplit(url)
     names = [name for name in parts.path.split("/") if name not in ("", ".", "..")]
     if parts.scheme not in ("http", "https") or not parts.hostname or not names:

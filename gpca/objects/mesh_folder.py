@@ -123,7 +123,7 @@ def _require_whole(path: Path) -> None:
 
 
 def _off_rows(content: bytes) -> tuple[int, list[bytes], int, bool]:
-    """Declared rows, the rows, least columns of the last one, and whether that one begins with a list's length."""
+    """Return declared rows, the rows, least columns of the last one, and whether it begins with a list's length."""
     rows = [row for row in (line.split(b"#")[0].strip() for line in content.splitlines()) if row]
     counts, rows = (rows[1], rows[2:]) if rows[0].isalpha() else (rows[0][3:], rows[1:])  # OFF may share their line
     vertices, faces = map(int, counts.split()[:2])
@@ -131,7 +131,7 @@ def _off_rows(content: bytes) -> tuple[int, list[bytes], int, bool]:
 
 
 def _ply_rows(content: bytes) -> tuple[int, list[bytes], int, bool]:
-    """The same for an ASCII PLY; a binary one has no rows."""
+    """Return the same for an ASCII PLY; a binary one has no rows."""
     header, _, body = content.partition(b"end_header")
     if b"format ascii" not in header:
         return 0, [], 0, False

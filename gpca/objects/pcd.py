@@ -1,6 +1,8 @@
 """Point Cloud Data (PCD 0.6, 0.7): ascii, binary and binary_compressed.
 
 Format: https://pointclouds.org/documentation/tutorials/pcd_file_format.html
+Open3D's reader (0.19) does not serve here: it takes a cut ascii file, a short row, a header without WIDTH or with an
+unknown TYPE for whole ones and fills the gaps with whatever the memory holds, and it reads a double after bytes as 0.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ class _Header:
 
 
 def parse(content: bytes, subject: object) -> np.ndarray:
-    """Points of a PCD file.
+    """Return the points of a PCD file.
 
     Args:
         content: the whole file.
@@ -71,7 +73,9 @@ def _parse_header(content: bytes) -> tuple[_Header, bytes]:
     for key in ("FIELDS", "SIZE", "TYPE", "WIDTH", "HEIGHT", "POINTS"):
         if not values.get(key):
             raise ValueError(f"wrong header: no line {key}")
-    fields, sizes, types = values["FIELDS"], values["SIZE"], values["TYPE"]
+    fields = values["FIELDS"]
+    sizes = values["SIZE"]
+    types = values["TYPE"]
     counts = values.get("COUNT", ["1"] * len(fields))
     if not len(fields) == len(sizes) == len(types) == len(counts):
         raise ValueError("wrong header: FIELDS, SIZE, TYPE and COUNT differ in length")
@@ -128,7 +132,7 @@ _DECODERS = {"ascii": _ascii, "binary": _binary, "binary_compressed": _binary_co
 
 
 def _lzf_decompress(data: bytes) -> bytes:
-    """LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write."""
+    """Undo LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write."""
     out = bytearray()
     i = 0
     while i < len(data):

@@ -123,7 +123,7 @@ def source_modules(entry: dict) -> list[str]:
 
 
 def _unpacked(file: Path) -> Path:
-    # Named by content: an archive that was fetched anew is unpacked anew.
+    # The folder is named by content, so an archive that was fetched anew is unpacked anew.
     return archive.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-TOLERANCE = 0.01  # of the diameter
+TOLERANCE = 0.01  # diameters
 DISCRETE_DEG = (90.0, 180.0)
 CONTINUOUS_DEG = (25.0, 50.0, 75.0)  # none is a symmetry of a square or hexagonal shape
 
@@ -17,7 +17,7 @@ def read_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None
     The file lists none for an object that has none, and for no object at all where its makers left them out.
 
     Args:
-        models_info: as :func:`gpca.objects.bop.read_models_info` returns it.
+        models_info: what :func:`gpca.objects.bop.read_models_info` returns.
     """
     lists = {n: {k: v for k, v in entry.items() if k.startswith("symmetries_")} for n, entry in models_info.items()}
     return lists.get(object_id, {}) if any(lists.values()) else None
@@ -32,7 +32,7 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
 
     Args:
         points_N_3: a dense cloud of the whole surface, centred on its bounding box.
-        diameter: in the unit of the points.
+        diameter: the object's, in the unit of the points.
 
     Returns:
         ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with their offset. Keys only

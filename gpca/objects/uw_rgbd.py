@@ -35,8 +35,8 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
 
     Args:
         paths: .pcd files and tars of them.
-        unit: of the points.
-        views_per_instance: at most so many of the views of one instance, within one tar or among the single files.
+        unit: that of the points.
+        views_per_instance: how many views of one instance are read at most, of one tar or of the single files.
 
     Raises:
         InputError: damaged tar or PCD, a tar without PCD, NaN.

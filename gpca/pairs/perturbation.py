@@ -62,7 +62,7 @@ def add_noise(points: np.ndarray, severities: Severities, random: np.random.Gene
     return Perturbed(points + random.normal(scale=sigma, size=points.shape), severity={"noise": sigma})
 
 
-def move(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
+def misplace(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
     """Rotate about a random axis through the object's centre and shift in a random direction."""
     angle_rad = np.deg2rad(random.uniform(*severities.rotation_deg))
     distance = random.uniform(*severities.translation)
@@ -85,4 +85,4 @@ def crop(points: np.ndarray, severities: Severities, random: np.random.Generator
 
 
 Perturbation = Callable[[np.ndarray, Severities, np.random.Generator], Perturbed]
-PERTURBATIONS: dict[str, Perturbation] = {"noise": add_noise, "pose": move, "overlap": crop}
+PERTURBATIONS: dict[str, Perturbation] = {"noise": add_noise, "pose": misplace, "overlap": crop}

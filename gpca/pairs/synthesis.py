@@ -1,4 +1,4 @@
-"""Making the registrations of one source and seed: perturb clean clouds, align them by ICP, label them."""
+"""Makes the registrations of one source and seed: perturbs clean clouds, aligns them by ICP, labels them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def make_registrations(
     Returns:
         the registrations, and the seconds (S,) that ICP took for each.
     """
-    require_open3d()  # loaded here, or the first sample's seconds would hold its import
+    require_open3d()  # it is loaded here, or the first sample's seconds would hold its import
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
     records = []
     for split, n in progress(samples, f"registrations of {source}, seed {seed}"):
@@ -73,7 +73,7 @@ def _register_one(
 ) -> dict:
     points = objects.points(object_index) / float(objects.diameters_m[object_index])
     n_points = min(settings.points, len(points) // 2)
-    # Disjoint draws: a point seen in both clouds would have distance zero, and that gives the concept away.
+    # The draws are disjoint: a point in both clouds would have distance zero, and that gives the concept away.
     order = random.permutation(len(points))
     source_rows, target_rows = order[:n_points], order[n_points : 2 * n_points]
     perturbed = PERTURBATIONS[concept](points[source_rows], settings.severities, random)
@@ -86,8 +86,8 @@ def align_pair(
     """Align a perturbed cloud to points of its object's model, from the identity, and return it as a row's columns.
 
     Args:
-        perturbed: in diameters, in the frame of the initial pose.
-        target_rows: of the object's canonical cloud.
+        perturbed: the cloud in diameters, in the frame of the initial pose.
+        target_rows: rows of the object's canonical cloud.
     """
     diameter_m = float(objects.diameters_m[object_index])
     target = objects.points(object_index)[target_rows] / diameter_m

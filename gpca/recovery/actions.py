@@ -16,10 +16,10 @@ from gpca.alignment.rigid import inverse, scale_translation
 from gpca.errors import InputError
 from gpca.frames.shots import Shot, agreement, fuse
 
-LOOSER = 2.0  # the correspondence distance of the broader search, in that of ICP
-JUDGED = 8  # results of the search that the shots are compared with
+LOOSER = 2.0  # the broader search has so many times ICP's correspondence distance
+JUDGED = 8  # so many results of the search are compared with the shots
 MODEL_POINTS, CLOUD_POINTS = 512, 256
-BEHIND = (0.1, 0.25)  # diameters from the middle of the measured side to the object's centre, in turn
+BEHIND = (0.1, 0.25)  # the centre is tried so many diameters behind the middle of the measured side
 
 
 class Robot(Protocol):
@@ -43,10 +43,11 @@ class Holding:
     """What a robot has of a case.
 
     Attributes:
-        shots: by viewpoint.
-        T_world_object_init: the pose that ICP starts from. T_world_object: what it ended at.
-        frames: that are taken at a viewpoint.
-        filtered: statistical outliers are removed.
+        shots: one per viewpoint.
+        T_world_object_init: the pose that ICP starts from.
+        T_world_object: the pose that ICP ended at.
+        frames: how many are taken at a viewpoint.
+        filtered: whether statistical outliers are removed.
     """
 
     shots: tuple[Shot, ...]
@@ -103,23 +104,31 @@ def new_view(
     from gpca.frames.situations import coarse
     from gpca.frames.viewpoint import best_viewpoint, candidates, expected_surface
 
-    # About what was measured, not the estimated centre, which may be anywhere.
-    centre_m, first = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0), holding.shots[0]
+    # The viewpoints surround what was measured, since the estimated centre may be anywhere.
+    centre_m = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0)
+    first = holding.shots[0]
     distance_m = float(np.linalg.norm(centre_m - first.T_world_camera[:3, 3]))
     poses_n = candidates(centre_m, distance_m, azimuths, elevations_deg)
     points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
-    mesh = (robot.vertices_m, robot.faces)
-    expected = expected_surface(
-        holding.shots, *mesh, points_m, holding.T_world_object, robot.diameter_m, poses_n, coarse(first.camera)
+    together_n, alone_n = expected_surface(
+        holding.shots,
+        robot.vertices_m,
+        robot.faces,
+        points_m,
+        holding.T_world_object,
+        robot.diameter_m,
+        poses_n,
+        coarse(first.camera),
     )
-    shot = robot.shoot(poses_n[best_viewpoint(*expected)], holding.frames)
+    shot = robot.shoot(poses_n[best_viewpoint(together_n, alone_n)], holding.frames)
     looked = replace(holding, shots=(*holding.shots, shot))
     return best_start(looked, robot, [robot.estimate(shot, looked.filtered)])
 
 
 def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames: int = 10) -> Holding:
     """Take several frames at every viewpoint and average them, and remove statistical outliers, from now on."""
-    frames += holding.frames * holding.filtered
+    if holding.filtered:  # it was taken before, and its frames count too
+        frames += holding.frames
     shots = tuple(robot.shoot(shot.T_world_camera, frames) for shot in holding.shots)
     measured = replace(holding, shots=shots, frames=frames, filtered=True)
     return best_start(measured, robot, [robot.estimate(shot, True) for shot in shots])
@@ -130,14 +139,16 @@ def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None
 
     Poses are compared by :func:`gpca.frames.shots.agreement`, which needs no truth.
     """
-    d, step = robot.diameter_m, max(1, len(robot.points_m) // MODEL_POINTS)
+    d = robot.diameter_m
+    step = max(1, len(robot.points_m) // MODEL_POINTS)
     cloud_m = fuse(holding.shots, d, holding.filtered)
     cloud_m = cloud_m[:: max(1, len(cloud_m) // CLOUD_POINTS)]
     if not len(cloud_m):
         return holding
-    model = (robot.points_m[::step].astype(np.float64), robot.normals[::step])
+    model_m = robot.points_m[::step].astype(np.float64)
+    normals = robot.normals[::step]
     known = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
-    shares = [agreement(holding.shots, cloud_m, *model, T, d) for T in known]
+    shares = [agreement(holding.shots, cloud_m, model_m, normals, T, d) for T in known]
     return replace(holding, T_world_object_init=known[int(np.argmax(shares))])
 
 

@@ -17,8 +17,8 @@ from gpca.pairs.synthesis import align_pair
 from gpca.recovery.actions import Action, Holding
 from gpca.seeds import generator
 
-FEWEST_POINTS = 64  # of the object in all shots; with fewer there is nothing to register
-JUDGED_POINTS = 1000  # of the model, by which a pose error is measured
+FEWEST_POINTS = 64  # with fewer points of the object in all shots there is nothing to register
+JUDGED_POINTS = 1000  # so many points of the model measure a pose error
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Attempt:
     """A registration: what the robot holds, the columns of its row, the truth about it.
 
     Attributes:
-        holding: with the pose that ICP ended at.
-        record: as :func:`gpca.pairs.synthesis.align_pair` returns it, less sample and split.
+        holding: what the robot has, with the pose that ICP ended at.
+        record: what :func:`gpca.pairs.synthesis.align_pair` returns, which lacks sample and split.
         error: ADD, or ADD-S of symmetric objects, relative to the diameter. Never shown to a policy.
-        seconds: of ICP and of the action before it, without the camera's.
+        seconds: what ICP and the action before it took, without the camera.
     """
 
     holding: Holding
@@ -43,11 +43,14 @@ class RobotIn:
 
     def __init__(self, situation: Situation, axes: tuple = ()) -> None:
         shelf, model = situation.shelf, situation.model
-        self.points_m, self.normals = shelf.objects.points(model), shelf.objects.normals(model)
-        self.vertices_m, self.faces = shelf.surfaces[model].vertices_m, shelf.surfaces[model].faces
+        self.points_m = shelf.objects.points(model)
+        self.normals = shelf.objects.normals(model)
+        self.vertices_m = shelf.surfaces[model].vertices_m
+        self.faces = shelf.surfaces[model].faces
         self.diameter_m = situation.diameter_m
         self.camera_seconds = 0.0
-        self._situation, self._axes = situation, axes
+        self._situation = situation
+        self._axes = axes
 
     def shoot(self, T_world_camera: np.ndarray, frames: int) -> Shot:
         """Measure from a viewpoint; the noise is named by what was done before and by the viewpoint."""
@@ -100,7 +103,9 @@ def register_held(
 ) -> Attempt | None:
     """Align the object's fused points to its model by ICP, from the initial pose."""
     started = perf_counter()
-    objects, model, d = situation.shelf.objects, situation.model, situation.diameter_m
+    objects = situation.shelf.objects
+    model = situation.model
+    d = situation.diameter_m
     cloud_m = fuse(holding.shots, d, holding.filtered)
     if len(cloud_m) < FEWEST_POINTS:
         return None

@@ -16,12 +16,13 @@ from gpca.frames.shots import Shot
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action
 from gpca.recovery.cases import Attempt
-from gpca.recovery.loop import Episode, LoopSettings
+from gpca.recovery.episodes import Episode
+from gpca.recovery.settings import LoopSettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
-ACTION = "new_view"  # that the figure shows
+ACTION = "new_view"  # the figure shows this one
 SHOWN_POINTS = 3000
 
 
@@ -53,7 +54,8 @@ def save_example(
     shown = shown[shown["policy"] == "gpca"].iloc[0] if (shown["policy"] == "gpca").any() else shown.iloc[0]
     before, after = episode.outcomes[()], episode.take((ACTION,), actions, settings)
     new = after.holding.shots[-1]
-    objects, model = episode.situation.shelf.objects, episode.situation.model
+    objects = episode.situation.shelf.objects
+    model = episode.situation.model
     arrays = {
         "camera_3_3": new.camera.matrix_3_3,
         "model_m": objects.points(model)[:SHOWN_POINTS],

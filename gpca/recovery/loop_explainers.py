@@ -1,4 +1,4 @@
-"""The explainers that policies of recovery read, learnt from registrations of other scenes of the same camera."""
+"""The explainers that policies of recovery read. They learn from other scenes of the same camera."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baselines.registry import explainer_entry
 from gpca.attribution.scores import Attribution
 from gpca.encoders.training import EncoderSettings, embed, train_encoder
 from gpca.pairs.dataset import Registrations
-from gpca.recovery.loop import Explain
+from gpca.recovery.answers import Explain
 from gpca.uncertainty.evaluation import evaluate_design
 from gpca.uncertainty.spread import UncertaintySettings
 
@@ -22,9 +22,9 @@ class LoopExplainers:
     """Explainers by name, and how well each does on the calibration samples.
 
     Attributes:
-        explain: by name, of registrations without labels.
-        calibration: by name, what it says of the calibration samples.
-        concepts: (N,) the truth of those.
+        explain: for each name the function that attributes registrations without labels.
+        calibration: for each name what it says of the calibration samples.
+        concepts: (N,) the truth about those.
     """
 
     explain: Mapping[str, Explain]
@@ -49,20 +49,23 @@ def learn_explainers(
     """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration.
 
     Args:
-        names: of explainers (:mod:`gpca.explainers.interface`) that read embeddings or the design ``removal``.
+        names: explainers (:mod:`baselines.registry`) that read embeddings or the design ``removal``.
         settings: explainer -> its settings.
         most_remedied: training samples whose remedies are run, at most; Monte-Carlo ICP is slow.
     """
     train, held_out = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
-    explain, model = {}, None
+    explain = {}
+    model = None
     for name in names:
         entry = explainer_entry(name)
         explainer = entry.make(source, seed, **(settings.get(name) or {}))
         if entry.reads == "embeddings":
             model = model or train_encoder(registrations, source, seed, encoder)[0]
-            attach, learnt = _embedding(model, source, seed, encoder), train
+            attach = _embedding(model, source, seed, encoder)
+            learnt = train
         else:
-            attach, learnt = _remedies(source, seed, uncertainty), train.subset(np.arange(len(train))[:most_remedied])
+            attach = _remedies(source, seed, uncertainty)
+            learnt = train.subset(np.arange(len(train))[:most_remedied])
         explainer.fit(attach(learnt))
         explain[name] = _timed(explainer, attach)
     calibration = {name: of_name(held_out.without_labels()) for name, of_name in explain.items()}
@@ -74,7 +77,7 @@ def _timed(explainer, attach) -> Explain:
         started = perf_counter()
         attached = attach(registrations)
         attribution = explainer.explain(attached)
-        # Divided evenly, as the encoder sees many at once; what remedies took is in the explainer's own seconds too.
+        # All get the same, as the encoder sees many at once; the explainer's own seconds hold what remedies took too.
         each = (perf_counter() - started) / len(registrations)
         return replace(attribution, seconds_N=np.full(len(registrations), each))
 

@@ -17,10 +17,10 @@ from gpca.recovery.policy import QUEUE
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLE = "recovery"  # what `table` and `source` of the tidy rows read
+TABLE = "recovery"  # `table` and `source` of the tidy rows read this
 RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "recovered", "tries")
 SECONDS = ("explanation_seconds", "action_seconds")
-FIRST = "first_"  # metrics of the confusion: first_<action or queue>
+FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
 
 
 def collect_recovery(files: Iterable[str | Path], treatments: Mapping[str, str], budget: int) -> pd.DataFrame:
@@ -35,7 +35,8 @@ def collect_recovery(files: Iterable[str | Path], treatments: Mapping[str, str],
     """
     records = []
     for path in files:
-        seed, rows = seed_of_file(path), read_recovery(path)
+        seed = seed_of_file(path)
+        rows = read_recovery(path)
         for policy, of_policy in rows.groupby("policy", sort=False):
             for cause in (ALL, *CONCEPTS):
                 of_cause = of_policy if cause == ALL else of_policy[of_policy["cause"] == cause]
@@ -97,7 +98,8 @@ def wilson_interval(successes: float, trials: int, level: float = 0.95) -> tuple
     """
     if trials < 1:
         raise ValueError("interval of no trials")
-    z, share = NormalDist().inv_cdf((1 + level) / 2), successes / trials
+    z = NormalDist().inv_cdf((1 + level) / 2)
+    share = successes / trials
     centre = share + z**2 / (2 * trials)
     half_width = z * sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
     low, high = ((centre + sign * half_width) / (1 + z**2 / trials) for sign in (-1, 1))

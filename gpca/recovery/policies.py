@@ -22,7 +22,7 @@ class Case:
 
     Attributes:
         actions: those that were taken, in order.
-        scores_T_C, bald_T: of its explainer, at the start and after each action; None for a policy that reads none.
+        scores_T_C, bald_T: what its explainer said at the start and after each action; None where it reads none.
         cause: the truth, for the oracle alone; empty for all others.
         random: the case's own numbers for policies, from their start: the same at every decision.
     """
@@ -42,10 +42,10 @@ class PolicyEntry:
     """A policy by name.
 
     Attributes:
-        title: as tables show it.
-        make: called with the robot's policy (thresholds, treatments) and the names of the actions.
-        explainer: that it reads (:mod:`gpca.explainers.interface`), empty for none.
-        oracle: it is told the cause.
+        title: what tables call it.
+        make: what makes it from the robot's policy (thresholds, treatments) and the names of the actions.
+        explainer: the one that it reads (:mod:`baselines.registry`), empty for none.
+        oracle: whether it is told the cause.
     """
 
     title: str
@@ -60,7 +60,7 @@ def follow_scores(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
 
     def decide(case: Case) -> Decision:
         scores_T_C, bald_T = case.scores_T_C, case.bald_T
-        assert scores_T_C is not None and bald_T is not None  # given to whoever reads an explainer
+        assert scores_T_C is not None and bald_T is not None  # whoever reads an explainer is given both
         bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
         before = []
         for step, action in enumerate(case.actions):
@@ -110,7 +110,7 @@ def always_act(action: str) -> Callable[[RecoveryPolicy, Sequence[str]], Decide]
     return lambda policy, actions: lambda case: Decision(action, "", "always")
 
 
-ALWAYS = "always_"  # before an action's name: the policy that takes it always
+ALWAYS = "always_"  # with an action's name behind it, the policy that always takes this action
 POLICIES = {
     "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca"),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),

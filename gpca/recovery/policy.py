@@ -17,7 +17,7 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 
 QUEUE = "queue"  # the branch that acts no more: a person labels the case, and the classifier learns it
-TREATMENTS = {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"}  # as the paper maps them
+TREATMENTS = {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"}  # the paper maps them so
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class Thresholds:
     """When which branch is taken.
 
     Attributes:
-        uncertain: BALD in nats above which a case is queued.
-        dominant: least score of the concept that is treated; with less, none dominates and the case is queued.
-        improvement: least fall of the treated concept's score by which an action counts as an improvement.
-        attempts: actions without improvement after which the case is queued.
+        uncertain: a case is queued where its BALD, in nats, is above this.
+        dominant: a concept is treated from this score on; with less, none dominates and the case is queued.
+        improvement: an action counts as an improvement where the treated concept's score falls by this or more.
+        attempts: after so many actions without improvement the case is queued.
     """
 
     uncertain: float = np.inf
@@ -85,7 +85,7 @@ class RecoveryPolicy:
 
         Args:
             attempts: see :class:`Thresholds`.
-            bald_N: of the calibration samples (:func:`choose_uncertain`).
+            bald_N: the uncertainties of the calibration samples (:func:`choose_uncertain`).
         """
         declared = {name: value for name, value in thresholds.items() if value is not None}
         queued_share = declared.pop("queued_share")
@@ -134,7 +134,7 @@ def choose_uncertain(bald_N: np.ndarray, queued_share: float) -> float:
 
     Args:
         bald_N: uncertainties of samples that the classifier did not learn.
-        queued_share: in [0, 1).
+        queued_share: the share, in [0, 1).
 
     Raises:
         InputError: no samples, or a share out of range.

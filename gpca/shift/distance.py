@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-COMPONENTS = 16  # of an embedding, in which its distances are measured
+PRINCIPAL_COMPONENTS = 16  # distances between embeddings are measured in so many
 
 
 def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int = 10) -> np.ndarray:
@@ -41,6 +41,6 @@ def principal_components(train_N_d: np.ndarray, query_S_d: np.ndarray) -> tuple[
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 
-    components = min(COMPONENTS, *train_N_d.shape)
+    components = min(PRINCIPAL_COMPONENTS, *train_N_d.shape)
     reduction = make_pipeline(StandardScaler(), PCA(components, svd_solver="full")).fit(train_N_d)
     return reduction.transform(train_N_d), reduction.transform(query_S_d)

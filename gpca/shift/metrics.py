@@ -19,8 +19,8 @@ from gpca.shift.sets import DISTANCES, TRAINED_ON, ShiftedSets
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLE = "learners/"  # and the set: what `table` of the tidy rows reads
-SCORES = ("max_score", "entropy", "bald", "variance")  # whose order is judged; two of them not every learner has
+TABLE = "learners/"  # `table` of the tidy rows reads this and the set
+SCORES = ("max_score", "entropy", "bald", "variance")  # the order of each is judged; not every learner has the last two
 RESAMPLES = 200
 
 
@@ -44,7 +44,7 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     """Return (source, learner, seed) -> rows of predictions, with the uncertainties `SCORES`, higher where less sure.
 
     Args:
-        prediction_files: named `…/{source}/{learner}/seed{seed}.csv`, as the step ``learn`` writes them.
+        prediction_files: named `…/{source}/{learner}/seed{seed}.csv`, as the step ``learners`` writes them.
         set_files: named `…/{source}/seed{seed}.npz`; their `DISTANCES` become columns of the rows.
 
     Raises:

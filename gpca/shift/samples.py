@@ -1,4 +1,4 @@
-"""Making samples unlike those of the training: severities beyond it, another source, objects never seen."""
+"""Makes samples unlike those of the training: severities beyond it, another source, objects never seen."""
 
 from __future__ import annotations
 
@@ -117,7 +117,8 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
         test = np.flatnonzero(part.split == "test")
         distance_S_K = np.zeros((len(part), 2 * len(SPACES)))
         for i, space in enumerate(SPACES):
-            features_N_F, query_S_F = spaces[space][home][train], spaces[space][name][test]
+            features_N_F = spaces[space][home][train]
+            query_S_F = spaces[space][name][test]
             if space == "embedding":
                 features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
             distance_S_K[test, 2 * i] = knn_distance(features_N_F, query_S_F, settings.neighbours)

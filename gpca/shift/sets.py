@@ -54,7 +54,8 @@ class ShiftedSets:
 
     def registrations(self, rows: np.ndarray) -> Registrations:
         """Return the rows as explainers that read embeddings take them: without clouds and poses."""
-        nan_S, zeros_S = np.full(len(rows), np.nan), np.zeros(len(rows), int)
+        nan_S = np.full(len(rows), np.nan)
+        zeros_S = np.zeros(len(rows), int)
         columns = dict.fromkeys(REGISTRATION_COLUMNS, nan_S) | {"object_index": zeros_S}
         columns |= {name: np.full((len(rows), 4, 4), np.nan) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
         columns |= {name: getattr(self, name)[rows] for name in ("sample", "split", "concept", "object_name")}

@@ -50,7 +50,8 @@ def run(options: Namespace) -> None:
     inputs = [options.registrations, options.embeddings, options.embeddings_without]
     axes = (options.source, options.seed)
     with record_provenance(options.out, inputs, options.settings, seed=options.seed):
-        settings, stream = settings_from(options.settings), StreamSettings(**options.settings.get("stream", {}))
+        settings = settings_from(options.settings)
+        stream = StreamSettings(**options.settings.get("stream", {}))
         curves: dict[str, dict] = {strategy: {} for strategy in options.strategies}
         for setting, task, gpc in progress(_tasks(options, settings), f"active learning on {options.source}"):
             for strategy in options.strategies:

@@ -9,7 +9,7 @@ from pathlib import Path
 from baselines.registry import explainer_entry, require_settings
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.errors import InputError
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
@@ -57,7 +57,9 @@ def run(options: Namespace) -> None:
             )
 
 
-def _load(name: str, entry: Entry, registrations: Path, embeddings, uncertainty, uncertainty_timings, timings: Path):
+def _load(
+    name: str, entry: ExplainerEntry, registrations: Path, embeddings, uncertainty, uncertainty_timings, timings: Path
+):
     """Return the registrations that the explainer gets, with what it reads and the seconds spent before attached."""
     loaded = Registrations.load(registrations)
     seconds_S, icp_seconds_S = read_timings(timings, loaded)

@@ -40,7 +40,7 @@ def run(options: Namespace) -> None:
     target, frame = read_points(options.target, options.unit)
     uncertainty = UncertaintySettings() if options.uncertainty else None
     explanation = Explainer(model).explain(source, target, T_init, options.unit, frame, uncertainty)
-    trained_on = model.title + " (procedural stand-in)" * model.stand_in
+    trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
     for note in (*explanation.notes, f"model {path}, trained on {trained_on}"):
         print(note, file=sys.stderr)
     if options.json:

@@ -35,7 +35,8 @@ def run(options: Namespace) -> None:
     settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(given))
     inputs = [options.instances, options.objects]
     with record_provenance([options.out, options.poses, options.timings], inputs, options.settings, seed=options.seed):
-        instances, objects = Instances.load(options.instances), ObjectClouds.load(options.objects)
+        instances = Instances.load(options.instances)
+        objects = ObjectClouds.load(options.objects)
         made = make_frame_registrations(instances, objects, options.source, options.seed, settings)
         registrations, icp_seconds_S, poses = made
         registrations.save(options.out)

@@ -126,7 +126,8 @@ def _ask(session: Session, registrations: Registrations, question: Question, pic
 
 def _retrain(session: Session) -> None:
     learnt = session.retrain()
-    print(f"  learnt {learnt} answer{'s' * (learnt != 1)}; concepts: {', '.join(session.gpc.classes)}")
+    answers = "1 answer" if learnt == 1 else f"{learnt} answers"
+    print(f"  learnt {answers}; concepts: {', '.join(session.gpc.classes)}")
 
 
 def _finish(session: Session, registrations: Registrations, options: Namespace) -> None:

@@ -31,7 +31,8 @@ def run(options: Namespace) -> None:
     for seed, embeddings, out in per_seed(options, "embeddings", "out"):
         with record_provenance([out], [embeddings], options.settings, seed=seed):
             arrays = load_arrays(embeddings, SHAPES, made_by="python -m gpca embed")
-            h_S_d, train_S = arrays["h"], arrays["split"] == "train"
+            h_S_d = arrays["h"]
+            train_S = arrays["split"] == "train"
             if not train_S.any():
                 raise InputError(embeddings, "holds no training samples", "make it anew with 'python -m gpca embed'")
             axes = (options.source, seed, "reduction")

@@ -40,7 +40,8 @@ def run(options: Namespace) -> None:
         raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"known are {', '.join(SECTIONS)}")
     for name, section in SECTIONS.items():
         check_settings(given[name], *section)
-    settings, encoder_settings = settings_from(**given), EncoderSettings(**given["encoder"])
+    settings = settings_from(**given)
+    encoder_settings = EncoderSettings(**given["encoder"])
     options.other_registrations = options.other_registrations or [None] * len(options.seeds)
     objects = ObjectClouds.load(options.objects)
     files = ("registrations", "other_registrations", "embeddings", "encoders", "out")

@@ -30,11 +30,11 @@ def run(options: Namespace) -> None:
     check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
     registrations = Registrations.load(options.registrations)
-    # Not an output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
+    # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = options.out.with_suffix(".checkpoint")
     with record_provenance([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
         model, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
-        # Given a path, torch.save writes its name, here one with the process id, into the file.
+        # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
         with whole_file(options.out) as partial, partial.open("wb") as file:
             torch.save(model.state_dict(), file)
         with whole_file(options.curve) as partial:

@@ -20,7 +20,7 @@ from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
 from gpca.uncertainty.remedies import Remedies, RemedyRuns
 from gpca.uncertainty.spread import Outcome, UncertaintySettings
 
-STEP = 0.1  # of a local derivative, in the knob's range
+STEP = 0.1  # a local derivative takes this step, in the knob's range
 LATIN = 24  # settings of the knobs in a Latin hypercube
 SALTELLI = 8  # base samples of Saltelli's scheme, which makes five settings of each
 

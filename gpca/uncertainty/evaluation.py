@@ -1,4 +1,4 @@
-"""Running a design for many registrations."""
+"""Runs a design for many registrations."""
 
 from __future__ import annotations
 

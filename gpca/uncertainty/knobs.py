@@ -63,8 +63,11 @@ class KnobRuns:
         self._xi_n_6 = xi_n_6
         self._jitter = random.normal(size=source.shape)
         self._order = np.argsort(source @ random_direction(random), kind="stable")
-        self._source, self._target = source, target
-        self._T_init, self._T_ref, self._settings = T_target_source_init, T_ref, settings
+        self._source = source
+        self._target = target
+        self._T_init = T_target_source_init
+        self._T_ref = T_ref
+        self._settings = settings
         self._icp = BatchedICP(target, settings.icp)
         self._seen: dict[Knobs, Outcome] = {}
 

@@ -17,11 +17,11 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import transform
 from gpca.uncertainty.spread import Outcome, Runs, UncertaintySettings, run_from_starts, summarise_runs
 
-NEIGHBOURS = 24  # of a point, for the plane that it is moved to
+NEIGHBOURS = 24  # so many span the plane that a point is moved to
 OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbour distance
 BROADER = 3.75  # spread of the restarts, in that of the other starts: the middle of the pose severities
-RESTARTS = 5  # of which the one with the lowest cost counts
-FEWEST_POINTS = 16  # of a trimmed target; with fewer, nothing is trimmed
+RESTARTS = 5  # the one with the lowest cost counts
+FEWEST_POINTS = 16  # where a trimmed target would have fewer, nothing is trimmed
 
 
 class Remedies(NamedTuple):
@@ -54,8 +54,10 @@ class RemedyRuns:
     ) -> None:
         self._xi_n_6 = xi_n_6
         self._settings = settings
-        self._T_init, self._T_icp = T_target_source_init, T_target_source_icp
-        self._source, self._target = source[random.permutation(len(source))], target
+        self._T_init = T_target_source_init
+        self._T_icp = T_target_source_icp
+        self._source = source[random.permutation(len(source))]
+        self._target = target
 
     def __call__(self, remedies: Remedies) -> Outcome:
         """Evaluate one combination; what several share is worked out, and charged, once."""

@@ -19,7 +19,7 @@ from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp, log
 from gpca.errors import InputError
 
-SMALLEST_RESIDUAL = 1e-6  # in diameters: that of a cloud on itself, whose logarithm has to stay finite
+SMALLEST_RESIDUAL = 1e-6  # diameters; a cloud on itself counts as this far off, or the logarithm would be infinite
 FEWEST_STARTS = 13  # the 2·6 + 1 of an unscented estimate; a 6×6 covariance of 6 samples or fewer is singular
 
 
@@ -50,7 +50,7 @@ class UncertaintySettings:
             raise InputError("uncertainty setting 'floor'", f"{self.floor}", "give a positive variance")
 
     def deviation_6(self) -> np.ndarray:
-        """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
+        """Return the standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
         per_axis = np.array([np.deg2rad(self.start_rotation_deg), self.start_translation]) / np.sqrt(3)
         return np.repeat(per_axis, 3)
 
@@ -72,7 +72,7 @@ class Runs:
     icp_seconds: float
 
     def cost_n(self, distance: float) -> np.ndarray:
-        """Mean over the source of the squared distance to the target, cut off at the correspondence distance."""
+        """Return the source's mean squared distance to the target, cut off at the correspondence distance."""
         return self.fitness_n * self.inlier_rmse_n**2 + (1 - self.fitness_n) * distance**2
 
     def chosen(self, rows_n: np.ndarray) -> Runs:

@@ -234,7 +234,7 @@ def test_a_class_without_a_name_of_its_own_is_not_added(gpc, name):
 
 def kernel_parameters(gpc):
     """Outputscale and lengthscale (2, C) of each class's kernel."""
-    kernel = gpc._prior.kernel
+    kernel = gpc._prior.covariance
     return np.stack([kernel.outputscale.numpy(), kernel.base_kernel.lengthscale.numpy().ravel()])
 
 

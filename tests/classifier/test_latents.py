@@ -37,7 +37,7 @@ def trained():
         patch.setattr(Prior, "of", lambda model, of=Prior.of: models.append(model) or of(model))
         gpc = GPC(CLASSES, QUICK, "blobs", 0).fit(H, LABELS)
     (model,) = models
-    reference = LatentGPs(model.kernel, model.inducing_M_d.detach())
+    reference = LatentGPs(model.covariance, model.inducing_M_d.detach())
     reference.strategy.variational_params_initialized.fill_(1)  # or gpytorch would set them to the prior's
     distribution = reference.strategy._variational_distribution
     with torch.no_grad():

@@ -28,8 +28,8 @@ def embedded(registrations):
 def own_baseline(tmp_path, monkeypatch):
     """A file of the user's in a folder of baselines."""
     (tmp_path / "always_noise.py").write_text(
-        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import Entry\n"
-        "EXPLAINERS = {'always_noise': Entry('Always noise', GPCA)}\n"
+        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import ExplainerEntry\n"
+        "EXPLAINERS = {'always_noise': ExplainerEntry('Always noise', GPCA)}\n"
     )
     (tmp_path / "helper_without_explainers.py").write_text("")
     monkeypatch.setattr(baselines, "__path__", [*baselines.__path__, str(tmp_path)])

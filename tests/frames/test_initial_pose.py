@@ -6,7 +6,7 @@ import pytest
 from gpca.alignment.pose_error import pose_error
 from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
-from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace, nearest_to, read_results
+from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace, nearest_to, read_bop_results
 
 from .tiny import read
 
@@ -37,7 +37,7 @@ def test_results_are_read_best_first_row_by_row_and_in_metres(tmp_path):
     path = results(
         tmp_path, f"1,0,3,0.2,{ONE},100 200 300,-1", f"1,0,3,0.9,{quarter},1 2 3,-1", f"2,5,4,1,{ONE},0 0 9,0.1"
     )
-    found = read_results(path, {(1, 0), (2, 5)})
+    found = read_bop_results(path, {(1, 0), (2, 5)})
     assert set(found) == {(1, 0, 3), (2, 5, 4)}
     best, second = found[1, 0, 3]
     assert best[:3, 3].tolist() == [0.001, 0.002, 0.003]
@@ -66,7 +66,7 @@ FAULTS = {
 def test_faulty_results_are_refused_in_one_line(tmp_path, fault):
     lines, head, expected = FAULTS[fault]
     with pytest.raises(InputError, match=expected) as caught:
-        read_results(results(tmp_path, *lines, head=head), {(1, 0)})
+        read_bop_results(results(tmp_path, *lines, head=head), {(1, 0)})
     assert str(caught.value).startswith(str(tmp_path / "results.csv"))
 
 

@@ -3,7 +3,7 @@ import pytest
 from scipy.optimize import linprog
 
 from gpca.alignment.rigid import rotation_angle_rad, transform
-from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities, add_noise, crop, move
+from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities, add_noise, crop, misplace
 
 POINTS = np.random.default_rng(0).uniform(-0.5, 0.5, size=(2000, 3))
 LIMITS = {
@@ -76,8 +76,8 @@ def test_a_crop_loses_the_drawn_share_beyond_a_plane(seed):
     ("perturb", "changed", "name", "value"),
     [
         (add_noise, {"noise": (0.2, 0.2)}, "noise", 0.2),
-        (move, {"rotation_deg": (90, 90)}, "rotation_rad", np.pi / 2),
-        (move, {"translation": (0.0, 0.0)}, "translation", 0.0),
+        (misplace, {"rotation_deg": (90, 90)}, "rotation_rad", np.pi / 2),
+        (misplace, {"translation": (0.0, 0.0)}, "translation", 0.0),
         (crop, {"crop": (0.9, 0.9)}, "crop", 0.9),
     ],
 )

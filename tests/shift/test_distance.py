@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.shift.distance import COMPONENTS, knn_distance, mahalanobis_distance, principal_components
+from gpca.shift.distance import PRINCIPAL_COMPONENTS, knn_distance, mahalanobis_distance, principal_components
 
 RANDOM = np.random.default_rng(0)
 TRAIN = RANDOM.normal(size=(60, 5))
@@ -42,7 +42,7 @@ def test_constant_features_and_a_single_training_sample_are_finite(distance):
 def test_principal_components_keep_what_varies_and_learn_from_the_training_samples_alone():
     wide = RANDOM.normal(size=(40, 3)) @ RANDOM.normal(size=(3, 50))
     train, query = principal_components(wide, wide[:7])
-    assert train.shape == (40, COMPONENTS)
+    assert train.shape == (40, PRINCIPAL_COMPONENTS)
     assert query == pytest.approx(train[:7])
     assert np.abs(train[:, 3:]).max() < 1e-8
     assert principal_components(wide, 1e6 * wide[:7])[0] == pytest.approx(train)

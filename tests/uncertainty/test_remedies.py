@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.twist import exp
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
-from gpca.uncertainty import remedies as mitigation
+from gpca.uncertainty import remedies
 from gpca.uncertainty.designs import CORNERS
 from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbours, denoise, trim
 from gpca.uncertainty.spread import Runs, UncertaintySettings
@@ -173,8 +173,8 @@ def test_a_combination_does_not_depend_on_those_before_it():
 def test_what_several_combinations_share_is_worked_out_by_the_first_that_needs_it(monkeypatch):
     worked_out = []
     for name in ("denoise", "trim"):
-        work = getattr(mitigation, name)
-        monkeypatch.setattr(mitigation, name, lambda *given, n=name, w=work: worked_out.append(n) or w(*given))
+        work = getattr(remedies, name)
+        monkeypatch.setattr(remedies, name, lambda *given, n=name, w=work: worked_out.append(n) or w(*given))
     evaluate = remedy_runs("noise", 0, 300)
     evaluate(Remedies())
     evaluate(Remedies(restart=True))

@@ -85,7 +85,7 @@ EXPLAINER = """
 import numpy as np
 
 from gpca.attribution.scores import Attribution
-from gpca.explainers.interface import Entry
+from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.perturbation import CONCEPTS
 
 
@@ -104,7 +104,7 @@ class FitnessOnly:
         return Attribution(CONCEPTS, scores, scores + np.nan, nan, zeros > 0, zeros.astype(int), zeros, zeros)
 
 
-EXPLAINERS = {"fitness_only": Entry("Fitness only", FitnessOnly)}
+EXPLAINERS = {"fitness_only": ExplainerEntry("Fitness only", FitnessOnly)}
 """
 
 

@@ -39,8 +39,8 @@ WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 4 + 2
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
     (project.folder / "baselines/lazy.py").write_text(
-        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import Entry\n"
-        "EXPLAINERS = {'lazy': Entry('Lazy', GPCA)}\n"
+        "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import ExplainerEntry\n"
+        "EXPLAINERS = {'lazy': ExplainerEntry('Lazy', GPCA)}\n"
     )
     project.append("config/smoke.yaml", "  lazy: {}\n")
     smoke = ("--configfile", "config/smoke.yaml")

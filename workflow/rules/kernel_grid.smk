@@ -8,7 +8,7 @@ rule fit_kernel_grid:
             f"<results>/embeddings/{{{{source}}}}/{EMBEDDING}/seed{{seed}}.npz",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.kernels"),
+        code=code_files("gpca.steps.kernel_grid"),
     output:
         collect("<results>/kernels/{{source}}/seed{seed}.csv", seed=SEEDS),
     log:
@@ -26,7 +26,7 @@ rule fit_kernel_grid:
         settings=settings("kernels"),
         seeds=SEEDS,
     shell:
-        "python -m gpca kernels --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "python -m gpca kernel_grid --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
         "--registrations {input.registrations} --embeddings {input.embeddings} "
         "--settings {params.settings:q} --out {output} 2> {log}"
 

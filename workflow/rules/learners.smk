@@ -77,7 +77,7 @@ rule shift:
 rule fit_learners:
     input:
         sets=collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
-        code=code_files("gpca.steps.learn", *map(explainer_module, LEARNER_SETTINGS)),
+        code=code_files("gpca.steps.learners", *map(explainer_module, LEARNER_SETTINGS)),
     output:
         collect(
             "<results>/learners/{{source}}/{learner}/seed{seed}.csv",
@@ -100,7 +100,7 @@ rule fit_learners:
         learners=list(LEARNER_SETTINGS),
         seeds=SEEDS,
     shell:
-        "python -m gpca learn --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "python -m gpca learners --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
         "--learners {params.learners} --settings {params.settings:q} --sets {input.sets} "
         "--out {output} 2> {log}"
 

@@ -75,7 +75,8 @@ def build(cup: Cup) -> trimesh.Trimesh:
     """Mesh of one cup in metres, foot at z = 0, first handle towards +x."""
     radii, heights = np.array(cup.profile).T
     outline = PchipInterpolator(heights, radii)
-    top, lip = heights[-1], 0.45 * cup.wall
+    top = heights[-1]
+    lip = 0.45 * cup.wall
     z = _heights(0, cup.fillet, top, lip)
     outer = outline(z) - _inset(z, cup.fillet) - _inset(top - z, lip)
     body = revolve([(0, 0), *zip(outer, z, strict=True), (0, top)])
@@ -106,7 +107,7 @@ def _heights(bottom: float, fillet: float, top: float, lip: float) -> np.ndarray
 
 
 def _inset(distance: np.ndarray, radius: float) -> np.ndarray:
-    """How far a fillet of this radius draws the wall in at a distance from the end."""
+    """Return how far a fillet of this radius draws the wall in at a distance from the end."""
     beyond = np.clip(radius - distance, 0, radius)
     return radius - np.sqrt(radius**2 - beyond**2)
 

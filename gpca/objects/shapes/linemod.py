@@ -35,7 +35,7 @@ BOTH = (-1, 1)  # the two sides of what is symmetric in y
 
 
 def ape() -> trimesh.Trimesh:
-    """Sitting gorilla, hands on its knees."""
+    """Build a sitting gorilla, hands on its knees."""
     parts = [ellipsoid((25, 29, 34), (-8, 0, 36)), ellipsoid((22, 24, 22), (4, 0, 25)), ellipsoid(18, (0, 0, 73))]
     parts += [
         ellipsoid((8, 14, 5), (13, 0, 78)),
@@ -86,7 +86,7 @@ def camera() -> trimesh.Trimesh:
 
 
 def can() -> trimesh.Trimesh:
-    """Watering can, open half at the top: spout with rose towards -y, handle at the back, bow above."""
+    """Build a watering can, open half at the top: spout with rose towards -y, handle at the back, bow above."""
     outline = [(0, 0), (50, 0), (50, 4), (48, 6), (48, 24), (50, 26), (48, 28), (48, 84), (50, 86), (48, 88)]
     body = revolve([*outline, (48, 112), (50, 114), (50, 118), (0, 118)])
     spout = tube([(0, -40, 22), (0, -66, 62), (0, -82, 108)], [13, 10, 8])
@@ -167,7 +167,7 @@ def duck() -> trimesh.Trimesh:
 
 
 def eggbox() -> trimesh.Trimesh:
-    """Closed box for two rows of three eggs: cups below, rim, bevelled lid with bulges above."""
+    """Build a closed box for two rows of three eggs: cups below, rim, bevelled lid with bulges above."""
     nests = [(x, y) for x in (-48, 0, 48) for y in (-25, 25)]
     cups = [move(revolve([(0, 0), (15, 0), (19, 4), (26, 36), (0, 36)]), (x, y, 0)) for x, y in nests]
     lower = [*cups, box((120, 74, 16), (0, 0, 28))]

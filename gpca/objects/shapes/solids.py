@@ -19,7 +19,7 @@ from trimesh.smoothing import filter_laplacian
 from trimesh.transformations import euler_matrix
 
 SEGMENTS = 64
-BALL_SEGMENTS = 24  # of roundings, which are small beside the body they belong to
+BALL_SEGMENTS = 24  # few suffice for roundings, which are small beside their body
 AXES = {"x": (0, 90, 0), "y": (-90, 0, 0), "z": (0, 0, 0)}  # rotation that takes z to the axis, degrees
 
 Point = ArrayLike  # three numbers, in a section two
@@ -100,7 +100,8 @@ def tube(
     steps_unit /= np.linalg.norm(steps_unit, axis=1, keepdims=True)
     tangents = np.concatenate([steps_unit[:1], steps_unit[:-1] + steps_unit[1:], steps_unit[-1:]])
     angles = np.linspace(0, 2 * np.pi, segments, endpoint=False)
-    across, rings = np.asarray(side, float), []
+    across = np.asarray(side, float)
+    rings = []
     for centre, radius, tangent in zip(path_K_3, radii_K, tangents, strict=True):
         tangent = tangent / np.linalg.norm(tangent)
         across = across - (across @ tangent) * tangent  # carried along the path, so that the circle never twists
@@ -131,12 +132,12 @@ def difference(mesh: trimesh.Trimesh, *cut: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def intersection(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
-    """What all of the meshes share."""
+    """Return what all of the meshes share."""
     return _trimesh(Manifold.batch_boolean([_manifold(mesh) for mesh in meshes], OpType.Intersect))
 
 
 def blend(*meshes: trimesh.Trimesh, edge: float, rounds: int = 10) -> trimesh.Trimesh:
-    """Union whose seams are smoothed away, as in modelling clay.
+    """Return the union, its seams smoothed away as in modelling clay.
 
     Edges are cut to at most `edge` and smoothed by Laplacian rounds that keep the volume; what is then flat within
     1/30 of `edge` is merged into larger triangles.

@@ -189,7 +189,7 @@ def _marker() -> trimesh.Trimesh:
 def _clamp(
     jaw: float, jaw_half: float, length: float, half_spread: float, grip: float, thick: float
 ) -> trimesh.Trimesh:
-    """Spring clamp lying flat, its tip at the origin, grips towards +x.
+    """Build a spring clamp lying flat, its tip at the origin, grips towards +x.
 
     Args:
         jaw: distance from tip to pivot.

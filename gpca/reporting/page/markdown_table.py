@@ -1,4 +1,7 @@
-"""Reads the Markdown that :mod:`gpca.reporting.tables.table` writes: the form of a table that readers see."""
+"""Reads the Markdown that :mod:`gpca.reporting.tables.table` writes: the form of a table that readers see.
+
+Nothing else that a run keeps will do: the CSV has neither titles, printed digits, bold cells nor footnotes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Step ``learn``: embeddings of all sets -> what every learner says of their test samples."""
+"""Step ``learners``: embeddings of all sets -> what every learner says of their test samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Step ``kernels``: embeddings -> accuracy and calibration of every kernel, learning rate and number of iterations."""
+"""Step ``kernel_grid``: embeddings -> accuracy and calibration by kernel, learning rate and number of iterations."""
 
 from __future__ import annotations
 

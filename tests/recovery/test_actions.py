@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+from gpca.alignment.rigid import inverse, rotation_angle_rad
+from gpca.errors import InputError
+from gpca.recovery import actions
+from gpca.recovery.actions import ACTIONS, action_of, best_start
+from gpca.recovery.cases import RobotIn, register_after, register_held
+
+from ..documents import block
+from .conftest import LOOP
+
+ICP = LOOP.icp
+
+
+def test_a_broader_search_finds_what_explains_the_shots(start):
+    situation, outcome = start
+    found = ACTIONS["reinitialise"](outcome.holding, RobotIn(situation), np.random.default_rng(0), starts=48)
+    assert register_held(situation, found, LOOP.points, ICP).error < outcome.error
+    assert found.shots is outcome.holding.shots
+
+
+def test_a_new_view_is_fused_with_the_old_one_and_shows_more(start):
+    situation, outcome = start
+    d = situation.diameter_m
+    result = register_after(situation, outcome, ACTIONS["new_view"], ("new_view",), 4000, ICP)
+    first_shot, new = result.holding.shots
+    assert first_shot is outcome.holding.shots[0]
+    turned = rotation_angle_rad(inverse(first_shot.T_world_camera) @ new.T_world_camera)
+    assert np.rad2deg(turned) > 30
+    both = len(first_shot.object_points_m(d)) + len(new.object_points_m(d))
+    assert len(result.record["cloud"]) == min(4000, both)
+
+
+def test_denoising_takes_more_frames_each_time_and_keeps_doing_so(start):
+    situation, outcome = start
+    once = register_after(situation, outcome, ACTIONS["denoise"], ("denoise",), LOOP.points, ICP)
+    twice = register_after(situation, once, ACTIONS["denoise"], ("denoise", "denoise"), LOOP.points, ICP)
+    assert (once.holding.frames, twice.holding.frames) == (10, 20)
+    assert once.holding.filtered
+    looked = register_after(situation, once, ACTIONS["new_view"], ("denoise", "new_view"), LOOP.points, ICP)
+    assert looked.holding.frames == 10
+
+
+def test_the_action_of_the_documentation_sees_the_object_from_closer(start):
+    situation, outcome = start
+    added = dict(vars(actions)) | {"ACTIONS": dict(ACTIONS)}
+    exec(block("gpca/recovery/actions.py"), added)
+    result = register_after(situation, outcome, added["ACTIONS"]["closer"], ("closer",), LOOP.points, ICP)
+    away, near = result.holding.shots
+    assert away is outcome.holding.shots[0]
+    assert near.mask.sum() > 1.5 * away.mask.sum()
+
+
+def test_the_pose_that_explains_the_shots_is_started_from(start):
+    situation, outcome = start
+    robot, true = RobotIn(situation), situation.T_world_object
+    assert (best_start(outcome.holding, robot, [None, true]).T_world_object_init == true).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "fault"),
+    [("pray", {}, "unknown; known are reinitialise"), ("denoise", {"framse": 3}, "unexpected keyword argument")],
+)
+def test_unknown_actions_and_settings_are_refused(name, given, fault):
+    with pytest.raises(InputError, match=fault):
+        action_of(name, given)
