@@ -93,8 +93,9 @@ def choose_samples(registrations: Registrations, path: str | Path, object_name: 
         ranks = [rankdata(getattr(registrations, name)[rows]) / (len(rows) + 1) for name in names]
         distance_S[rows] = np.abs(np.array(ranks) - 0.5).max(axis=0)
     is_shown_S = np.isfinite(distance_S)
+    object_names = [object_name] if object_name else list(dict.fromkeys(registrations.object_name.tolist()))
     choices = []
-    for name in [object_name] if object_name else dict.fromkeys(registrations.object_name.tolist()):
+    for name in object_names:
         of_object_S = is_shown_S & (registrations.object_name == name)
         rows_of = {c: np.flatnonzero(of_object_S & (registrations.concept == c)) for c in SEVERITIES}
         if all(len(rows) for rows in rows_of.values()):

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.objects.title import STAND_IN
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, save_figure, write_title
 
@@ -42,7 +43,7 @@ def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str
     policy = read_policy(policy_json)
     limits, treatments = policy["thresholds"], policy["treatments"]
     canvas = Canvas(TEXT_WIDTH_IN, 2.45)
-    write_title(canvas.figure, "Thresholds of this run, on virtual tables (procedural stand-in)")
+    write_title(canvas.figure, f"Thresholds of this run, on virtual tables ({STAND_IN})")
     words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"
     canvas.box(0.04, 0.86, 1.3, 0.66, words)
     branches = [(_queue_condition(limits), "Abstain\nqueue for labelling, retrain", GREY)]

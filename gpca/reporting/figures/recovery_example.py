@@ -9,6 +9,7 @@ import numpy as np
 from gpca.alignment.pose_error import CORRECT
 from gpca.alignment.rigid import transform
 from gpca.files import load_arrays
+from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import (
     CONCEPT_COLOURS,
@@ -80,9 +81,7 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
     for centre, caption in zip((0.1255, 0.395, 0.6195, 0.8735), captions, strict=True):
         figure.text(centre, 0.02, caption, ha="center", va="bottom")
     name = str(found["object"]).replace("_", " ")
-    write_title(
-        figure, f"Tables of the virtual depth camera (procedural stand-in): {name}; dots: model where ICP put it"
-    )
+    write_title(figure, f"Tables of the virtual depth camera ({STAND_IN}): {name}; dots: model where ICP put it")
     save_figure(figure, pdf_path, png_path)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
+from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import pool_share, wilson_interval
 from gpca.reporting.figures.style import (
@@ -21,6 +22,7 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,8 +52,7 @@ def draw_recovery_rates(
     figure, axes = plt.subplots(1, 2, figsize=(TEXT_WIDTH_IN, height_in), sharey=True, width_ratios=(1.5, 1))
     for k in range(1, budget + 1):
         offset = 0.22 * (k - (budget + 1) / 2)
-        label = f"within {k} action{'s' * (k > 1)}"
-        look = {"color": SHADES[(k - 1) % len(SHADES)], "marker": "o", "label": label}
+        look = {"color": SHADES[(k - 1) % len(SHADES)], "marker": "o", "label": f"within {plural(k, 'action')}"}
         _draw(axes[0], metrics, shown, f"recovered_within_{k}", "all", offset, look)
     for n, cause in enumerate(CONCEPTS):
         look = {"color": CONCEPT_COLOURS[cause], "marker": CONCEPT_MARKERS[cause], "label": cause}
@@ -67,7 +68,7 @@ def draw_recovery_rates(
         panel.legend(
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.2, columnspacing=1.0, borderpad=0
         )
-    title = "Failures on tables of the virtual depth camera (procedural stand-in)"
+    title = f"Failures on tables of the virtual depth camera ({STAND_IN})"
     _, episodes = pool_share(metrics, shown[0], "recovered_within_1") or (nan, 0)
     write_title(figure, f"{title}: {episodes} failures; right: within {budget} actions, by cause")
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.16 / height_in), pad=0.4)

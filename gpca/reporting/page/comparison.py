@@ -13,8 +13,19 @@ from gpca.files import read_csv
 
 TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # other verdicts judge nothing
 _COLUMNS = (
-    *("table", "row", "column", "unit", "published", "decimals", "reproduced", "ci_low", "ci_high", "n"),
-    *("difference", "verdict", "reason"),
+    "table",
+    "row",
+    "column",
+    "unit",
+    "published",
+    "decimals",
+    "reproduced",
+    "ci_low",
+    "ci_high",
+    "n",
+    "difference",
+    "verdict",
+    "reason",
 )
 _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
 
@@ -40,15 +51,17 @@ def page_comparison(path: str | Path) -> dict | None:
 def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
     """Return the entries of a row as they are printed; the texts stay as they are."""
     printed = {name: _rounded(path, row, name) for name in _NUMBERS}
-    upper, deviation = (printed[name] for name in ("upper", "deviation"))
-    at_least = row.get("at_least", "").lower() == "true"
+    published = printed["published"]
+    if printed["upper"]:
+        published += f" to {printed['upper']}"
+    if printed["deviation"]:
+        published += f" ± {printed['deviation']}"
+    bound = "> " if row.get("at_least", "").lower() == "true" else ""
     return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict", "reason")} | {
         "tone": TONES.get(row["verdict"], ""),
         "objects": ", ".join(filter(None, (row.get("objects", ""), row.get("hardware", "")))),
-        "published": printed["published"]
-        + (f" to {upper}" if upper else "")
-        + (f" ± {deviation}" if deviation else ""),
-        "reproduced": "> " * at_least + printed["reproduced"],
+        "published": published,
+        "reproduced": bound + printed["reproduced"],
         "interval": f"[{printed['ci_low']}, {printed['ci_high']}]" if printed["ci_low"] and printed["ci_high"] else "",
         "difference": printed["difference"],
         "factor": f"× {_number(path, row, 'factor'):.2g}" if row.get("factor") else "",

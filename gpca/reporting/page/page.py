@@ -116,9 +116,9 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
         try:
             record = json.loads(record_path.read_text(encoding="utf-8"))
             code, libraries = record["code"], record["libraries"]
+            commit = code["commit"] or "outside a git checkout"
             values = {
-                "Code": (code["commit"] or "outside a git checkout")
-                + " with uncommitted changes" * bool(code["dirty"]),
+                "Code": f"{commit} with uncommitted changes" if code["dirty"] else commit,
                 "Config (SHA-256)": record["config_sha256"] or "none",
                 "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],
                 "Device": record["device"],

@@ -12,7 +12,9 @@ from pathlib import Path
 from gpca.files import whole_file
 
 EMPTY = "–"  # what is drawn where there is no number
-_COLUMN_CHARACTERS, _TEXT_CHARACTERS = 50, 100  # that fill one column and both of a two-column paper
+_COLUMN_CHARACTERS = 50  # fill one column of a two-column paper
+_TEXT_CHARACTERS = 100  # fill both columns
+_SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"  # only where the text is narrower
 
 
 @dataclass(frozen=True)
@@ -47,14 +49,13 @@ class Column:
 
     def text(self, cell: Cell) -> str:
         """Return e.g. ``97.7 ± 0.4``, or ``> 52.0``."""
-        if not self.interval or cell.at_least:
-            return f"{'> ' * cell.at_least}{cell.mean:.{self.decimals}f}"
+        mean = f"{cell.mean:.{self.decimals}f}"
+        if cell.at_least:
+            return f"> {mean}"
+        if not self.interval:
+            return mean
         half_width = EMPTY if math.isnan(cell.half_width) else f"{cell.half_width:.{self.decimals}f}"
-        return f"{cell.mean:.{self.decimals}f} ± {half_width}"
-
-
-Rows = list[tuple[tuple[str, str], ...]]  # for each row of a table its labels, key -> title each
-Cells = dict[tuple[int, str], Cell]
+        return f"{mean} ± {half_width}"
 
 
 @dataclass(frozen=True)
@@ -139,25 +140,31 @@ class Table:
         plain = [self._heads(), *self._body(str, str)]
         characters = sum(2 + max(map(len, column)) for column in zip(*plain, strict=True))
         float_name = "table" if characters <= _COLUMN_CHARACTERS else "table*"
-        scale = characters > _TEXT_CHARACTERS
+        alignments = "l" * len(self.row_heads) + "c" * len(self.columns)
+        begin = rf"\begin{{tabular}}{{{alignments}}}"
+        end = r"\end{tabular}"
+        packages = "booktabs"
+        if characters > _TEXT_CHARACTERS:
+            begin = f"{_SCALED_DOWN}\n{begin}"
+            end += "}"
+            packages = "booktabs, graphicx"
         heads = [r"\textbf{" + _tex(title) + "}" for title in self._heads()]
         body = self._body(_tex, lambda text: r"\textbf{" + text + "}")
         return "\n".join(
             [
-                rf"% needs \usepackage{{booktabs{', graphicx' * scale}}}",
+                rf"% needs \usepackage{{{packages}}}",
                 rf"\begin{{{float_name}}}[t]",
                 r"\centering",
                 rf"\caption{{{_tex(self.caption)}}}",
                 rf"\label{{tab:{self.name}}}",
                 r"\small",
-                *([r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"] if scale else []),
-                rf"\begin{{tabular}}{{{'l' * len(self.row_heads)}{'c' * len(self.columns)}}}",
+                begin,
                 r"\toprule",
                 " & ".join(heads) + r" \\",
                 r"\midrule",
                 *(" & ".join(row) + r" \\" for row in body),
                 r"\bottomrule",
-                r"\end{tabular}" + "}" * scale,
+                end,
                 *(rf"\par\smallskip{{\footnotesize {_tex(footnote)}}}" for footnote in self.footnotes),
                 rf"\end{{{float_name}}}",
                 "",
@@ -168,7 +175,8 @@ class Table:
         return [*self.row_heads.values(), *(column.title for column in self.columns.values())]
 
     def _body(self, escape, bold) -> list[list[str]]:
-        body, best = [], self.best()
+        body = []
+        best = self.best()
         for row, labels in enumerate(self.rows):
             texts = [escape(title) for _, title in labels]
             for name, column in self.columns.items():
