@@ -1,4 +1,4 @@
-"""Learning curves of kernels and learning rates: accuracy and confidence over iterations, the paper's rows marked."""
+"""Draws accuracy and confidence over iterations by kernel and learning rate, with the paper's rows marked."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLOURS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
-LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # of the learning rates, from the largest on
+LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # The largest learning rate has the first.
 MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
 
 
@@ -61,7 +61,7 @@ def draw_kernel_curves(
             panel.set_xticks(ticks, [f"{tick}" for tick in ticks])
             panel.xaxis.set_minor_locator(NullLocator())
             panel.set_ylim(30, 100)
-        axes[0, column].set_title(_wrapped(sources[source]))
+        axes[0, column].set_title(_in_two_lines(sources[source]))
         axes[-1, column].set_xlabel("iterations")
     for row, label in enumerate(MEASURES.values()):
         axes[row, 0].set_ylabel(label)
@@ -81,5 +81,6 @@ def draw_kernel_curves(
     save_figure(figure, pdf_path, png_path)
 
 
-def _wrapped(title: str) -> str:
+def _in_two_lines(title: str) -> str:
+    """Break a title before its first bracket."""
     return title.replace(" (", "\n(")

@@ -3,7 +3,9 @@ import pytest
 
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
-from gpca.reporting.tables.learners import LEARNER_TABLES, RHO, SHIFTED, table5_claims, table5_learners, table5_shift
+from gpca.reporting.tables.diagnostics import RHO, SHIFTED
+from gpca.reporting.tables.learner_claims import table5_claims
+from gpca.reporting.tables.learners import LEARNER_TABLES, table5_learners, table5_shift
 
 REAL = {"ycb": {"title": "YCB", "stand_in": False}, "linemod": {"title": "LINEMOD", "stand_in": False}}
 STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
