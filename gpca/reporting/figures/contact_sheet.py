@@ -1,4 +1,4 @@
-"""A contact sheet: every object of one source drawn as a shaded solid, so that the eye can check the data."""
+"""Draws a contact sheet: every object of one source as a shaded solid, so that the eye can check the data."""
 
 from __future__ import annotations
 
@@ -36,13 +36,14 @@ def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, flo
     surroundings (Luft et al., "Image enhancement by unsharp masking the depth buffer", SIGGRAPH 2006).
 
     Args:
-        points: (P, 3), any unit of length.
-        normals: (P, 3) unit, outward; those that face away are turned towards the eye and count as the back of a wall.
-        view: azimuth and elevation of the eye in radians, z up.
-        pixels: width and height of the picture.
+        points: The points (P, 3), in any unit of length.
+        normals: Their outward unit normals (P, 3). Those that face away are turned towards the eye, and count as the
+            back of a wall.
+        view: The azimuth and the elevation of the eye in radians, z up.
+        pixels: The width and the height of the picture.
 
     Returns:
-        (pixels, pixels, 3) float64 in [0, 1], row 0 on top, white where nothing is.
+        The picture (pixels, pixels, 3) as float64 in [0, 1], row 0 on top, white where nothing is.
     """
     size = pixels * SUPERSAMPLING
     axes = view_from(*view)

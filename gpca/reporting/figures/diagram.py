@@ -8,7 +8,7 @@ from gpca.reporting.figures.style import GREY, SMALL_PT, use_style
 
 
 class Canvas:
-    """A figure on which everything is placed in inches from the lower left corner.
+    """Places everything on a figure in inches from the lower left corner.
 
     Attributes:
         figure: The figure of matplotlib, in the suite's style.

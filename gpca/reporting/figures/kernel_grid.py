@@ -24,11 +24,12 @@ def draw_kernel_curves(
     """Draw means over the seeds; a circle is a row of the paper's Table IV.
 
     Args:
-        grid: as :func:`gpca.classifier.kernel_grid.read_grids` returns it.
-        sources: name -> title, in order; those without a grid are left out.
+        grid: The frame that :func:`gpca.classifier.kernel_grid.read_grids` returns.
+        sources: The title of each name, in order; those without a grid are left out.
+        pdf_path, png_path: The two files to write.
 
     Raises:
-        InputError: no grid of these sources.
+        InputError: The grid holds none of these sources.
     """
     shown = [name for name in sources if (grid["source"] == name).any()]
     if not shown:

@@ -39,8 +39,10 @@ def draw_overview(
     pdf_path: str | Path,
     png_path: str | Path,
 ) -> None:
-    """Draw the clouds before and after ICP, the embedding, scores ± deviations, BALD among all test samples, and what
-    follows: the action against the concept named, or a question to a person and a classifier trained anew.
+    """Draw what the stages make of one registration, from its clouds to what follows.
+
+    The figure shows the clouds before and after ICP, the embedding, the scores ± their deviations, and BALD among all
+    test samples. What follows is the action against the concept named, or a question to a person and a new training.
 
     Args:
         registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the

@@ -41,7 +41,7 @@ THUMBNAILS = 6  # The figure shows this many clouds of the pool.
 
 @dataclass(frozen=True)
 class Round:
-    """The next round of labels, with the N test samples as the pool.
+    """Holds the next round of labels, with the N test samples as the pool.
 
     Attributes:
         rows_N: The rows of the test samples.

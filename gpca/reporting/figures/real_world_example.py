@@ -131,7 +131,7 @@ def choose_sample(samples: pd.DataFrame, path: str | Path) -> int:
 
 
 class _Camera:
-    """The camera of an instance, and where a sample's target frame is in it under each estimate."""
+    """Knows the camera of an instance, and where a sample's target frame is in it under each estimate."""
 
     def __init__(self, instances: Instances, i: int, registrations: Registrations, row: int) -> None:
         self._camera_3_3 = instances.camera_3_3[i]

@@ -30,8 +30,9 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
 
 
 def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
-    """Draw (a) the first view with the model where ICP put it, (b) the concept scores, (c) the new view, (d) the new
-    view with the model where ICP put it then.
+    """Draw (a) the first view with the model where ICP put it, (b) the concept scores, (c, d) the new view.
+
+    The last panel shows the new view once more, with the model where ICP put it then.
 
     Raises:
         InputError: an unusable file.

@@ -1,4 +1,4 @@
-"""Recovery rates: the share of failures that each policy recovers within 1, 2, … actions."""
+"""Draws recovery rates: the share of failures that each policy recovers within 1, 2, … actions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gpca.reporting.words import plural
 if TYPE_CHECKING:
     import pandas as pd
 
-SHADES = (SKY_BLUE, BLUE, BLACK)  # darker with every action
+SHADES = (SKY_BLUE, BLUE, BLACK)  # The shade grows darker with every action.
 
 
 def draw_recovery_rates(
@@ -36,8 +36,10 @@ def draw_recovery_rates(
     """Draw (left) the rate within 1 to `budget` actions with its Wilson interval, (right) that within all by cause.
 
     Args:
-        metrics: tidy, as :func:`gpca.recovery.metrics.collect_recovery` makes them.
-        policies: name -> title, from top to bottom; those without numbers are left out.
+        metrics: The tidy metrics that :func:`gpca.recovery.metrics.collect_recovery` makes.
+        policies: The title of each name, from top to bottom; those without numbers are left out.
+        budget: The number of actions that a policy may take.
+        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: the metrics hold none of these.

@@ -1,4 +1,4 @@
-"""The comparison as the page shows it: numbers with the digits that the paper prints, verdicts with a tone."""
+"""Words the comparison for the page: numbers with the digits that the paper prints, verdicts with a tone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gpca.comparison.verdicts import CLOSE, NOT_REPRODUCED, REPRODUCED
 from gpca.errors import InputError
 from gpca.files import read_csv
 
-TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # other verdicts judge nothing
+TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # Other verdicts judge nothing.
 _COLUMNS = (
     "table",
     "row",
@@ -73,7 +73,7 @@ def _rounded(path: str | Path, row: Mapping[str, str], name: str) -> str:
     if row.get(name, "") in ("", "nan"):
         return ""
     value = _number(path, row, name)
-    decimals = max(0, _number(path, row, "decimals", int))  # below 0 for what is printed in round tens
+    decimals = max(0, _number(path, row, "decimals", int))  # Numbers printed in round tens have fewer than 0.
     return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"
 
 

@@ -1,4 +1,4 @@
-"""The registrations that the page shows in 3-D: which ones, how their clouds lie, and what GP-CA says of them."""
+"""Picks the registrations that the page shows in 3-D, and says how their clouds lie and what GP-CA says of them."""
 
 from __future__ import annotations
 

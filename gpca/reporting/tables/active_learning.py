@@ -1,12 +1,12 @@
-"""The tables of active learning, from the tidy metrics of :func:`gpca.active_learning.metrics.collect_curves`.
+"""Makes the tables of active learning from the tidy metrics of :func:`gpca.active_learning.metrics.collect_curves`.
 
 All take the same arguments and raise the same error:
 
-    metrics: tidy.
-    sources: name -> ``{"title": str, "stand_in": bool}``, in the order of the rows.
-    strategies: name -> title, in the order in which they are shown.
-    conditions: the config's section ``active_learning``, and ``train`` and ``test`` of its ``registrations``.
-    InputError: the metrics hold none of these sources and strategies.
+    metrics: The tidy metrics.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+    strategies: The title of each name, in the order in which they are shown.
+    conditions: The config's section ``active_learning``, and ``train`` and ``test`` of its ``registrations``.
+    InputError: The metrics hold none of these sources and strategies.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from gpca.reporting.tables.table import Cell, Column, Table
 if TYPE_CHECKING:
     import pandas as pd
 
-PAPERS_HELD_OUT = "overlap"  # a GPC that knows noise and pose (Sec. IV-C)
-SETTINGS = {  # name -> title
+PAPERS_HELD_OUT = "overlap"  # The paper's GPC knows noise and pose (Sec. IV-C).
+SETTINGS = {
     "pretrained": "all concepts",
     "unseen": "the known concepts only",
     "rare": "all concepts; the new one rare",
 }
 _COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
-_SHARES = ("reached", "area_under_curve", "area_gain")  # and every accuracy: in [0, 1], printed in %
-_NOTHING = ("metrics", "hold nothing", "run its strategies first")  # where a table would have no row
+_SHARES = ("reached", "area_under_curve", "area_gain")  # These and every accuracy lie in [0, 1] and are printed in %.
+_NOTHING = ("metrics", "hold nothing", "run its strategies first")  # The error of a table without rows says this.
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a column shows: a metric of all rows, or of one strategy or one concept held out."""
+    """Says what a column shows: a metric of all rows, or of one strategy or one concept held out."""
 
     metric: str
     column: Column
@@ -49,7 +49,7 @@ class Quantity:
 def table3_active_learning(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
 ) -> Table:
-    """Labels to the target accuracy, by BALD with k-means and at random (paper, Table III): sources × settings."""
+    """Return the labels to the target accuracy by BALD with k-means and at random (Table III), sources × settings."""
     of_table = metrics[metrics["concept"] == PAPERS_HELD_OUT]
     quantities = {
         "labels_bald_kmeans": Quantity(
@@ -86,7 +86,7 @@ def table3_active_learning(
 def table3_extended(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
 ) -> Table:
-    """Every strategy, encoder and concept held out; means over the three where one column stands for all."""
+    """Return every strategy, encoder and concept held out, with means over the three where one column is for all."""
     quantities = {
         f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **_COUNT), concept=c)
         for c in _concepts(metrics)
@@ -127,7 +127,7 @@ def table3_extended(
 def table3_stream(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
 ) -> Table:
-    """The stream form: labels asked for, arrivals until a new concept is recognised, accuracy."""
+    """Return the stream form: labels asked for, arrivals until a new concept is recognised, accuracy."""
     stream = conditions["stream"]
     quantities = {
         f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **_COUNT), concept=c) for c in _concepts(metrics)
@@ -176,7 +176,7 @@ def _cells(metrics: pd.DataFrame, quantities: Mapping[str, Quantity], conditions
 
 
 def _cell(metrics: pd.DataFrame, quantity: Quantity, test: int) -> Cell | None:
-    """Return the mean over the concepts held out that the rows hold, then over the seeds."""
+    """Return the mean of a quantity over the concepts held out that the rows hold, then over the seeds."""
     if quantity.strategy is not None:
         metrics = rows_where(metrics, method=quantity.strategy)
     if quantity.concept is not None:

@@ -1,4 +1,4 @@
-"""Table VI of the paper: GP-CA on depth frames by backbone and reduction, with the paper's classic features below."""
+"""Makes Table VI of the paper: GP-CA on depth frames by backbone and reduction, and below it the classic features."""
 
 from __future__ import annotations
 
@@ -37,16 +37,17 @@ def table6_backbones(
     backbones: Mapping[str, int],
     reductions: Sequence[str],
 ) -> Table:
-    """Accuracy on depth frames: backbones × reductions, and the classic features.
+    """Return the accuracy on depth frames by backbones × reductions, and of the classic features.
 
     Args:
-        metrics: tidy (:func:`gpca.attribution.metrics.collect`); methods are named ``{backbone}-{reduction}``.
-        title: of the frames.
-        backbones: name -> number of parameters, in order; differences are to the first, with the first reduction.
-        reductions: in order.
+        metrics: The tidy metrics (:func:`gpca.attribution.metrics.collect`) of methods ``{backbone}-{reduction}``.
+        title: The title of the frames.
+        backbones: The number of parameters of each name, in order. The table shows differences to the first backbone
+            with the first reduction.
+        reductions: The names of the reductions, in order.
 
     Raises:
-        InputError: the metrics hold none of these.
+        InputError: The metrics hold none of these.
     """
     first = next(iter(backbones))
     reference_R = _values(metrics, f"{first}-{reductions[0]}")

@@ -1,4 +1,4 @@
-"""Builds a table row by row: which rows have cells, which of them compete for bold, what every table says below."""
+"""Builds a table row by row: it knows which rows have cells, which compete for bold, and what all tables say below."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class TableBuilder:
     """Collects labelled rows of cells and makes a :class:`Table` of them.
 
     Attributes:
-        name: of the table, which the error for an empty one names.
-        row_heads: key -> title of each row label.
-        rows: the labels of the rows so far.
-        cells: (row number, column key) -> cell, so far.
+        name: The name of the table, which the error for an empty one mentions.
+        row_heads: The title of each row label, by key.
+        rows: The labels of the rows so far.
+        cells: The cells so far, by row number and column key.
     """
 
     def __init__(self, name: str, row_heads: Mapping[str, str]) -> None:
@@ -41,9 +41,9 @@ class TableBuilder:
         """Add a row, unless it has no cell at all.
 
         Args:
-            labels: key and title of each, one label per row head.
-            cells: column key -> cell; None where there is no number.
-            rival: whether the row competes with others for bold, as an oracle does not.
+            labels: The key and the title of one label per row head.
+            cells: The cell of each column key, or None where there is no number.
+            rival: Whether the row competes with others for bold, as an oracle does not.
         """
         found = {key: cell for key, cell in cells.items() if cell is not None}
         if not found:
@@ -103,9 +103,9 @@ def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bo
     """Return the mean over R repeats with the half-width of its t-interval, or None without any repeat.
 
     Args:
-        values_R: one value per seed, in the column's unit.
-        test_samples: of all seeds together.
-        at_least: whether some repeat was stopped before it was done, which makes the mean a lower bound.
+        values_R: One value per seed, in the column's unit.
+        test_samples: The number of test samples of all seeds together.
+        at_least: Whether some repeat was stopped before it was done, which makes the mean a lower bound.
     """
     if len(values_R) == 0:
         return None

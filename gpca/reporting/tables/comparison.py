@@ -1,4 +1,4 @@
-"""The comparison as Markdown: the counts of each verdict, then a table for each of the paper's, reasons below it."""
+"""Writes the comparison as Markdown: the counts of each verdict, then a table for each of the paper's with reasons."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Mappi
     """Return the page.
 
     Args:
-        comparison: as :func:`gpca.comparison.verdicts.compare` returns it.
-        tolerances: of each unit, as in the config.
+        comparison: The frame that :func:`gpca.comparison.verdicts.compare` returns.
+        tolerances: The tolerances of each unit, as in the config.
     """
     parts = ["# Published and reproduced", summary(comparison), counts_table(comparison), *_rule(tolerances)]
     for table, rows in comparison.groupby("table", sort=False):

@@ -1,4 +1,4 @@
-"""What the tables of learners take from the tidy diagnostics, and the notes that all of them have."""
+"""Selects what the tables of learners take from the tidy diagnostics, and words the notes that all of them have."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 SHIFTED = {"severity": "severities beyond", "source": "unseen source", "objects": "unseen objects"}
 RHO = f"rho_max_score_{DISTANCES[0]}"
-NOTHING = ("diagnostics", "hold nothing", "run its learners first")  # where a table would have no row
+NOTHING = ("diagnostics", "hold nothing", "run its learners first")  # The error of a table without rows says this.
 OF_DISTANCE = (
     "ρ: Spearman's correlation of 1 - largest score with the distance to the training samples, the mean over the "
     "nearest ones in the space of the analytical features; diagnostics.csv has the other scores and distances."
@@ -23,12 +23,12 @@ OF_DISTANCE = (
 
 
 def only(metrics: pd.DataFrame, names: Iterable[str]) -> pd.DataFrame:
-    """Return the rows of these metrics, and of the numbers of samples: one in twenty, to be searched many times."""
+    """Return the rows of these metrics and of the numbers of samples, one in twenty, which are quicker to search."""
     return metrics[metrics["metric"].isin(["test_samples", *names])]
 
 
 def values_by_seed(metrics: pd.DataFrame, source: str, learner: str, of_set: str, metric: str) -> pd.Series:
-    """Return the values over the seeds, by seed."""
+    """Return a learner's values of a metric on a set, by seed."""
     chosen = rows_where(metrics, table=TABLE + of_set, source=source, method=learner, metric=metric)
     return chosen.set_index("seed")["value"]
 

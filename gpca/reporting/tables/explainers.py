@@ -1,11 +1,11 @@
-"""The paper's tables, from tidy metrics: each function names its rows, its columns and its notes.
+"""Makes the tables of explainers from tidy metrics: each function names its rows, its columns and its notes.
 
 All take the same arguments and raise the same error:
 
-    metrics: tidy, as :mod:`gpca.attribution.metrics` collects them.
-    sources: name -> ``{"title": str, "stand_in": bool}``, in the order of the rows.
-    explainers: name -> ``{"title": str, "oracle": bool}``, in the order in which they are shown.
-    InputError: the metrics hold none of these sources and explainers.
+    metrics: The tidy metrics that :mod:`gpca.attribution.metrics` collects.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+    explainers: The ``{"title": str, "oracle": bool}`` of each name, in the order in which they are shown.
+    InputError: The metrics hold none of these sources and explainers.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
 if TYPE_CHECKING:
     import pandas as pd
 
-GPCA_FORMS = ("gpca_paper", "gpca")  # whose concepts the paper's Table II looks into
-TABLE1 = ("shap_additive", "sa_local_additive", *GPCA_FORMS)  # the paper's: SHAP, SA, GP-CA, and ours trained longer
-EXTENDED = {  # metric -> its column in table1_extended
+GPCA_FORMS = ("gpca_paper", "gpca")  # The paper's Table II looks into these.
+TABLE1 = ("shap_additive", "sa_local_additive", *GPCA_FORMS)  # The paper has SHAP, SA and GP-CA; ours trains longer.
+EXTENDED = {  # Each of these metrics has a column in table1_extended.
     "accuracy": Column("Accuracy (%)"),
     "permuted_accuracy": Column("Relabelled (%)"),
     "causal_accuracy": Column("Causal (%)"),
@@ -34,14 +34,14 @@ EXTENDED = {  # metric -> its column in table1_extended
     "seconds_per_sample": Column("Seconds", decimals=3, interval=False, limits=(0, inf)),
     "test_samples": Column("n", decimals=0, interval=False, limits=(0, inf)),
 }
-_SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # metrics in [0, 1], printed in %
-_NOTHING = ("metrics", "hold no accuracy", "run its explainers first")  # where a table would have no row
+_SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # These are printed in %.
+_NOTHING = ("metrics", "hold no accuracy", "run its explainers first")  # The error of a table without rows says this.
 
 
 def table1_single_baselines(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
 ) -> Table:
-    """Accuracy of single-concept attribution (paper, Table I): sources by those of `TABLE1` with predictions."""
+    """Return the accuracy of single-concept attribution (Table I): sources by those of `TABLE1` with predictions."""
     shown = [name for name in TABLE1 if name in explainers and (metrics["method"] == name).any()]
     table = TableBuilder("table1_single_baselines", {"source": "Dataset"})
     for source, entry in sources.items():
@@ -61,7 +61,7 @@ def table1_single_baselines(
 
 
 def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]) -> Table:
-    """Every explainer on every source by the metrics of `EXTENDED`; one that was not measured has no column.
+    """Return every explainer on every source by the metrics of `EXTENDED` that were measured.
 
     The best accuracy of a source is bold, oracles apart: they are told what the others have to find out.
     """
@@ -106,7 +106,7 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
 def table2_per_concept(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
 ) -> Table:
-    """Accuracy per concept (paper, Table II): sources × those of `GPCA_FORMS` with predictions, by concepts and all.
+    """Return the accuracy per concept (Table II): sources × those of `GPCA_FORMS` with predictions, by concepts.
 
     The best concept of a row is bold, as in the paper.
     """

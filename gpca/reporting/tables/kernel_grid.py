@@ -1,11 +1,11 @@
-"""The tables of kernels and schedules (paper, Table IV), from the grids of :mod:`gpca.classifier.kernel_grid`.
+"""Makes the tables of kernels and schedules (Table IV) from the grids of :mod:`gpca.classifier.kernel_grid`.
 
 Both take the same arguments and raise the same error:
 
-    grid: as :func:`gpca.classifier.kernel_grid.read_grids` returns it.
-    sources: name -> ``{"title": str, "stand_in": bool}``, in the order in which they are shown.
-    test: test samples of each seed.
-    InputError: the grid holds none of the sources, or none of the rows.
+    grid: The frame that :func:`gpca.classifier.kernel_grid.read_grids` returns.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order in which they are shown.
+    test: The number of test samples of each seed.
+    InputError: The grid holds none of the sources, or none of the rows.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TITLES = {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "Polynomial, p = 2"}
-PRINTED = (  # the rows of the paper's table
+PRINTED = (  # The paper's table has these rows.
     ("rbf", 0.01, 100),
     ("matern32", 0.01, 200),
     ("polynomial", 0.01, 200),
@@ -30,8 +30,8 @@ PRINTED = (  # the rows of the paper's table
     ("polynomial", 0.001, 200),
 )
 _HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
-_NOTHING = ("kernels", "hold nothing", "run its sources and iterations first")  # where a table would have no row
-_MEASURES = {  # of the grid -> column, and the factor to its unit
+_NOTHING = ("kernels", "hold nothing", "run its sources and iterations first")  # An empty table says this.
+_MEASURES = {  # Each measure of the grid has a column, and a factor to the column's unit.
     "accuracy": (Column("Accuracy (%)"), 100),
     "confidence": (Column("Confidence (%)"), 100),
     "ece": (Column("ECE (%)", least_is_best=True), 100),
@@ -41,7 +41,7 @@ _MEASURES = {  # of the grid -> column, and the factor to its unit
 
 
 def table4_kernels(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
-    """Accuracy of the paper's five kernels and schedules: settings by sources; those that were fitted."""
+    """Return the accuracy of those of the paper's five kernels and schedules that were fitted, by sources."""
     shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
     table = TableBuilder("table4_kernels", _HEADS)
     for setting in PRINTED:
@@ -60,7 +60,7 @@ def table4_kernels(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int
 
 
 def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
-    """Every kernel, learning rate and number of iterations on every source, with confidence and calibration."""
+    """Return every kernel, learning rate and number of iterations on every source, with its calibration."""
     shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
     settings = list(grid[list(_HEADS)].drop_duplicates().itertuples(index=False, name=None))
     table = TableBuilder("table4_grid", {"source": "Dataset", **_HEADS})

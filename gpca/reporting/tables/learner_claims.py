@@ -1,4 +1,4 @@
-"""Whether the paper's two claims about the GPC hold: it is as accurate as its rivals, and it tracks shift better."""
+"""Answers the paper's two claims about the GPC: that it is as accurate as its rivals, and tracks shift better."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ RIVALS = ("learner_forest", "learner_linear_svm")  # The paper compares the GPC 
 
 
 def table5_claims(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
-    """The paper's two claims about the GPC, answered with the differences paired by seed."""
+    """Return the answers to both claims, with the differences paired by seed.
+
+    The arguments and the error are those of :mod:`gpca.reporting.tables.learners`.
+    """
     sets = {"accuracy": ["in_distribution"], "rho": [with_training_like(name) for name in SHIFTED]}
     metrics = only(metrics, ["accuracy", RHO])
     table = TableBuilder(

@@ -1,11 +1,11 @@
-"""The tables of learners and of what their uncertainty is worth (paper, Table V), from the tidy diagnostics.
+"""Makes the tables of learners and of what their uncertainty is worth (Table V) from the tidy diagnostics.
 
 All take the same arguments and raise the same error:
 
-    metrics: as :func:`gpca.shift.metrics.collect_diagnostics` makes them.
-    sources: name -> ``{"title": str, "stand_in": bool}``, in the order of the rows.
-    learners: name -> title, in the order in which they are shown.
-    InputError: the metrics hold none of these sources and learners.
+    metrics: The tidy diagnostics that :func:`gpca.shift.metrics.collect_diagnostics` makes.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+    learners: The title of each name, in the order in which they are shown.
+    InputError: The metrics hold none of these sources and learners.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _RHO: dict[str, Any] = {"decimals": 3, "limits": (-1, 1)}
 
 
 def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
-    """Accuracy and diagnostics of every learner on test samples like the training's (paper, Table V)."""
+    """Return accuracy and diagnostics of every learner on test samples like the training's (paper, Table V)."""
     quantities = {
         "accuracy": ("accuracy", Column("Accuracy (%)")),
         "rho": (RHO, Column("ρ", **_RHO)),
@@ -68,7 +68,7 @@ def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learn
 
 
 def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
-    """Accuracy, calibration and ρ of every learner where the samples are unlike those of the training."""
+    """Return accuracy, calibration and ρ of every learner on samples unlike those of the training."""
     columns: dict[str, Column] = {}
     picks: dict[str, tuple[str, str]] = {}
     for name, title in SHIFTED.items():

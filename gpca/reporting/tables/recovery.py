@@ -1,4 +1,4 @@
-"""Table VIII: what policies of recovery make of the same failures with the same number of actions."""
+"""Makes Table VIII: what policies of recovery make of the same failures with the same number of actions."""
 
 from __future__ import annotations
 
@@ -20,15 +20,16 @@ if TYPE_CHECKING:
 def table8_recovery(
     metrics: pd.DataFrame, seconds: Mapping[str, float], policies: Mapping[str, str], budget: int
 ) -> Table:
-    """Recovery within 1 to `budget` actions, wrong first actions, queued cases and seconds, by policy.
+    """Return recovery within 1 to `budget` actions, wrong first actions, queued cases and seconds, by policy.
 
     Args:
-        metrics: tidy, as :func:`gpca.recovery.metrics.collect_recovery` makes them.
-        seconds: policy -> mean seconds of a failure.
-        policies: name -> title, in order.
+        metrics: The tidy metrics that :func:`gpca.recovery.metrics.collect_recovery` makes.
+        seconds: The mean seconds of a failure, by policy.
+        policies: The title of each name, in order.
+        budget: The number of actions that a policy may take.
 
     Raises:
-        InputError: the metrics hold none of these.
+        InputError: The metrics hold none of these.
     """
     seeds = metrics["seed"].nunique()
     within = [f"recovered_within_{k}" for k in range(1, budget + 1)]

@@ -1,4 +1,4 @@
-"""Table VII of the paper: what each component takes, here and as printed."""
+"""Makes Table VII of the paper: the time that each component takes, here and as printed."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number]) -> Table:
-    """Mean, standard deviation and median of each component in milliseconds, and what the paper prints.
+    """Return mean, standard deviation and median of each component in milliseconds, and what the paper prints.
 
     Args:
-        runtime: as :func:`gpca.model.runtime_file.read_runtime` reads it.
-        title: of the objects that were registered.
-        numbers: that the paper prints.
+        runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.
+        title: The title of the objects that were registered.
+        numbers: The numbers that the paper prints.
 
     Raises:
-        InputError: no rows.
+        InputError: The frame has no rows.
     """
     if runtime.empty:
         raise InputError("runtime", "holds no rows", "run the step 'runtime' first")
