@@ -71,7 +71,7 @@ def table3_active_learning(
         caption=f"Labels until a GPC that knew noise and pose reaches {conditions['target']:.0%} on all concepts"
         + table.stand_in_clause(sources, partly=False),
         column_head="quantity",
-        columns={key: quantity.column for key, quantity in quantities.items()},
+        columns=_columns(quantities),
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
@@ -112,7 +112,7 @@ def table3_extended(
         caption=f"Active learning of a held-out concept by every strategy, to {conditions['target']:.0%}"
         + table.stand_in_clause(sources, partly=False),
         column_head="quantity",
-        columns={key: quantity.column for key, quantity in quantities.items()},
+        columns=_columns(quantities),
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
@@ -149,7 +149,7 @@ def table3_stream(
     return table.build(
         caption="A new concept in a stream of registrations" + table.stand_in_clause(sources, partly=False),
         column_head="quantity",
-        columns={key: quantity.column for key, quantity in quantities.items()},
+        columns=_columns(quantities),
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
@@ -168,6 +168,10 @@ LEARNING_TABLES = {table.__name__: table for table in (table3_active_learning, t
 
 def _concepts(metrics: pd.DataFrame) -> list[str]:
     return list(dict.fromkeys(metrics["concept"]))
+
+
+def _columns(quantities: Mapping[str, Quantity]) -> dict[str, Column]:
+    return {key: quantity.column for key, quantity in quantities.items()}
 
 
 def _cells(metrics: pd.DataFrame, quantities: Mapping[str, Quantity], conditions: Mapping) -> dict[str, Cell | None]:
