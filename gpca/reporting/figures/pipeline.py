@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from gpca.active_learning.acquisition import EXPANSION, Pool, bald_kmeans, top
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.active_learning import STYLES, mean_curves
 from gpca.reporting.figures.cloud_views import draw_clouds, thinned
 from gpca.reporting.figures.diagram import Canvas
+from gpca.reporting.figures.label_round import Round, next_round
 from gpca.reporting.figures.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
 from gpca.reporting.figures.style import (
     BLACK,
@@ -31,28 +30,11 @@ from gpca.reporting.figures.style import (
     write_title,
 )
 from gpca.reporting.words import in_words
-from gpca.seeds import generator
 
 CONCEPT = "overlap"  # The sample shown is of this concept.
 SETTING = "pretrained"  # In the learning curves, the encoder knows all concepts and the classifier all but one.
 TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # The figure draws the curves of these strategies.
 THUMBNAILS = 6  # The figure shows this many clouds of the pool.
-
-
-@dataclass(frozen=True)
-class Round:
-    """Holds the next round of labels, with the N test samples as the pool.
-
-    Attributes:
-        rows_N: The rows of the test samples.
-        map_S_2: The principal components of all embeddings, fitted to the standardised ones of the training samples.
-        candidates, chosen: The places in `rows_N` of the B·K largest BALD, and of the B of them that k-means keeps.
-    """
-
-    rows_N: np.ndarray
-    map_S_2: np.ndarray
-    candidates: np.ndarray
-    chosen: np.ndarray
 
 
 def draw_pipeline(
@@ -100,26 +82,6 @@ def draw_pipeline(
     canvas.dot(6.15, 3.4, TARGET_COLOUR, r"target $\mathcal{Q}$", gap_in=0.05)
     canvas.dot(6.63, 3.4, SOURCE_COLOUR, r"source $\mathcal{P}$", gap_in=0.05)
     save_figure(canvas.figure, pdf_path, png_path)
-
-
-def next_round(stages: Stages, batch: int) -> Round:
-    """Let the paper's strategy choose what a person would be asked about next among the test samples."""
-    from sklearn.decomposition import PCA
-    from sklearn.preprocessing import StandardScaler
-
-    train = stages.registrations.rows("train")
-    rows_N = stages.registrations.rows("test")
-    if not len(train):
-        raise InputError("registrations", "hold no training samples", "raise registrations.train")
-    scaler = StandardScaler().fit(stages.h_S_d[train])  # The classifier scales embeddings in the same way.
-    h_S_d = scaler.transform(stages.h_S_d)
-    map_S_2 = PCA(2, svd_solver="full").fit(h_S_d[train]).transform(h_S_d)
-    of_pool = stages.predictions.iloc[rows_N]
-    scores_N_C = of_pool[[f"score_{concept}" for concept in CONCEPTS]].to_numpy()
-    bald_N = of_pool["bald"].to_numpy()
-    pool = Pool(h_S_d[rows_N], scores_N_C, bald_N, h_S_d[train], of_pool["concept_true"].to_numpy())
-    chosen = bald_kmeans(pool, min(batch, len(rows_N)), generator("fig4_pipeline"))
-    return Round(rows_N, map_S_2, top(bald_N, batch * EXPANSION), chosen)
 
 
 def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, asked: Round) -> None:
