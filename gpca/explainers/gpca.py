@@ -49,3 +49,4 @@ EXPLAINERS = {
     "gpca_paper": ExplainerEntry("GP-CA (paper's setting)", GPCA, reads="embeddings"),
     "gpca": ExplainerEntry("GP-CA (trained longer)", GPCA, reads="embeddings"),
 }
+GPCA_FORMS = tuple(EXPLAINERS)

@@ -1,1 +1,1 @@
-"""Tables, figures and their style: everything here draws from files and computes no result."""
+"""Makes tables, figures and the page from files, in one style, and computes no result."""

@@ -10,11 +10,11 @@ from typing import Any
 
 from baselines.registry import explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.explainers.gpca import GPCA_FORMS
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import title_of
 from gpca.recovery.policies import policy_entry
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
-from gpca.reporting.tables.explainers import GPCA_FORMS
 from gpca.reporting.tables.kernel_grid import PRINTED
 
 

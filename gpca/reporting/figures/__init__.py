@@ -1,1 +1,1 @@
-"""Figures; nothing here computes a result."""
+"""Draws the figures; nothing here computes a result."""

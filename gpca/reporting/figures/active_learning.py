@@ -1,4 +1,4 @@
-"""Learning curves of active learning: accuracy over labels, strategies as lines, sources and encoders as panels."""
+"""Draws learning curves of active learning: accuracy over labels by strategy, sources and encoders as panels."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
-STYLES = {  # of the strategies that are known; the paper's two are thick, with their intervals
+STYLES = {  # The paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER.
     "bald_kmeans": (BLUE, "-", 1.8),
     "random": (BLACK, "-", 1.8),
     "random_stratified": (BLACK, ":", 0.9),
@@ -52,12 +52,13 @@ def draw_learning_curves(
     pdf_path: str | Path,
     png_path: str | Path,
 ) -> None:
-    """Draw the mean over seeds of the accuracy, itself the mean over the concepts held out.
+    """Draw the accuracy over labels: its mean over the concepts held out, then over the seeds.
 
     Args:
-        curve_files: named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
-        sources, strategies: name -> title, in order; those without curves are left out.
-        target: the accuracy that counts as reached, drawn as a dashed line.
+        curve_files: Files named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
+        sources, strategies: The title of each name, in order; those without curves are left out.
+        target: The accuracy that counts as reached, which a dashed line marks.
+        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: an unusable file, or no curve of these.
@@ -96,7 +97,7 @@ def draw_learning_curves(
 
 
 def mean_curves(curve_files: Iterable[str | Path]) -> dict[tuple[str, str, str], pd.DataFrame]:
-    """Return (source, strategy, setting) -> labels, mean, low and high accuracy in %; intervals are over the seeds."""
+    """Return labels, mean, low and high accuracy in % by source, strategy and setting; intervals are over the seeds."""
     import pandas as pd
 
     parts: dict[tuple[str, str, str], list] = {}

@@ -1,4 +1,4 @@
-"""Two clouds drawn over each other, source on target, from one side: the farther a point, the paler."""
+"""Draws two clouds over each other, source on target, seen from one side: the farther a point, the paler it is."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ import numpy as np
 from gpca.reporting.figures.style import SOURCE_COLOUR, TARGET_COLOUR
 
 _ELEVATION_RAD = np.radians(22.0)
-_PALEST = 0.65  # share of white in the colour of the farthest point
+_PALEST = 0.65  # The colour of the farthest point holds this share of white.
 
 
 def draw_clouds(axes, target_Q_3: np.ndarray, source_P_3: np.ndarray, size: float = 1.6, corners=None) -> None:
     """Scatter both clouds together from back to front, without axes.
 
     Args:
-        axes: that are drawn on.
-        target_Q_3, source_P_3: in the frame of the view: right, up, towards the viewer.
-        size: of a point, in points².
-        corners: lowest and highest coordinates (2, 3) that panels of one scale share; by default those of the clouds.
+        axes: The panel to draw on.
+        target_Q_3, source_P_3: The clouds in the frame of the view, whose axes are right, up and towards the viewer.
+        size: The area of a point in points².
+        corners: The lowest and the highest coordinates (2, 3), which panels of one scale share. They are those of the
+            two clouds by default.
     """
     from matplotlib.colors import to_rgb
 
@@ -33,10 +34,26 @@ def draw_clouds(axes, target_Q_3: np.ndarray, source_P_3: np.ndarray, size: floa
     axes.set_axis_off()
 
 
-def view_from(azimuth_rad: float) -> np.ndarray:
+def thinned(rows: np.ndarray, count: int) -> np.ndarray:
+    """Return at most `count` of the rows, spread evenly over their order, which is random or a scan's in a cloud."""
+    return rows[np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int)]
+
+
+def legend_of_clouds(figure, target: str, source: str, gap: float) -> None:
+    """Name the two clouds at the top right of a figure, `gap` letters away from the edges."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], linestyle="", marker="o", markersize=3, color=colour, label=label)
+        for colour, label in ((TARGET_COLOUR, target), (SOURCE_COLOUR, source))
+    ]
+    figure.legend(handles=handles, loc="upper right", ncols=2, borderaxespad=gap, handletextpad=0.1, columnspacing=1)
+
+
+def view_from(azimuth_rad: float, elevation_rad: float = _ELEVATION_RAD) -> np.ndarray:
     """Return the rotation (3, 3) to right, up and towards-the-viewer axes of a view from slightly above, z up."""
     sine, cosine = np.sin(azimuth_rad), np.cos(azimuth_rad)
-    towards = np.array([cosine * np.cos(_ELEVATION_RAD), sine * np.cos(_ELEVATION_RAD), np.sin(_ELEVATION_RAD)])
+    towards = np.array([cosine * np.cos(elevation_rad), sine * np.cos(elevation_rad), np.sin(elevation_rad)])
     right = np.array([-sine, cosine, 0.0])
     return np.array([right, np.cross(towards, right), towards])
 

@@ -1,4 +1,4 @@
-"""Fig. 3 of the paper: one object, perturbed in each of the three ways, over its clean target."""
+"""Draws Fig. 3 of the paper: one object, perturbed in each of the three ways, over its clean target."""
 
 from __future__ import annotations
 
@@ -10,15 +10,9 @@ from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
-from gpca.reporting.figures.cloud_views import draw_clouds, widest_views
-from gpca.reporting.figures.style import (
-    SOURCE_COLOUR,
-    TARGET_COLOUR,
-    TEXT_WIDTH_IN,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
+from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
+from gpca.reporting.words import in_words
 
 TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
 SEVERITIES = {
@@ -38,20 +32,21 @@ def draw_concepts_figure(
 ) -> None:
     """Draw target (vermilion) and perturbed source in its initial pose (blue) in one panel per concept.
 
-    Shown are test samples of one object: `object_name`, or that object whose samples come nearest to the medium
-    severity. One view serves all panels; it is chosen so that the pose error and the cut are seen from the side.
+    The figure shows test samples of one object: `object_name`, or the object whose samples come nearest to the medium
+    severity. One view serves all panels, and shows the pose error and the cut from the side.
 
     Raises:
         InputError: an unusable file, or no (such) object with a test sample of each concept.
     """
-    objects, registrations = ObjectClouds.load(objects_npz), Registrations.load(registrations_npz)
+    objects = ObjectClouds.load(objects_npz)
+    registrations = Registrations.load(registrations_npz)
     samples = choose_samples(registrations, registrations_npz, object_name)
     name = str(registrations.object_name[samples["noise"]])
     if name not in objects.names:
         raise InputError(objects_npz, f"has no object '{name}'", f"make it and {registrations_npz} from one config")
     sources = {concept: source_before_icp(registrations, sample) for concept, sample in samples.items()}
     row = objects.names.index(name)
-    points_shown = max(len(source) for source in sources.values())  # both clouds equally dense
+    points_shown = max(len(source) for source in sources.values())  # This makes both clouds equally dense.
     target = objects.points(row)[:points_shown] / objects.diameters_m[row]
     view = choose_view(target, sources)
 
@@ -62,39 +57,37 @@ def draw_concepts_figure(
     corners = np.concatenate([np.concatenate(pair) for pair in clouds.values()])
     low, high = corners.min(axis=0), corners.max(axis=0)
     panel_in = TEXT_WIDTH_IN / len(clouds)
-    head_in, foot_in = 0.2, 0.2
-    height_in = panel_in * (high[1] - low[1]) / (high[0] - low[0]) + head_in + foot_in
+    margin_in = 0.2  # The title takes it above the panels, and their captions below.
+    height_in = panel_in * (high[1] - low[1]) / (high[0] - low[0]) + margin_in + margin_in
     figure, panels = plt.subplots(1, len(clouds), figsize=(TEXT_WIDTH_IN, height_in))
-    figure.subplots_adjust(left=0, right=1, bottom=foot_in / height_in, top=1 - head_in / height_in, wspace=0)
+    figure.subplots_adjust(left=0, right=1, bottom=margin_in / height_in, top=1 - margin_in / height_in, wspace=0)
     for letter, panel, (concept, (target_view, source_view)) in zip("abc", panels, clouds.items(), strict=True):
         draw_clouds(panel, target_view, source_view, corners=(low, high))
         severity = severity_text(registrations, samples[concept], concept)
         panel.set_title(f"({letter}) {TITLES[concept]}: {severity}", y=0, pad=-4, va="top")
-    handles = [
-        plt.Line2D([], [], linestyle="", marker="o", markersize=3, color=colour, label=label)
-        for colour, label in ((TARGET_COLOUR, "target"), (SOURCE_COLOUR, "perturbed source, before ICP"))
-    ]
-    figure.legend(handles=handles, loc="upper right", ncols=2, borderaxespad=0.2, handletextpad=0.1, columnspacing=1)
-    write_title(figure, f"{title}: {name.replace('_', ' ')}")
+    legend_of_clouds(figure, "target", "perturbed source, before ICP", gap=0.2)
+    write_title(figure, f"{title}: {in_words(name)}")
     save_figure(figure, pdf_path, png_path)
 
 
 def choose_samples(registrations: Registrations, path: str | Path, object_name: str | None = None) -> dict[str, int]:
     """Return for each concept the row of one object's test sample that is nearest to the concept's medium severity.
 
-    Severities are compared by rank within the test samples of the concept, so that no unit or range matters.
-    The object is `object_name`, or the one whose farthest sample is nearest. InputError where there is none.
+    It compares severities by their rank within the test samples of the concept, so that no unit or range matters.
+    The object is `object_name`, or the one whose farthest sample is nearest. Raises an InputError where there is none.
     """
     from scipy.stats import rankdata
 
-    distance_S = np.full(len(registrations), np.inf)  # of the rank from the middle; infinite for what is not shown
+    # The distance of a sample's rank from the middle rank is infinite where the sample cannot be shown.
+    distance_S = np.full(len(registrations), np.inf)
     for concept, names in SEVERITIES.items():
         rows = np.flatnonzero((registrations.split == "test") & (registrations.concept == concept))
         ranks = [rankdata(getattr(registrations, name)[rows]) / (len(rows) + 1) for name in names]
         distance_S[rows] = np.abs(np.array(ranks) - 0.5).max(axis=0)
     is_shown_S = np.isfinite(distance_S)
+    object_names = [object_name] if object_name else list(dict.fromkeys(registrations.object_name.tolist()))
     choices = []
-    for name in [object_name] if object_name else dict.fromkeys(registrations.object_name.tolist()):
+    for name in object_names:
         of_object_S = is_shown_S & (registrations.object_name == name)
         rows_of = {c: np.flatnonzero(of_object_S & (registrations.concept == c)) for c in SEVERITIES}
         if all(len(rows) for rows in rows_of.values()):
@@ -114,15 +107,16 @@ def source_before_icp(registrations: Registrations, sample: int) -> np.ndarray:
 def choose_view(target: np.ndarray, sources: dict[str, np.ndarray]) -> np.ndarray:
     """Return the rotation (3, 3) to a view's right, up and towards-the-viewer axes, with z up in the world.
 
-    Of 24 directions around the object, the 8 that show it widest are kept (a mug with its handle at the side), and
-    of these the one that shows best how pose error and cut shift the centroid: the visible shares' product is largest.
+    It keeps the 8 of 24 directions around the object that show it widest (a mug with its handle at the side), and
+    picks the one of them that shows best how pose error and cut shift the centroid: the product of the visible shares
+    is largest there.
     """
     shifts = [sources[concept].mean(axis=0) - target.mean(axis=0) for concept in ("pose", "overlap")]
     return max(widest_views(target), key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))
 
 
 def severity_text(registrations: Registrations, sample: int, concept: str) -> str:
-    """Return the sample's severity as it is printed under its panel; lengths are relative to the diameter d."""
+    """Return a sample's severity as it is printed under its panel, with lengths relative to the diameter d."""
     if concept == "noise":
         return f"$\\sigma$ = {100 * registrations.severity_noise[sample]:.1f} % $d$"
     if concept == "pose":

@@ -1,4 +1,4 @@
-"""What every explainer takes each concept for: confusion matrix and predicted classes, explainers by sources."""
+"""Draws what every explainer takes each concept for: confusion matrix and predicted classes, explainers by sources."""
 
 from __future__ import annotations
 
@@ -25,10 +25,15 @@ from gpca.reporting.figures.style import (
 if TYPE_CHECKING:
     import pandas as pd
 
-LABEL_IN = 1.45  # of the explainers' titles
-HEAD_IN, ROW_IN, PANEL_IN, FOOT_IN = 0.62, 0.53, 0.43, 0.04
-LEAST_SOURCE_IN, LARGEST_SOURCE_IN = 1.4, 1.9
-LETTERS_IN, GAP_IN = 0.14, 0.2  # left of a matrix; between matrix and bars, and after the bars
+LABEL_IN = 1.45  # The explainers' titles are this wide.
+HEAD_IN = 0.62
+ROW_IN = 0.53
+PANEL_IN = 0.43
+FOOT_IN = 0.04
+LEAST_SOURCE_IN = 1.4
+LARGEST_SOURCE_IN = 1.9
+LETTERS_IN = 0.14  # The letters left of a matrix take this.
+GAP_IN = 0.2  # This lies between matrix and bars, and after the bars.
 
 
 def draw_confusions_figure(
@@ -44,9 +49,9 @@ def draw_confusions_figure(
     abstained. The bars are the predicted classes' shares of all test samples, with a dash at the true share.
 
     Args:
-        metrics_csv: as :func:`gpca.attribution.metrics.collect` makes it.
-        sources, explainers: name -> title, in order; those without metrics are left out.
-        pdf_path, png_path: the two files to write.
+        metrics_csv: The file that :func:`gpca.attribution.metrics.collect` makes.
+        sources, explainers: The title of each name, in order; those without metrics are left out.
+        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: an unusable file, or one without metrics of these explainers and sources.
@@ -61,7 +66,8 @@ def draw_confusions_figure(
 
     source_in = float(np.clip((TEXT_WIDTH_IN - LABEL_IN) / len(columns), LEAST_SOURCE_IN, LARGEST_SOURCE_IN))
     panel_in = (source_in - LETTERS_IN - 2 * GAP_IN) / 2
-    width_in, height_in = LABEL_IN + len(columns) * source_in, HEAD_IN + len(rows) * ROW_IN + FOOT_IN
+    width_in = LABEL_IN + len(columns) * source_in
+    height_in = HEAD_IN + len(rows) * ROW_IN + FOOT_IN
     figure = plt.figure(figsize=(width_in, height_in))
 
     def text(x_in, y_in, words, **style):
@@ -103,8 +109,18 @@ def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFra
     return pooled
 
 
+def counts_and_shares(confusion: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Return how many samples of each true concept (rows) are taken for each (columns), and what share of the row.
+
+    Abstained samples count in the whole of a row. The shares of a concept without samples are NaN.
+    """
+    counts_C_C1 = confusion.reindex(list(confusion.columns[:-1])).to_numpy(float)
+    return counts_C_C1[:, :-1], counts_C_C1[:, :-1] / counts_C_C1.sum(axis=1, keepdims=True)
+
+
 def _wrapped(title: str, width_in: float, size_pt: float) -> str:
-    letter_in = 0.48 * size_pt / 72  # about half as wide as high
+    """Break a title into lines that fit; a letter is about half as wide as it is high."""
+    letter_in = 0.48 * size_pt / 72
     return "\n".join(textwrap.wrap(title, int(width_in / letter_in), break_on_hyphens=False))
 
 
@@ -123,8 +139,7 @@ def letters(concepts: list[str]) -> list[str]:
 def draw_matrix(axes, confusion: pd.DataFrame, head: bool) -> None:
     """Draw the rows' shares; a concept without samples has none. Predicted concepts are named only at the `head`."""
     concepts = list(confusion.columns[:-1])
-    counts_C_C1 = confusion.reindex(concepts).to_numpy(float)
-    shares_C_C = counts_C_C1[:, :-1] / counts_C_C1.sum(axis=1, keepdims=True)
+    _, shares_C_C = counts_and_shares(confusion)
     axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues(), vmin=0, vmax=1, aspect="auto")
     for (row, column), share in np.ndenumerate(shares_C_C):
         if np.isfinite(share):
@@ -141,8 +156,10 @@ def draw_bars(axes, confusion: pd.DataFrame, head: bool) -> None:
     """Draw the predicted classes' shares of all samples; a dash stands at the share that truly is of a concept."""
     concepts = list(confusion.columns[:-1])
     total = confusion.to_numpy().sum()
-    shares, truth = confusion.sum() / total, confusion.sum(axis=1) / total
-    colours = [*(CONCEPT_COLOURS.get(concept, GREY) for concept in concepts), LIGHT_GREY]  # the last abstained
+    shares = confusion.sum() / total
+    truth = confusion.sum(axis=1) / total
+    of_abstained = LIGHT_GREY
+    colours = [*(CONCEPT_COLOURS.get(concept, GREY) for concept in concepts), of_abstained]
     axes.bar(range(len(shares)), shares, color=colours, width=0.7)
     places = np.array([concepts.index(concept) for concept in truth.index])
     axes.hlines(truth, places - 0.45, places + 0.45, color="black", linewidth=0.6)

@@ -1,4 +1,4 @@
-"""A contact sheet: every object of one source drawn as a shaded solid, so that the eye can check the data."""
+"""Draws a contact sheet: every object of one source as a shaded solid, so that the eye can check the data."""
 
 from __future__ import annotations
 
@@ -9,20 +9,22 @@ from pathlib import Path
 import numpy as np
 
 from gpca.files import load_arrays
+from gpca.reporting.figures.cloud_views import view_from
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
+from gpca.reporting.words import in_words
 
-VIEW = (math.radians(-55), math.radians(32))  # azimuth and elevation of the eye, z up: front, right and top are seen
+VIEW = (math.radians(-55), math.radians(32))  # Azimuth and elevation of the eye, z up: it sees front, right and top.
 BASE_COLOUR = np.array([0.62, 0.70, 0.80])
-LIGHT = np.array([-0.42, 0.55, 0.72])  # in the view frame (right, up, towards the eye): over the left shoulder
-SUPERSAMPLING = 2  # the picture is drawn finer and averaged, which smooths outlines
-FILL = 0.9  # share of a tile that the larger side of the object's outline takes
-DISC_COVER = 12.0  # mean number of points under a disc: exp(-12) of the surface stays bare
-LARGEST_DISC = 0.03  # of the picture: no disc leaves it, and a sparse cloud looks sparse
-OUTLINE = 0.6  # share of solid pixels around one that makes it solid; above 1/2 the outline is drawn in
-AWAY = 0.7  # discs that face away are this much smaller, lest the far wall stand out over a rim
-BLEND = 1.5  # discs within this many radii of the nearest are one surface: their normals are averaged
-CROWN = 1.5  # a disc's rim lies this many radii below its middle: at an edge the face's own discs win
-LEAST_TILT = 0.12  # discs seen edge on are kept this wide
+LIGHT = np.array([-0.42, 0.55, 0.72])  # The light shines over the left shoulder (right, up, towards the eye).
+SUPERSAMPLING = 2  # The picture is drawn this much finer and averaged, which smooths outlines.
+FILL = 0.9  # The larger side of an object's outline takes this share of its tile.
+DISC_COVER = 12.0  # This many points lie under a disc on average, so exp(-12) of the surface stays bare.
+LARGEST_DISC = 0.03  # No disc is larger than this share of the picture, so that a sparse cloud looks sparse.
+OUTLINE = 0.6  # A pixel is solid where this share around it is; above 1/2, that draws the outline in.
+AWAY = 0.7  # Discs that face away are this much smaller, lest the far wall stand out over a rim.
+BLEND = 1.5  # Discs within this many radii of the nearest are one surface: their normals are averaged.
+CROWN = 1.5  # A disc's rim lies this many radii below its middle, so that a face's own discs win at its edge.
+LEAST_TILT = 0.12  # Discs seen edge on are kept this wide.
 
 
 def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, float], pixels: int) -> np.ndarray:
@@ -34,17 +36,19 @@ def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, flo
     surroundings (Luft et al., "Image enhancement by unsharp masking the depth buffer", SIGGRAPH 2006).
 
     Args:
-        points: (P, 3), any unit of length.
-        normals: (P, 3) unit, outward; those that face away are turned towards the eye and count as the back of a wall.
-        view: azimuth and elevation of the eye in radians, z up.
-        pixels: width and height of the picture.
+        points: The points (P, 3), in any unit of length.
+        normals: Their outward unit normals (P, 3). Those that face away are turned towards the eye, and count as the
+            back of a wall.
+        view: The azimuth and the elevation of the eye in radians, z up.
+        pixels: The width and the height of the picture.
 
     Returns:
-        (pixels, pixels, 3) float64 in [0, 1], row 0 on top, white where nothing is.
+        The picture (pixels, pixels, 3) as float64 in [0, 1], row 0 on top, white where nothing is.
     """
     size = pixels * SUPERSAMPLING
-    axes = _view_axes(*view)
-    positions, facing = points @ axes.T, normals @ axes.T
+    axes = view_from(*view)
+    positions = points @ axes.T
+    facing = normals @ axes.T
     low, high = positions.min(axis=0), positions.max(axis=0)
     scale = FILL * size / (float((high - low)[:2].max()) or 1.0)
     positions = (positions - (low + high) / 2) * scale
@@ -55,17 +59,8 @@ def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, flo
     return image.reshape(pixels, SUPERSAMPLING, pixels, SUPERSAMPLING, 3).mean(axis=(1, 3))[::-1]
 
 
-def _view_axes(azimuth: float, elevation: float) -> np.ndarray:
-    """Return the rows right, up and towards-the-eye of an eye that looks at the origin."""
-    towards = np.array(
-        [math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)]
-    )
-    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
-    return np.stack([right, np.cross(towards, right), towards])
-
-
 def _disc_radius(positions: np.ndarray) -> float:
-    """Radius of a disc that covers DISC_COVER points, from the distance to the 8th neighbour."""
+    """Return the radius of a disc that covers DISC_COVER points, from the distance to the 8th neighbour."""
     from scipy.spatial import cKDTree
 
     neighbours = min(8, len(positions) - 1)
@@ -88,14 +83,16 @@ def _splat(positions, facing, radius, size) -> tuple[np.ndarray, np.ndarray]:
     kept = positions[:, 2] + (1 + BLEND) * radius > behind[row, column]
     facing = facing[kept]
     towards_eye = facing * np.where(facing[:, 2:] < 0, -1.0, 1.0)
-    weights, heights, normal = np.zeros(size * size), np.zeros(size * size), np.zeros((3, size * size))
+    weights = np.zeros(size * size)
+    heights = np.zeros(size * size)
+    normal = np.zeros((3, size * size))
     for pixel, height, crown, point, weight in _discs(positions[kept], facing, radius, size):
         seen = height - crown > nearest[pixel] - BLEND * radius
-        pixel, point, weight = pixel[seen], point[seen], weight[seen]
+        pixel, weight = pixel[seen], weight[seen]
         np.add.at(weights, pixel, weight)
         np.add.at(heights, pixel, weight * height[seen])
         for axis in range(3):
-            np.add.at(normal[axis], pixel, weight * towards_eye[point, axis])
+            np.add.at(normal[axis], pixel, weight * towards_eye[point[seen], axis])
     depth = np.divide(heights, weights, out=np.full(size * size, np.nan), where=weights > 0)
     return depth.reshape(size, size), normal.T.reshape(size, size, 3)
 
@@ -103,7 +100,8 @@ def _splat(positions, facing, radius, size) -> tuple[np.ndarray, np.ndarray]:
 def _discs(positions, facing, radius, size):
     """Yield, for every pixel offset within the radius, what is hit there: pixel, depth, crown, point, weight."""
     column, row = np.floor(positions[:, :2].T).astype(np.int64)
-    centre, height = row * size + column, positions[:, 2]
+    centre = row * size + column
+    height = positions[:, 2]
     slant = np.maximum(np.abs(facing[:, 2]), LEAST_TILT) * np.where(facing[:, 2] < 0, -1.0, 1.0)
     tilt_right, tilt_up = -facing[:, 0] / slant, -facing[:, 1] / slant
     away = facing[:, 2] < 0
@@ -128,8 +126,8 @@ def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) 
     # Discs on the rim stand out over the true outline, each a little differently: smooth the outline and pull it in.
     solid = gaussian_filter(covered.astype(float), 0.5 * radius) > OUTLINE
     nearest = tuple(distance_transform_edt(~covered, return_distances=False, return_indices=True))
-    depth, normal = depth[nearest], normal[nearest]  # pinholes inside the outline take the pixel beside them
-    lambert = _unit(normal) @ (LIGHT / np.linalg.norm(LIGHT))
+    depth = depth[nearest]  # Pinholes inside the outline take the pixel beside them.
+    lambert = _unit(normal[nearest]) @ (LIGHT / np.linalg.norm(LIGHT))
     soft = (0.5 + 0.5 * lambert) ** 1.6
     # Only solid pixels take part in the mean depth: the background is nowhere, not far away.
     heights = np.where(solid, depth, 0.0)
@@ -147,9 +145,9 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, pdf_path: str | Path
     """Draw all objects of one source in a grid, each filling its tile, with its name and diameter below.
 
     Args:
-        objects_npz: the clouds as `gpca objects` writes them.
-        title: the line on top; it says so when the objects are stand-ins.
-        pdf_path, png_path: the two files to write.
+        objects_npz: The clouds as `gpca objects` writes them.
+        title: The line on top, which says so when the objects are stand-ins.
+        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: the npz is missing, unreadable or not of that format.
@@ -176,21 +174,22 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, pdf_path: str | Path
     for index, (name_lines, diameter_m) in enumerate(zip(captions, objects["diameters_m"], strict=True)):
         row, column = divmod(index, columns)
         in_row = min(columns, count - row * columns)
-        left = (column + (columns - in_row) / 2) * tile  # a short last row stands in the middle
+        left = (column + (columns - in_row) / 2) * tile  # A short last row stands in the middle.
         bottom = height - title_height - row * (tile + caption_height) - tile
         cloud = slice(objects["offsets"][index], objects["offsets"][index + 1])
         image = render_cloud(objects["points_m"][cloud], objects["normals"][cloud], VIEW, round(tile * 300))
         axes = figure.add_axes((left / TEXT_WIDTH_IN, bottom / height, tile / TEXT_WIDTH_IN, tile / height))
         axes.imshow(image, interpolation="antialiased")
         axes.set_axis_off()
-        text_x, text_y = (left + tile / 2) / TEXT_WIDTH_IN, (bottom - 0.02) / height
+        text_x = (left + tile / 2) / TEXT_WIDTH_IN
+        text_y = (bottom - 0.02) / height
         text = f"{name_lines}\n{diameter_m * 1000:.0f} mm"
         figure.text(text_x, text_y, text, ha="center", va="top", fontsize=size_pt, linespacing=1.15)
     save_figure(figure, pdf_path, png_path)
 
 
 def _columns(count: int) -> int:
-    """Between √n and 1.7 √n columns (4 at least), the number that leaves the fewest tiles empty, wider first."""
+    """Return the number of columns that leaves the fewest tiles empty, of √n to 1.7 √n (4 at least), wider first."""
     widest = max(4, math.floor(1.7 * math.sqrt(count)))
     return min(range(widest, max(4, math.ceil(math.sqrt(count))) - 1, -1), key=lambda columns: -count % columns)
 
@@ -198,4 +197,4 @@ def _columns(count: int) -> int:
 def _caption(name: str, width_pt: float, size_pt: float) -> str:
     """Break a name at its underscores into lines that fit the tile; letters are about half as wide as high."""
     letters = max(4, int(0.96 * width_pt / (0.5 * size_pt)))
-    return "\n".join(textwrap.wrap(str(name).replace("_", " "), letters))
+    return "\n".join(textwrap.wrap(in_words(name), letters))

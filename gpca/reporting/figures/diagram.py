@@ -1,4 +1,4 @@
-"""Diagrams whose parts are panels of data: a canvas measured in inches, with boxes and arrows of one look."""
+"""Draws diagrams whose parts are panels of data, on a canvas measured in inches, with boxes and arrows of one look."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from gpca.reporting.figures.style import GREY, SMALL_PT, use_style
 
 
 class Canvas:
-    """A figure on which everything is placed in inches from the lower left corner.
+    """Places everything on a figure in inches from the lower left corner.
 
     Attributes:
-        figure: of matplotlib, in the suite's style.
-        axes: fills the figure, without frame; its data coordinates are inches.
+        figure: The figure of matplotlib, in the suite's style.
+        axes: Axes without frame that fill the figure; their data coordinates are inches.
     """
 
     def __init__(self, width_in: float, height_in: float) -> None:
         use_style()
         import matplotlib.pyplot as plt
 
-        self.width_in, self.height_in = width_in, height_in
+        self.width_in = width_in
+        self.height_in = height_in
         self.figure = plt.figure(figsize=(width_in, height_in))
         self.axes = self.figure.add_axes((0, 0, 1, 1))
         self.axes.set(xlim=(0, width_in), ylim=(0, height_in))
@@ -27,8 +28,9 @@ class Canvas:
 
     def panel(self, left_in: float, bottom_in: float, width_in: float, height_in: float):
         """Return new axes at this place, through which boxes are seen."""
-        w, h = self.width_in, self.height_in
-        axes = self.figure.add_axes((left_in / w, bottom_in / h, width_in / w, height_in / h))
+        left, width = left_in / self.width_in, width_in / self.width_in
+        bottom, height = bottom_in / self.height_in, height_in / self.height_in
+        axes = self.figure.add_axes((left, bottom, width, height))
         axes.patch.set_visible(False)
         return axes
 
@@ -36,6 +38,11 @@ class Canvas:
         """Write at this place, centred unless the style says otherwise."""
         look: dict[str, Any] = {"ha": "center", "fontsize": SMALL_PT, "linespacing": 1.15} | style
         self.axes.text(x_in, y_in, words, **look)
+
+    def dot(self, x_in: float, y_in: float, colour: str, words: str, gap_in: float = 0.06) -> None:
+        """Draw a dot of a cloud's colour at this place, with the cloud's name to its right."""
+        self.axes.plot(x_in, y_in + 0.005, "o", color=colour, markersize=3)
+        self.text(x_in + gap_in, y_in, words, ha="left", va="center")
 
     def box(
         self,
@@ -62,10 +69,10 @@ class Canvas:
         """Draw a line through the points with a head at the last; words stand over (or under) the middle of its start.
 
         Args:
-            points_in: two or more (x, y).
-            colour: of line and head.
-            words: at the first stretch.
-            over: words above that stretch, else below.
+            points_in: Two or more points (x, y).
+            colour: The colour of line and head.
+            words: The words at the first stretch.
+            over: Whether the words stand above that stretch, else below.
         """
         if len(points_in) > 2:
             self.axes.plot(

@@ -1,7 +1,8 @@
-"""What pictures of depth frames share: samples with their poses and scores, and clouds drawn over models."""
+"""Draws what pictures of depth frames share: samples with their poses and scores, and clouds over models."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,8 @@ def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataF
     Raises:
         InputError: an unusable file, or files of different samples.
     """
-    poses, predictions = read_csv(poses_csv, POSE_COLUMNS), read_predictions(predictions_csv)
+    poses = read_csv(poses_csv, POSE_COLUMNS)
+    predictions = read_predictions(predictions_csv)
     if not (poses[["split", "sample"]].to_numpy() == predictions[["split", "sample"]].to_numpy()).all():
         raise InputError(poses_csv, f"holds other samples than {predictions_csv}", "make both anew from one config")
     for name in ("instance", "init_error", "icp_error"):
@@ -57,12 +59,21 @@ def _view_of(offset_P_3: np.ndarray) -> np.ndarray:
 
 def draw_scores(axes, row: pd.Series) -> None:
     """Draw a sample's concept scores as bars with ± one standard deviation, the true concept's name in bold."""
-    for place, concept in enumerate(CONCEPTS):
-        deviation = np.sqrt(row[f"variance_{concept}"])
-        look = {"color": CONCEPT_COLOURS[concept], "height": 0.7, "error_kw": {"lw": 0.8}}
-        axes.barh(place, row[f"score_{concept}"], xerr=deviation, **look)
-        weight = "bold" if concept == row["concept_true"] else "normal"
-        axes.text(-0.03, place, concept, ha="right", va="center", fontsize=SMALL_PT, fontweight=weight)
-    axes.set(xlim=(0, 1), ylim=(len(CONCEPTS) - 0.4, -0.6), yticks=[])
+    deviations = [np.sqrt(row[f"variance_{concept}"]) for concept in CONCEPTS]
+    draw_score_bars(axes, [row[f"score_{concept}"] for concept in CONCEPTS], row["concept_true"], deviations)
+    axes.set(xlim=(0, 1))
     axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+
+
+def draw_score_bars(
+    axes, scores_C: Sequence[float], true_concept: str, deviations_C: Sequence[float] | None = None
+) -> None:
+    """Draw a bar for each concept from top to bottom, without axis at the left, the true concept's name in bold."""
+    for place, concept in enumerate(CONCEPTS):
+        deviation = None if deviations_C is None else deviations_C[place]
+        look = {"color": CONCEPT_COLOURS[concept], "height": 0.7, "error_kw": {"lw": 0.8}}
+        axes.barh(place, scores_C[place], xerr=deviation, **look)
+        weight = "bold" if concept == true_concept else "normal"
+        axes.text(-0.03, place, concept, ha="right", va="center", fontsize=SMALL_PT, fontweight=weight)
+    axes.set(ylim=(len(CONCEPTS) - 0.4, -0.6), yticks=[])
     axes.spines["left"].set_visible(False)

@@ -1,4 +1,4 @@
-"""Learning curves of kernels and learning rates: accuracy and confidence over iterations, the paper's rows marked."""
+"""Draws accuracy and confidence over iterations by kernel and learning rate, with the paper's rows marked."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLOURS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
-LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # of the learning rates, from the largest on
+LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # The largest learning rate has the first.
 MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
 
 
@@ -24,11 +24,12 @@ def draw_kernel_curves(
     """Draw means over the seeds; a circle is a row of the paper's Table IV.
 
     Args:
-        grid: as :func:`gpca.classifier.kernel_grid.read_grids` returns it.
-        sources: name -> title, in order; those without a grid are left out.
+        grid: The frame that :func:`gpca.classifier.kernel_grid.read_grids` returns.
+        sources: The title of each name, in order; those without a grid are left out.
+        pdf_path, png_path: The two files to write.
 
     Raises:
-        InputError: no grid of these sources.
+        InputError: The grid holds none of these sources.
     """
     shown = [name for name in sources if (grid["source"] == name).any()]
     if not shown:
@@ -61,7 +62,7 @@ def draw_kernel_curves(
             panel.set_xticks(ticks, [f"{tick}" for tick in ticks])
             panel.xaxis.set_minor_locator(NullLocator())
             panel.set_ylim(30, 100)
-        axes[0, column].set_title(_wrapped(sources[source]))
+        axes[0, column].set_title(_in_two_lines(sources[source]))
         axes[-1, column].set_xlabel("iterations")
     for row, label in enumerate(MEASURES.values()):
         axes[row, 0].set_ylabel(label)
@@ -81,5 +82,6 @@ def draw_kernel_curves(
     save_figure(figure, pdf_path, png_path)
 
 
-def _wrapped(title: str) -> str:
+def _in_two_lines(title: str) -> str:
+    """Break a title before its first bracket."""
     return title.replace(" (", "\n(")

@@ -1,11 +1,11 @@
-"""What the uncertainty of learners is worth: risk over coverage, reliability, uncertainty over distance.
+"""Draws what the uncertainty of learners is worth: risk over coverage, reliability, uncertainty over distance.
 
 All take the same arguments and raise the same error:
 
-    learned: as :func:`gpca.shift.metrics.read_learner_predictions` returns it.
-    sources, learners: name -> title, in order; those without predictions are left out.
-    pdf_path, png_path: where the figure is written.
-    InputError: no predictions of these sources and learners.
+    learned: The predictions that :func:`gpca.shift.metrics.read_learner_predictions` returns.
+    sources, learners: The title of each name, in order; those without predictions are left out.
+    pdf_path, png_path: The two files to write.
+    InputError: There are no predictions of these sources and learners.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from gpca.reporting.figures.style import (
 from gpca.shift.metrics import sets_of, wrong
 from gpca.shift.sets import DISTANCES
 
-STYLES = {  # of the learners that are known: colour, line, width; GPC thick, the paper's rivals thinner
+STYLES = {  # A learner has a colour, a line and a width; the GPC is thick, and the paper's rivals are thinner.
     "gpca_paper": (BLUE, (0, (4, 2)), 1.8),
     "gpca": (BLUE, "-", 1.8),
     "learner_forest": (VERMILION, "-", 1.2),
@@ -51,15 +51,15 @@ STYLES = {  # of the learners that are known: colour, line, width; GPC thick, th
     "learner_dirichlet_gp": (PURPLE, "-", 0.9),
 }
 _OTHER = (GREY, "-", 0.9)
-SET_STYLES = {  # set -> title, colour
+SET_STYLES = {  # A set has a title and a colour.
     "in_distribution": ("like the training", GREY),
     "severity": ("severities beyond", ORANGE),
     "source": ("unseen source", BLUE),
     "objects": ("unseen objects", GREEN),
 }
 Titles = Mapping[str, str]
-PANELS_PER_ROW = 4  # panels side by side
-FEWEST = 5  # samples of a bin whose accuracy is drawn
+PANELS_PER_ROW = 4
+FEWEST = 5  # A bin with fewer samples has no point.
 COVERAGES = np.linspace(0.02, 1, 99)
 
 
@@ -102,8 +102,8 @@ def draw_reliability(
 ) -> None:
     """Draw accuracy over confidence, in the bins of the calibration error, and the share of samples in each bin.
 
-    Samples of all sources and seeds together, those like the training's; bins of fewer than `FEWEST` of them have no
-    point. The number in a title is the calibration error of them all.
+    The samples are those like the training's, of all sources and seeds together. Bins of fewer than `FEWEST` of them
+    have no point. The number in a title is the calibration error of them all.
     """
     shown, columns = _known(learned, sources, learners)
     figure, panels = _panels(len(shown), panel_height_in=1.55)
@@ -133,7 +133,7 @@ def draw_reliability(
 def draw_uncertainty_vs_distance(
     learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
 ) -> None:
-    """Draw 1 - largest score over the distance to the training samples, of the first seed of every source.
+    """Draw 1 - largest score over the distance to the training samples, for the first seed of every source.
 
     ρ is the mean over sources, seeds and the three kinds of shift, each with the samples like the training's.
     """

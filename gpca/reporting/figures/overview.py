@@ -1,4 +1,4 @@
-"""Fig. 2 of the paper: GP-CA at a glance, drawn from one registration of the run and what every stage made of it."""
+"""Draws Fig. 2 of the paper, GP-CA at a glance, from one registration of the run and what every stage made of it."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from gpca.reporting.figures.style import (
     save_figure,
     write_title,
 )
+from gpca.reporting.words import in_words
 
-CONCEPT = "pose"  # of the sample shown: before and after ICP differ to the eye
+CONCEPT = "pose"  # The sample shown is of this concept, since before and after ICP differ to the eye.
 CAPTIONS = {"init": "initial", "icp": "aligned"}
 
 
@@ -38,16 +39,18 @@ def draw_overview(
     pdf_path: str | Path,
     png_path: str | Path,
 ) -> None:
-    """Draw the clouds before and after ICP, the embedding, scores ± deviations, BALD among all test samples, and what
-    follows: the action against the concept named, or a question to a person and a classifier trained anew.
+    """Draw what the stages make of one registration, from its clouds to what follows.
+
+    The figure shows the clouds before and after ICP, the embedding, the scores ± their deviations, and BALD among all
+    test samples. What follows is the action against the concept named, or a question to a person and a new training.
 
     Args:
-        registrations_npz, embeddings_npz, predictions_csv: of one source and seed; the sample shown is
-            :meth:`gpca.reporting.figures.shown_sample.Stages.choose`'s of the concept `CONCEPT`.
-        title: of the source.
-        encoder: as the figure names it.
-        treatments: concept -> action of recovery.
-        pdf_path, png_path: the two files to write.
+        registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
+            sample of the concept `CONCEPT` that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns.
+        title: The title of the source.
+        encoder: The name that the figure gives the encoder.
+        treatments: The action of recovery for each concept.
+        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: an unusable file, files of different samples, or a concept without a treatment.
@@ -87,10 +90,9 @@ def draw_overview(
     canvas.box(0.02, 1.08, 1.9, 0.37, "Ask a person for the concept\nof a few such cases", GREY, dashed=True)
     canvas.arrow((1.92, 1.265), (2.22, 1.265), words="retrain")
 
-    write_title(canvas.figure, f"{title}: {sample['object'].replace('_', ' ')}")
+    write_title(canvas.figure, f"{title}: {in_words(sample['object'])}")
     for x_in, colour, words in ((0.06, TARGET_COLOUR, "target"), (0.5, SOURCE_COLOUR, "source")):
-        canvas.axes.plot(x_in, 2.745, "o", color=colour, markersize=3)
-        canvas.text(x_in + 0.06, 2.74, words, ha="left", va="center")
+        canvas.dot(x_in, 2.74, colour, words)
     save_figure(canvas.figure, pdf_path, png_path)
 
 

@@ -1,19 +1,18 @@
-"""Fig. 4 of the paper: online inference (top) and active learning (bottom), drawn from what a run wrote."""
+"""Draws Fig. 4 of the paper, online inference (top) and active learning (bottom), from what a run wrote."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from gpca.active_learning.acquisition import EXPANSION, Pool, bald_kmeans, top
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.active_learning import STYLES, mean_curves
-from gpca.reporting.figures.cloud_views import draw_clouds
+from gpca.reporting.figures.cloud_views import draw_clouds, thinned
 from gpca.reporting.figures.diagram import Canvas
+from gpca.reporting.figures.label_round import Round, next_round
 from gpca.reporting.figures.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
 from gpca.reporting.figures.style import (
     BLACK,
@@ -30,28 +29,12 @@ from gpca.reporting.figures.style import (
     save_figure,
     write_title,
 )
-from gpca.seeds import generator
+from gpca.reporting.words import in_words
 
-CONCEPT = "overlap"  # of the sample shown
-SETTING = "pretrained"  # of the learning curves: the encoder knows all concepts, the classifier all but one
-TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # of their strategies
-THUMBNAILS = 6  # clouds of the pool that are shown
-
-
-@dataclass(frozen=True)
-class Round:
-    """The next round of labels, with the N test samples as the pool.
-
-    Attributes:
-        rows_N: their rows.
-        map_S_2: principal components of all embeddings, fitted on the standardised ones of the training samples.
-        candidates, chosen: places in `rows_N` of the B·K largest BALD and of those B that k-means keeps.
-    """
-
-    rows_N: np.ndarray
-    map_S_2: np.ndarray
-    candidates: np.ndarray
-    chosen: np.ndarray
+CONCEPT = "overlap"  # The sample shown is of this concept.
+SETTING = "pretrained"  # In the learning curves, the encoder knows all concepts and the classifier all but one.
+TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # The figure draws the curves of these strategies.
+THUMBNAILS = 6  # The figure shows this many clouds of the pool.
 
 
 def draw_pipeline(
@@ -68,13 +51,14 @@ def draw_pipeline(
     """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
 
     Args:
-        registrations_npz, embeddings_npz, predictions_csv: of one source and seed; the sample shown is
-            :meth:`gpca.reporting.figures.shown_sample.Stages.choose`'s of the concept `CONCEPT`.
-        curve_files: of that source, as for :func:`gpca.reporting.figures.active_learning.draw_learning_curves`.
-        title: of the source.
-        encoder: as the figure names it.
-        batch: B, labels per round.
-        pdf_path, png_path: the two files to write.
+        registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
+            sample of the concept `CONCEPT` that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns.
+        curve_files: The files of that source, named as for
+            :func:`gpca.reporting.figures.active_learning.draw_learning_curves`.
+        title: The title of the source.
+        encoder: The name that the figure gives the encoder.
+        batch: The number B of labels per round.
+        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
@@ -94,37 +78,16 @@ def draw_pipeline(
     canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
     canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
-    write_title(canvas.figure, f"{title}: {stages.predictions['object'][row].replace('_', ' ')}")
-    for x_in, colour, words in (
-        (6.2, TARGET_COLOUR, r"target $\mathcal{Q}$"),
-        (6.68, SOURCE_COLOUR, r"source $\mathcal{P}$"),
-    ):
-        canvas.axes.plot(x_in - 0.05, 3.405, "o", color=colour, markersize=3)
-        canvas.text(x_in, 3.4, words, ha="left", va="center")
+    write_title(canvas.figure, f"{title}: {in_words(stages.predictions['object'][row])}")
+    canvas.dot(6.15, 3.4, TARGET_COLOUR, r"target $\mathcal{Q}$", gap_in=0.05)
+    canvas.dot(6.63, 3.4, SOURCE_COLOUR, r"source $\mathcal{P}$", gap_in=0.05)
     save_figure(canvas.figure, pdf_path, png_path)
 
 
-def next_round(stages: Stages, batch: int) -> Round:
-    """Let the paper's strategy choose what a person would be asked about next among the test samples."""
-    from sklearn.decomposition import PCA
-    from sklearn.preprocessing import StandardScaler
-
-    train, rows_N = stages.registrations.rows("train"), stages.registrations.rows("test")
-    if not len(train):
-        raise InputError("registrations", "hold no training samples", "raise registrations.train")
-    scaler = StandardScaler().fit(stages.h_S_d[train])  # as the classifier does it
-    h_S_d = scaler.transform(stages.h_S_d)
-    map_S_2 = PCA(2, svd_solver="full").fit(h_S_d[train]).transform(h_S_d)
-    of_pool = stages.predictions.iloc[rows_N]
-    scores_N_C = of_pool[[f"score_{concept}" for concept in CONCEPTS]].to_numpy()
-    bald_N = of_pool["bald"].to_numpy()
-    pool = Pool(h_S_d[rows_N], scores_N_C, bald_N, h_S_d[train], of_pool["concept_true"].to_numpy())
-    chosen = bald_kmeans(pool, min(batch, len(rows_N)), generator("fig4_pipeline"))
-    return Round(rows_N, map_S_2, top(bald_N, batch * EXPANSION), chosen)
-
-
 def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, asked: Round) -> None:
-    sample, middle_in, captions_in = stages.predictions.iloc[row], 2.66, 2.1
+    sample = stages.predictions.iloc[row]
+    middle_in = 2.66
+    captions_in = 2.1
     canvas.text(0.1, 3.27, "Online inference", ha="left", va="top", fontweight="bold")
     seen = stages.seen(row)
     corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
@@ -166,15 +129,16 @@ def _draw_labelled(axes, stages: Stages, row: int, asked: Round) -> None:
 
 def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: Mapping, batch: int) -> None:
     """Draw pool, score, diversify, annotate, retrain from right to left: the way back of the loop."""
-    heads_in, captions_in, middle_in = 1.58, 0.08, 0.86
+    heads_in = 1.58
+    captions_in = 0.08
+    middle_in = 0.86
     canvas.text(0.1, heads_in, "Active learning", ha="left", va="top", fontweight="bold")
 
     canvas.text(6.4, heads_in, r"Unlabelled pool $\mathcal{D}_U$", va="top")
     canvas.text(6.4, captions_in, f"{len(asked.rows_N)} test samples", va="bottom")
-    thumbnails = np.linspace(0, len(asked.rows_N) - 1, min(THUMBNAILS, len(asked.rows_N))).astype(int)
-    for place, i in enumerate(thumbnails):
+    for place, of_pool in enumerate(thinned(asked.rows_N, THUMBNAILS)):
         corner = (5.9 + 0.36 * (place % 3), 0.86 - 0.56 * (place // 3))
-        _draw_thumbnail(canvas.panel(*corner, 0.34, 0.5), stages, asked.rows_N[i])
+        _draw_thumbnail(canvas.panel(*corner, 0.34, 0.5), stages, of_pool)
     canvas.arrow((5.84, middle_in), (5.62, middle_in))
 
     canvas.text(5.04, heads_in, "Score: BALD", va="top")
@@ -219,7 +183,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: 
                 curves[name]["labels"], curves[name]["mean"], line, color=colour, linewidth=width, label=TITLES[name]
             )
     low, high = panel.get_ylim()
-    panel.set_ylim(bottom=low - 0.5 * (high - low))  # room for the legend
+    panel.set_ylim(bottom=low - 0.5 * (high - low))  # The legend needs room.
     panel.locator_params(axis="x", nbins=4, integer=True)
     panel.set_ylabel("accuracy (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_xlabel("labels", fontsize=SMALL_PT, labelpad=0)

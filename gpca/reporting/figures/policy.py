@@ -1,4 +1,4 @@
-"""Fig. 6 of the paper: from concept scores and their uncertainty to one of four branches, with the policy's numbers."""
+"""Draws Fig. 6 of the paper: from concept scores and their uncertainty to one of four branches, with their limits."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.objects.title import STAND_IN
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, save_figure, write_title
+from gpca.reporting.words import in_words
 
 WORDS = {
     "reinitialise": "Reinitialise ICP\nbroader search over orientations",
@@ -40,14 +42,15 @@ def read_policy(path: str | Path) -> dict:
 def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
     """Draw the mapping of one policy: what it reads, the four branches in the order of asking, and the way back."""
     policy = read_policy(policy_json)
-    limits, treatments = policy["thresholds"], policy["treatments"]
+    limits = policy["thresholds"]
+    treatments = policy["treatments"]
     canvas = Canvas(TEXT_WIDTH_IN, 2.45)
-    write_title(canvas.figure, "Thresholds of this run, on virtual tables (procedural stand-in)")
+    write_title(canvas.figure, f"Thresholds of this run, on virtual tables ({STAND_IN})")
     words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"
     canvas.box(0.04, 0.86, 1.3, 0.66, words)
     branches = [(_queue_condition(limits), "Abstain\nqueue for labelling, retrain", GREY)]
     branches += [
-        (ASKED.get(concept, concept), WORDS.get(action, action.replace("_", " ")), CONCEPT_COLOURS[concept])
+        (ASKED.get(concept, concept), WORDS.get(action, in_words(action)), CONCEPT_COLOURS[concept])
         for concept, action in sorted(treatments.items(), key=lambda item: ("pose", "overlap", "noise").index(item[0]))
     ]
     middles_in = [1.99 - 0.53 * place for place in range(len(branches))]
@@ -70,7 +73,7 @@ def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str
 
 def short_action(action: str) -> str:
     """Return the words for an action of recovery, its purpose left out."""
-    return WORDS.get(action, action.replace("_", " ")).splitlines()[0].rstrip(",")
+    return WORDS.get(action, in_words(action)).splitlines()[0].rstrip(",")
 
 
 def _queue_condition(limits: Mapping[str, float]) -> str:

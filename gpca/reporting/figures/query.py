@@ -1,4 +1,4 @@
-"""The registration that a person is asked about: the aligned cloud over its reference, from three sides."""
+"""Draws the registration that a person is asked about: the aligned cloud over its reference, from three sides."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.reporting.figures.cloud_views import thinned
 from gpca.reporting.figures.style import SOURCE_COLOUR, TARGET_COLOUR, TEXT_WIDTH_IN, save_png, use_style, write_title
 
-_POINTS = 1500  # of each cloud; more hide one another
+_POINTS = 1500  # At most this many points of each cloud are drawn, as more hide one another.
 
 
 def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:
@@ -17,8 +18,8 @@ def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_pa
     import matplotlib.pyplot as plt
 
     clouds = [
-        (_thinned(target_Q_3), TARGET_COLOUR, "reference"),
-        (_thinned(cloud_P_3), SOURCE_COLOUR, "aligned source"),
+        (thinned(target_Q_3, _POINTS), TARGET_COLOUR, "reference"),
+        (thinned(cloud_P_3, _POINTS), SOURCE_COLOUR, "aligned source"),
     ]
     everything = np.concatenate([cloud for cloud, *_ in clouds])
     centre = (everything.min(axis=0) + everything.max(axis=0)) / 2
@@ -38,7 +39,3 @@ def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_pa
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncol=2, markerscale=5)
     save_png(figure, png_path)
-
-
-def _thinned(cloud_P_3: np.ndarray) -> np.ndarray:
-    return cloud_P_3[np.linspace(0, len(cloud_P_3) - 1, min(_POINTS, len(cloud_P_3))).astype(int)]

@@ -1,4 +1,4 @@
-"""What GP-CA takes each concept for on depth frames, by backbone, with the numbers of samples."""
+"""Draws what GP-CA takes each concept for on depth frames, by backbone, with the numbers of samples."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.attribution.metrics import read_metrics
 from gpca.errors import InputError
-from gpca.reporting.figures.confusions import pooled_confusions
+from gpca.reporting.figures.confusions import counts_and_shares, pooled_confusions
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
 from gpca.reporting.tables.backbones import encoder_title
 
@@ -30,14 +30,14 @@ def draw_real_world_confusions(
     import matplotlib.pyplot as plt
 
     panel_in = min(1.5, (TEXT_WIDTH_IN - 0.6) / len(shown) - 0.12)
-    width_in, height_in = max(3.2, 0.6 + len(shown) * (panel_in + 0.12)), panel_in + 0.72
+    width_in = max(3.2, 0.6 + len(shown) * (panel_in + 0.12))
+    height_in = panel_in + 0.72
     figure = plt.figure(figsize=(width_in, height_in))
     for number, (method, counts) in enumerate(shown.items()):
         left_in = 0.6 + number * (panel_in + 0.12)
         axes = figure.add_axes((left_in / width_in, 0.32 / height_in, panel_in / width_in, panel_in / height_in))
         concepts = list(counts.columns[:-1])
-        counts_C_C = counts.reindex(concepts).to_numpy(float)[:, :-1]
-        shares_C_C = counts_C_C / counts.reindex(concepts).to_numpy(float).sum(axis=1, keepdims=True)
+        counts_C_C, shares_C_C = counts_and_shares(counts)
         axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues(), vmin=0, vmax=1)
         for (row, column), share in np.ndenumerate(shares_C_C):
             if np.isfinite(share):

@@ -1,4 +1,4 @@
-"""Fig. 5 of the paper: from a depth frame to an attribution, in four panels."""
+"""Draws Fig. 5 of the paper: from a depth frame to an attribution, in four panels."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
+from gpca.reporting.figures.cloud_views import legend_of_clouds
 from gpca.reporting.figures.concepts import source_before_icp
 from gpca.reporting.figures.frame_views import draw_scores, read_samples
 from gpca.reporting.figures.style import (
@@ -28,12 +29,13 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
+from gpca.reporting.words import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
 
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
-AXIS_COLOURS = (VERMILION, GREEN, SKY_BLUE)  # x, y, z, as robotics draws them: red, green, blue
+AXIS_COLOURS = (VERMILION, GREEN, SKY_BLUE)  # Robotics draws x, y and z in red, green and blue.
 
 
 def draw_real_world_example(
@@ -49,17 +51,19 @@ def draw_real_world_example(
     """Draw (a) the frame with the object's region, (b) its points at the initial pose over the model as the camera
     sees both, (c) after ICP, with the estimated axes, and (d) the concept scores with their deviations.
 
-    Shown is the test sample that an occluder covers (else any overlap sample) and whose right attribution has the
-    median score of such samples.
+    The figure shows a test sample that an occluder covers (else any overlap sample) and that is attributed rightly:
+    the one with the median score of such samples.
 
     Raises:
         InputError: an unusable file, or no test sample of the concept overlap.
     """
-    instances, objects = Instances.load(instances_npz), ObjectClouds.load(objects_npz)
+    instances = Instances.load(instances_npz)
+    objects = ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)
     samples = read_samples(poses_csv, predictions_csv)
     row = choose_sample(samples, predictions_csv)
-    sample, i = samples.iloc[row], int(samples["instance"].iloc[row])
+    sample = samples.iloc[row]
+    i = int(sample["instance"])
     camera = _Camera(instances, i, registrations, row)
     use_style()
     import matplotlib.pyplot as plt
@@ -109,12 +113,8 @@ def draw_real_world_example(
         if panel is not panels[3]:
             panel.set_axis_off()
     lost = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
-    write_title(figure, f"{title}: {str(registrations.object_name[row]).replace('_', ' ')}, {lost}")
-    handles = [
-        plt.Line2D([], [], linestyle="", marker="o", markersize=3, color=colour, label=label)
-        for colour, label in ((TARGET_COLOUR, "model"), (SOURCE_COLOUR, "measured"))
-    ]
-    figure.legend(handles=handles, loc="upper right", ncols=2, borderaxespad=0.1, handletextpad=0.1, columnspacing=1)
+    write_title(figure, f"{title}: {in_words(registrations.object_name[row])}, {lost}")
+    legend_of_clouds(figure, "model", "measured", gap=0.1)
     save_figure(figure, pdf_path, png_path)
 
 
@@ -123,18 +123,21 @@ def choose_sample(samples: pd.DataFrame, path: str | Path) -> int:
     overlap = samples[(samples["split"] == "test") & (samples["concept_true"] == "overlap")]
     if overlap.empty:
         raise InputError(path, "holds no test sample of overlap", "raise real_world.test")
-    for narrower in (overlap["lost_to"] == OCCLUDER, overlap["concept_predicted"] == "overlap"):
-        overlap = overlap[narrower] if (narrower := narrower.reindex(overlap.index)).any() else overlap
+    for column, wanted in (("lost_to", OCCLUDER), ("concept_predicted", "overlap")):
+        narrower = overlap[overlap[column] == wanted]
+        overlap = overlap if narrower.empty else narrower
     ranked = overlap.sort_values(["score_overlap", "sample"])
     return int(ranked.index[len(ranked) // 2])
 
 
 class _Camera:
-    """The camera of an instance, and where a sample's target frame is in it under each estimate."""
+    """Knows the camera of an instance, and where a sample's target frame is in it under each estimate."""
 
     def __init__(self, instances: Instances, i: int, registrations: Registrations, row: int) -> None:
-        self._camera_3_3, self._T_camera_init = instances.camera_3_3[i], instances.T_camera_object_init[i]
-        self._registrations, self._row = registrations, row
+        self._camera_3_3 = instances.camera_3_3[i]
+        self._T_camera_init = instances.T_camera_object_init[i]
+        self._registrations = registrations
+        self._row = row
 
     def T_camera_target(self, which: str) -> np.ndarray:
         """Return the pose of the target's frame that the estimate ``init`` or ``icp`` claims.

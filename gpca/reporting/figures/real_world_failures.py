@@ -1,4 +1,4 @@
-"""The ten most confident mistakes on depth frames: cloud over model, and what GP-CA said."""
+"""Draws the ten most confident mistakes on depth frames: cloud over model, and what GP-CA said."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.frame_views import draw_over_model, draw_scores, read_samples
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, save_figure, use_style, write_title
+from gpca.reporting.words import in_words
 
-SHOWN, PANELS_PER_ROW = 10, 5
+SHOWN = 10
+PANELS_PER_ROW = 5
 
 
 def draw_real_world_failures(
@@ -28,7 +30,7 @@ def draw_real_world_failures(
 ) -> None:
     """Draw the test samples of all seeds that were attributed wrongly with the highest score, one of each instance.
 
-    Files are given seed by seed in one order.
+    The three lists of files run through the seeds in the same order.
 
     Raises:
         InputError: an unusable file, or files of different samples.
@@ -39,15 +41,18 @@ def draw_real_world_failures(
     import matplotlib.pyplot as plt
 
     rows = max(1, -(-min(SHOWN, len(mistakes)) // PANELS_PER_ROW))
-    cell_in, head_in = TEXT_WIDTH_IN / PANELS_PER_ROW, 0.22
+    cell_in = TEXT_WIDTH_IN / PANELS_PER_ROW
+    head_in = 0.22
     cell_height_in = 2.1
     height_in = head_in + rows * cell_height_in
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
     shown = list(mistakes.head(SHOWN).iterrows())
     loaded = {file: Registrations.load(registrations_npz[file]) for file in sorted({m["file"] for _, m in shown})}
     for place, (_, mistake) in enumerate(shown):
-        registrations, row = loaded[mistake["file"]], int(mistake["row"])
-        left_in, top_in = place % PANELS_PER_ROW * cell_in, head_in + place // PANELS_PER_ROW * cell_height_in
+        registrations = loaded[mistake["file"]]
+        row = int(mistake["row"])
+        left_in = place % PANELS_PER_ROW * cell_in
+        top_in = head_in + place // PANELS_PER_ROW * cell_height_in
 
         def panel(x_in, y_in, width_in, panel_height_in, left_in=left_in, top_in=top_in):
             bottom_in = height_in - top_in - y_in - panel_height_in
@@ -58,10 +63,11 @@ def draw_real_world_failures(
         model = objects.points(index)[:2048] / objects.diameters_m[index]
         draw_over_model(panel(0.06, 0.42, cell_in - 0.12, 0.95), model, registrations.cloud(row))
         draw_scores(panel(0.42, 1.45, cell_in - 0.58, 0.38), mistake)
-        name = str(registrations.object_name[row]).replace("_", " ")
+        name = in_words(registrations.object_name[row])
         taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
         words = f"{name}\n{taken}\npose {100 * mistake['icp_error']:.0f} % $d$ off"
-        x, y = (left_in + cell_in / 2) / TEXT_WIDTH_IN, 1 - (top_in + 0.02) / height_in
+        x = (left_in + cell_in / 2) / TEXT_WIDTH_IN
+        y = 1 - (top_in + 0.02) / height_in
         figure.text(x, y, words, ha="center", va="top", fontsize=SMALL_PT, linespacing=1.15)
     none = "" if shown else ": no mistake in any seed"
     write_title(figure, f"{title}{none}")

@@ -1,4 +1,4 @@
-"""Fig. 1 of the paper: occluded, attributed to overlap, seen from a new viewpoint, solved; one failure of the run."""
+"""Draws Fig. 1 of the paper: one failure of the run, attributed to a concept, seen from a new viewpoint, and solved."""
 
 from __future__ import annotations
 
@@ -9,17 +9,11 @@ import numpy as np
 from gpca.alignment.pose_error import CORRECT
 from gpca.alignment.rigid import transform
 from gpca.files import load_arrays
+from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.style import (
-    CONCEPT_COLOURS,
-    SMALL_PT,
-    TARGET_COLOUR,
-    TEXT_WIDTH_IN,
-    YELLOW,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.frame_views import draw_score_bars
+from gpca.reporting.figures.style import TARGET_COLOUR, TEXT_WIDTH_IN, YELLOW, save_figure, use_style, write_title
+from gpca.reporting.words import in_words
 
 SHAPES: dict[str, tuple[int | str, ...]] = {
     "camera_3_3": (3, 3),
@@ -36,8 +30,9 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
 
 
 def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
-    """Draw (a) the first view with the model where ICP put it, (b) the concept scores, (c) the new view, (d) the new
-    view with the model where ICP put it then.
+    """Draw (a) the first view with the model where ICP put it, (b) the concept scores, (c, d) the new view.
+
+    The last panel shows the new view once more, with the model where ICP put it then.
 
     Raises:
         InputError: an unusable file.
@@ -53,7 +48,7 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
         panel.imshow(found[f"image_{view}"], alpha=0.75 if posed else 1.0)
         if posed:
             seen = transform(found[f"T_camera_object_{view}"], found["model_m"]) @ found["camera_3_3"].T
-            ahead = seen[:, 2] > 0.05  # metres before the camera
+            ahead = seen[:, 2] > 0.05  # Points nearer to the camera than this, in metres, are left out.
             u, v = (seen[ahead, :2] / seen[ahead, 2:]).T
             panel.scatter(u, v, s=0.6, color=TARGET_COLOUR, linewidths=0)
         else:
@@ -62,13 +57,9 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
         panel.set(xlim=(0, width - 1), ylim=(height - 1, 0))
         panel.set_axis_off()
     shown = found["scores"]
-    for place, concept in enumerate(CONCEPTS):
-        scores.barh(place, shown[place], color=CONCEPT_COLOURS[concept], height=0.7)
-        weight = "bold" if concept == str(found["cause"]) else "normal"
-        scores.text(-0.03, place, concept, ha="right", va="center", fontsize=SMALL_PT, fontweight=weight)
-    scores.set(xlim=(min(0, shown.min()), max(1, shown.max())), ylim=(len(CONCEPTS) - 0.4, -0.6), yticks=[])
+    draw_score_bars(scores, shown.tolist(), str(found["cause"]))
+    scores.set(xlim=(min(0, shown.min()), max(1, shown.max())))
     scores.set_xlabel("score", labelpad=1)
-    scores.spines["left"].set_visible(False)
     before, after = (100 * error for error in found["errors"])
     solved = "solved" if after <= 100 * CORRECT else "not solved"
     captions = (
@@ -79,13 +70,11 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
     )
     for centre, caption in zip((0.1255, 0.395, 0.6195, 0.8735), captions, strict=True):
         figure.text(centre, 0.02, caption, ha="center", va="bottom")
-    name = str(found["object"]).replace("_", " ")
-    write_title(
-        figure, f"Tables of the virtual depth camera (procedural stand-in): {name}; dots: model where ICP put it"
-    )
+    name = in_words(found["object"])
+    write_title(figure, f"Tables of the virtual depth camera ({STAND_IN}): {name}; dots: model where ICP put it")
     save_figure(figure, pdf_path, png_path)
 
 
 def _instead(action: str) -> str:
     """Return what the policy did where it did not change the viewpoint, as the panels show it."""
-    return "" if action == "new_view" else f" ({action.replace('_', ' ')})"
+    return "" if action == "new_view" else f" ({in_words(action)})"

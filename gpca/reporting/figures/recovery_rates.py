@@ -1,4 +1,4 @@
-"""Recovery rates: the share of failures that each policy recovers within 1, 2, … actions."""
+"""Draws recovery rates: the share of failures that each policy recovers within 1, 2, … actions."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
+from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import pool_share, wilson_interval
 from gpca.reporting.figures.style import (
@@ -21,11 +22,12 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SHADES = (SKY_BLUE, BLUE, BLACK)  # darker with every action
+SHADES = (SKY_BLUE, BLUE, BLACK)  # The shade grows darker with every action.
 
 
 def draw_recovery_rates(
@@ -34,8 +36,10 @@ def draw_recovery_rates(
     """Draw (left) the rate within 1 to `budget` actions with its Wilson interval, (right) that within all by cause.
 
     Args:
-        metrics: tidy, as :func:`gpca.recovery.metrics.collect_recovery` makes them.
-        policies: name -> title, from top to bottom; those without numbers are left out.
+        metrics: The tidy metrics that :func:`gpca.recovery.metrics.collect_recovery` makes.
+        policies: The title of each name, from top to bottom; those without numbers are left out.
+        budget: The number of actions that a policy may take.
+        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: the metrics hold none of these.
@@ -50,8 +54,7 @@ def draw_recovery_rates(
     figure, axes = plt.subplots(1, 2, figsize=(TEXT_WIDTH_IN, height_in), sharey=True, width_ratios=(1.5, 1))
     for k in range(1, budget + 1):
         offset = 0.22 * (k - (budget + 1) / 2)
-        label = f"within {k} action{'s' * (k > 1)}"
-        look = {"color": SHADES[(k - 1) % len(SHADES)], "marker": "o", "label": label}
+        look = {"color": SHADES[(k - 1) % len(SHADES)], "marker": "o", "label": f"within {plural(k, 'action')}"}
         _draw(axes[0], metrics, shown, f"recovered_within_{k}", "all", offset, look)
     for n, cause in enumerate(CONCEPTS):
         look = {"color": CONCEPT_COLOURS[cause], "marker": CONCEPT_MARKERS[cause], "label": cause}
@@ -67,7 +70,7 @@ def draw_recovery_rates(
         panel.legend(
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.2, columnspacing=1.0, borderpad=0
         )
-    title = "Failures on tables of the virtual depth camera (procedural stand-in)"
+    title = f"Failures on tables of the virtual depth camera ({STAND_IN})"
     _, episodes = pool_share(metrics, shown[0], "recovered_within_1") or (nan, 0)
     write_title(figure, f"{title}: {episodes} failures; right: within {budget} actions, by cause")
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.16 / height_in), pad=0.4)

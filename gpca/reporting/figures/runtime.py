@@ -1,4 +1,4 @@
-"""Where the time of one explanation goes, here and in the paper: one stacked bar each, on a scale of its own."""
+"""Draws where the time of one explanation goes, here and in the paper: one stacked bar each, on its own scale."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ def draw_runtime(
     """Draw the stages of one explanation as stacked bars.
 
     Args:
-        runtime: as :func:`gpca.model.runtime_file.read_runtime` reads it.
-        title: of the objects that were registered.
-        numbers: that the paper prints.
+        runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.
+        title: The title of the objects that were registered.
+        numbers: The numbers that the paper prints.
+        pdf_path, png_path: The two files to write.
 
     Raises:
-        InputError: a stage was not measured.
+        InputError: A stage was not measured.
     """
     bars = _bars(runtime, numbers)
     use_style()

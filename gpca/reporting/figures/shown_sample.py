@@ -1,4 +1,4 @@
-"""One registration of a run with all that the stages made of it: what the figures of the method are drawn from."""
+"""Reads one registration of a run with all that the stages made of it, which the figures of the method draw."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stages:
-    """S registrations of one source and seed, their embeddings h (S, d) and what GP-CA said of them, row by row."""
+    """Holds S registrations of one source and seed, their embeddings h (S, d), and what GP-CA said of each."""
 
     registrations: Registrations
     h_S_d: np.ndarray
@@ -55,9 +55,9 @@ class Stages:
     def choose(self, concept: str, path: str | Path) -> int:
         """Return the row that is shown, a test sample of the concept that is named right after a poor fit.
 
-        Of those named right (of all, where none is), the half that ICP fits worst is kept, since an explanation is
-        asked for when a registration looks bad; of these the one with the median score of the concept. InputError,
-        naming `path`, where there is no test sample of it.
+        The method keeps the half that ICP fits worst of the samples named right (of all, where none is), since people
+        ask for an explanation when a registration looks bad. It returns the one of these with the median score of the
+        concept, or raises an InputError that names `path` where there is no test sample of the concept.
         """
         test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
         if test.empty:
@@ -77,7 +77,7 @@ class Stages:
     def seen(self, row: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Return the clouds before (``init``) and after ICP (``icp``) in the axes of the view that shows most.
 
-        Of the views that show the target widest, the one in which the clouds before ICP differ most from those after.
+        It is that of the views that show the target widest in which ICP moves the source most.
         """
         pairs = {which: self.clouds(row, which) for which in ("init", "icp")}
         target, source = pairs["icp"]

@@ -1,4 +1,4 @@
-"""One look for every figure of the suite, and one way to write it: the same drawing gives the same bytes."""
+"""Gives every figure of the suite one look, and writes it in one way: the same drawing gives the same bytes."""
 
 from __future__ import annotations
 
@@ -7,26 +7,34 @@ from pathlib import Path
 from gpca.files import whole_file
 
 MATPLOTLIBRC = str(Path(__file__).with_name("matplotlibrc"))
-COLUMN_WIDTH_IN = 3.5  # IEEE two-column paper, one column
-TEXT_WIDTH_IN = 7.16  # both columns
+COLUMN_WIDTH_IN = 3.5  # One column of an IEEE paper is this wide.
+TEXT_WIDTH_IN = 7.16  # Both columns are this wide.
 
-# Okabe and Ito, "Color Universal Design", 2008: told apart under every common colour blindness.
-BLACK, ORANGE, SKY_BLUE, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+# Okabe and Ito chose these colours ("Color Universal Design", 2008), which no common colour blindness confuses.
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY_BLUE = "#56B4E9"
+GREEN = "#009E73"
+YELLOW = "#F0E442"
+BLUE = "#0072B2"
+VERMILION = "#D55E00"
+PURPLE = "#CC79A7"
 PALETTE = (BLUE, VERMILION, GREEN, ORANGE, SKY_BLUE, PURPLE, YELLOW, BLACK)
-GREY, LIGHT_GREY = "#666666", "#CCCCCC"  # of lines, boxes and what is not named; of what lies behind
+GREY = "#666666"  # Lines, boxes and what has no name of its own are grey.
+LIGHT_GREY = "#CCCCCC"  # What lies behind is light grey.
 
-# One colour for one thing in every figure. Concepts have a marker too, which survives a print in grey.
-TARGET_COLOUR, SOURCE_COLOUR = VERMILION, BLUE
+# One thing has one colour in every figure. Concepts have a marker too, which survives a print in grey.
+TARGET_COLOUR = VERMILION
+SOURCE_COLOUR = BLUE
 CONCEPT_COLOURS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
 CONCEPT_MARKERS = {"noise": "o", "pose": "s", "overlap": "^"}
-SMALL_PT = 7  # the least size of letters
+SMALL_PT = 7  # No letters are smaller.
 
 
 def use_style() -> None:
     """Set matplotlib to the suite's style, the file `MATPLOTLIBRC`, drawn by Agg.
 
-    Starts from matplotlib's own defaults, so that a user's matplotlibrc cannot change a figure.
+    It starts from matplotlib's own defaults, so that a user's matplotlibrc cannot change a figure.
     """
     import matplotlib
 

@@ -1,1 +1,1 @@
-"""The page of a run, index.html."""
+"""Writes the page of a run, index.html."""

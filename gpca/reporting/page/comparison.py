@@ -1,4 +1,4 @@
-"""The comparison as the page shows it: numbers with the digits that the paper prints, verdicts with a tone."""
+"""Words the comparison for the page: numbers with the digits that the paper prints, verdicts with a tone."""
 
 from __future__ import annotations
 
@@ -11,10 +11,21 @@ from gpca.comparison.verdicts import CLOSE, NOT_REPRODUCED, REPRODUCED
 from gpca.errors import InputError
 from gpca.files import read_csv
 
-TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # other verdicts judge nothing
+TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # Other verdicts judge nothing.
 _COLUMNS = (
-    *("table", "row", "column", "unit", "published", "decimals", "reproduced", "ci_low", "ci_high", "n"),
-    *("difference", "verdict", "reason"),
+    "table",
+    "row",
+    "column",
+    "unit",
+    "published",
+    "decimals",
+    "reproduced",
+    "ci_low",
+    "ci_high",
+    "n",
+    "difference",
+    "verdict",
+    "reason",
 )
 _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
 
@@ -40,15 +51,17 @@ def page_comparison(path: str | Path) -> dict | None:
 def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
     """Return the entries of a row as they are printed; the texts stay as they are."""
     printed = {name: _rounded(path, row, name) for name in _NUMBERS}
-    upper, deviation = (printed[name] for name in ("upper", "deviation"))
-    at_least = row.get("at_least", "").lower() == "true"
+    published = printed["published"]
+    if printed["upper"]:
+        published += f" to {printed['upper']}"
+    if printed["deviation"]:
+        published += f" ± {printed['deviation']}"
+    bound = "> " if row.get("at_least", "").lower() == "true" else ""
     return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict", "reason")} | {
         "tone": TONES.get(row["verdict"], ""),
         "objects": ", ".join(filter(None, (row.get("objects", ""), row.get("hardware", "")))),
-        "published": printed["published"]
-        + (f" to {upper}" if upper else "")
-        + (f" ± {deviation}" if deviation else ""),
-        "reproduced": "> " * at_least + printed["reproduced"],
+        "published": published,
+        "reproduced": bound + printed["reproduced"],
         "interval": f"[{printed['ci_low']}, {printed['ci_high']}]" if printed["ci_low"] and printed["ci_high"] else "",
         "difference": printed["difference"],
         "factor": f"× {_number(path, row, 'factor'):.2g}" if row.get("factor") else "",
@@ -60,7 +73,7 @@ def _rounded(path: str | Path, row: Mapping[str, str], name: str) -> str:
     if row.get(name, "") in ("", "nan"):
         return ""
     value = _number(path, row, name)
-    decimals = max(0, _number(path, row, "decimals", int))  # below 0 for what is printed in round tens
+    decimals = max(0, _number(path, row, "decimals", int))  # Numbers printed in round tens have fewer than 0.
     return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"
 
 

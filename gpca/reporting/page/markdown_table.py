@@ -14,7 +14,7 @@ from gpca.errors import InputError
 
 @dataclass(frozen=True)
 class ShownCell:
-    """A cell as it is printed; the best of those compared are bold."""
+    """Holds a cell as it is printed; the best of those compared are bold."""
 
     text: str
     bold: bool
@@ -22,14 +22,14 @@ class ShownCell:
 
 @dataclass(frozen=True)
 class ShownTable:
-    """A table as it is printed.
+    """Holds a table as it is printed.
 
     Attributes:
-        caption: the line above it.
-        heads: of the columns.
-        label_columns: how many columns, from the left, name the rows; the others hold numbers.
-        rows: of cells.
-        footnotes: the paragraphs below it.
+        caption: The line above it.
+        heads: The heads of the columns.
+        label_columns: The number of columns, from the left, that name the rows; the others hold numbers.
+        rows: The rows of cells.
+        footnotes: The paragraphs below it.
     """
 
     caption: str

@@ -1,4 +1,4 @@
-"""A run as one plain web page: the comparison, every table and figure, registrations in 3-D; it works from disk."""
+"""Writes a run as one plain web page that works from disk: comparison, tables, figures, registrations in 3-D."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gpca.reporting.page.markdown_table import read_markdown_table
 from gpca.reporting.page.samples import POINTS, RULE, page_samples
 
 TEMPLATES = Path(__file__).parent / "templates"
-_CSS_PIXELS = 130 / 300  # of a pixel of a figure, which has 300 in an inch: a little larger than in print
+_CSS_PIXELS = 130 / 300  # A figure's pixel, of 300 in an inch, takes so many: a little larger than in print.
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,16 @@ class Shown:
 
 @dataclass(frozen=True)
 class Run:
-    """What the page says of a run besides its results.
+    """Holds what the page says of a run besides its results.
 
     Attributes:
-        name: of the run.
-        seeds: of its repeats.
-        sources: name -> ``{"title": str, "stand_in": bool}``.
-        results: its tables and figures, in order.
-        samples: source -> files of registrations and of GP-CA's predictions on them.
-        config: the whole configuration.
-        command: that makes what is missing.
+        name: The name of the run.
+        seeds: The seeds of its repeats.
+        sources: The ``{"title": str, "stand_in": bool}`` of each name.
+        results: Its tables and figures, in order.
+        samples: The files of registrations, and of GP-CA's predictions on them, of each source.
+        config: The whole configuration.
+        command: The command that makes what is missing.
     """
 
     name: str
@@ -59,11 +59,11 @@ def write_page(folder: str | Path, run: Run) -> None:
     The comparison is shown where the folder has a ``comparison.csv``.
 
     Args:
-        folder: ``results/{run}``.
-        run: what is shown.
+        folder: The folder ``results/{run}``.
+        run: The run that is shown.
 
     Raises:
-        InputError: a file is missing (the line names all that are, and how to make them) or unusable.
+        InputError: A file is missing (the line names all that are, and how to make them) or unusable.
     """
     from plotly.offline import get_plotlyjs
 
@@ -116,16 +116,17 @@ def require_complete(folder: Path, run: Run) -> None:
 
 
 def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
-    """Return what the records beside files say: kind of fact -> its values, and of how many files each holds."""
+    """Return the values that the records beside files give for each kind of fact, with the number of files of each."""
     facts: dict[str, Counter] = {}
     for path in files:
         record_path = path.with_name(path.name + ".provenance.json")
         try:
             record = json.loads(record_path.read_text(encoding="utf-8"))
-            code, libraries = record["code"], record["libraries"]
+            code = record["code"]
+            libraries = record["libraries"]
+            commit = code["commit"] or "outside a git checkout"
             values = {
-                "Code": (code["commit"] or "outside a git checkout")
-                + " with uncommitted changes" * bool(code["dirty"]),
+                "Code": f"{commit} with uncommitted changes" if code["dirty"] else commit,
                 "Config (SHA-256)": record["config_sha256"] or "none",
                 "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],
                 "Device": record["device"],

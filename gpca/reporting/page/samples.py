@@ -1,4 +1,4 @@
-"""The registrations that the page shows in 3-D: which ones, how their clouds lie, and what GP-CA says of them."""
+"""Picks the registrations that the page shows in 3-D, and says how their clouds lie and what GP-CA says of them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.cloud_views import thinned
 
 if TYPE_CHECKING:
     import pandas as pd
 
-OF_EACH_CONCEPT = 2  # samples of a source
-POINTS = 600  # of a cloud
+OF_EACH_CONCEPT = 2  # The page shows this many samples of each concept in every source.
+POINTS = 600  # It shows at most this many points of a cloud.
 RULE = (
     f"Of every source, the first {OF_EACH_CONCEPT} test samples of each concept in the run's first seed, in the order "
     "of their numbers, right or wrong."
 )
-_STEPS_PER_DIAMETER = 1000  # coordinates are whole thousandths of the diameter
+_STEPS_PER_DIAMETER = 1000  # Coordinates are whole thousandths of the diameter.
 
 
 def page_samples(registrations_npz: str | Path, predictions_csv: str | Path, source: Mapping) -> list[dict]:
@@ -34,8 +35,8 @@ def page_samples(registrations_npz: str | Path, predictions_csv: str | Path, sou
     to its initial and to its true pose; object, concept, severity, scores, standard deviations, fitness.
 
     Args:
-        registrations_npz, predictions_csv: of one source and seed.
-        source: its ``title`` and ``stand_in``.
+        registrations_npz, predictions_csv: The files of one source and seed.
+        source: The ``title`` of the source, and whether it is a ``stand_in``.
 
     Raises:
         InputError: an unusable file, or a sample that was not predicted.
@@ -97,14 +98,13 @@ def _sample(registrations: Registrations, row: int, prediction: pd.Series, conce
 
 
 def _number(value: float) -> float | None:
-    """JSON knows no NaN, which is the score of an explainer that abstains."""
+    """Return a rounded number, or None for NaN, which JSON lacks: it is the score of an explainer that abstains."""
     return round(float(value), 3) if np.isfinite(value) else None
 
 
 def _flat(points: np.ndarray) -> list[int]:
-    """Thin a cloud (P, 3) evenly over its order, which is random or a scan's."""
-    kept = np.unique(np.linspace(0, len(points) - 1, min(POINTS, len(points))).astype(int))
-    return np.rint(points[kept] * _STEPS_PER_DIAMETER).astype(int).ravel().tolist()
+    """Return the coordinates of a thinned cloud, one after the other, in whole steps."""
+    return np.rint(thinned(points, POINTS) * _STEPS_PER_DIAMETER).astype(int).ravel().tolist()
 
 
 def _transform(T: np.ndarray) -> list[float]:

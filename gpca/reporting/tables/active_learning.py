@@ -1,43 +1,44 @@
-"""The tables of active learning, from the tidy metrics of :func:`gpca.active_learning.metrics.collect_curves`.
+"""Makes the tables of active learning from the tidy metrics of :func:`gpca.active_learning.metrics.collect_curves`.
 
 All take the same arguments and raise the same error:
 
-    metrics: tidy.
-    sources: name -> ``{"title": str, "stand_in": bool}``, in the order of the rows.
-    strategies: name -> title, in the order in which they are shown.
-    conditions: the config's section ``active_learning``, and ``train`` and ``test`` of its ``registrations``.
-    InputError: the metrics hold none of these sources and strategies.
+    metrics: The tidy metrics.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+    strategies: The title of each name, in the order in which they are shown.
+    conditions: The config's section ``active_learning``, and ``train`` and ``test`` of its ``registrations``.
+    InputError: The metrics hold none of these sources and strategies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.metrics import CENSORED_BY, TABLE
-from gpca.attribution.metrics import mean_interval
-from gpca.errors import InputError
-from gpca.objects.title import STAND_IN, title_of
-from gpca.reporting.tables.table import Cell, Cells, Column, Rows, Table
+from gpca.objects.title import title_of
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-PAPERS_HELD_OUT = "overlap"  # a GPC that knows noise and pose (Sec. IV-C)
-SETTINGS = {  # name -> title
+PAPERS_HELD_OUT = "overlap"  # The paper's GPC knows noise and pose (Sec. IV-C).
+SETTINGS = {
     "pretrained": "all concepts",
     "unseen": "the known concepts only",
     "rare": "all concepts; the new one rare",
 }
 _COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
+_SHARES = ("reached", "area_under_curve", "area_gain")  # These and every accuracy lie in [0, 1] and are printed in %.
+_NOTHING = ("metrics", "hold nothing", "run its strategies first")  # The error of a table without rows says this.
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a column shows: a metric of all rows, or of one strategy or one concept held out."""
+    """Says what a column shows: a metric of all rows, or of one strategy or one concept held out."""
 
     metric: str
     column: Column
@@ -48,7 +49,7 @@ class Quantity:
 def table3_active_learning(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
 ) -> Table:
-    """Labels to the target accuracy, by BALD with k-means and at random (paper, Table III): sources × settings."""
+    """Return the labels to the target accuracy by BALD with k-means and at random (Table III), sources × settings."""
     of_table = metrics[metrics["concept"] == PAPERS_HELD_OUT]
     quantities = {
         "labels_bald_kmeans": Quantity(
@@ -59,23 +60,20 @@ def table3_active_learning(
         "accuracy_random": Quantity("final_accuracy", Column("Acc. random (%)"), strategy="random"),
         "epochs_bald_kmeans": Quantity("epochs_to_target", Column("Epochs", **_COUNT), strategy="bald_kmeans"),
     }
-    labelled = [
-        (((source, title_of(entry)), (setting, title)), _select(of_table, source, setting))
-        for source, entry in sources.items()
-        for setting, title in SETTINGS.items()
-    ]
-    rows, cells = _filled(labelled, quantities)
-    return _table(
-        sources,
-        conditions,
-        name="table3_active_learning",
-        caption=f"Labels until a GPC that knew noise and pose reaches {conditions['target']:.0%} on all concepts",
-        row_heads={"source": "Dataset", "setting": "Encoder saw"},
-        rows=rows,
-        columns={key: quantity.column for key, quantity in quantities.items()},
-        cells=cells,
-        compared=tuple([(row, key) for key in ("labels_bald_kmeans", "labels_random")] for row in range(len(rows))),
-        notes=(
+    table = TableBuilder("table3_active_learning", {"source": "Dataset", "setting": "Encoder saw"})
+    for source, entry in sources.items():
+        for setting, title in SETTINGS.items():
+            of_row = rows_where(of_table, source=source, table=TABLE + setting)
+            table.add_row([(source, title_of(entry)), (setting, title)], _cells(of_row, quantities, conditions))
+    table.require_rows(*_NOTHING)
+    table.compare_across(["labels_bald_kmeans", "labels_random"])
+    return table.build(
+        caption=f"Labels until a GPC that knew noise and pose reaches {conditions['target']:.0%} on all concepts"
+        + table.stand_in_clause(sources, partly=False),
+        column_head="quantity",
+        columns=_columns(quantities),
+        footnotes=(
+            f"{mean_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
             f"Rare: {conditions['rare_share']:.0%} of the pool are of the new concept, and {conditions['rare_labels']} "
             "labels may be asked for.",
@@ -88,7 +86,7 @@ def table3_active_learning(
 def table3_extended(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
 ) -> Table:
-    """Every strategy, encoder and concept held out; means over the three where one column stands for all."""
+    """Return every strategy, encoder and concept held out, with means over the three where one column is for all."""
     quantities = {
         f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **_COUNT), concept=c)
         for c in _concepts(metrics)
@@ -99,29 +97,24 @@ def table3_extended(
         "area_under_curve": Quantity("area_under_curve", Column("Area (%)")),
         "area_gain": Quantity("area_gain", Column("Gain (%)", limits=(-100, 100))),
     }
-    labelled = [
-        (
-            ((source, title_of(entry)), (setting, SETTINGS[setting]), (strategy, title)),
-            _select(metrics, source, setting, strategy),
-        )
-        for source, entry in sources.items()
-        for setting in ("pretrained", "unseen")
-        for strategy, title in strategies.items()
-        if strategy in STRATEGIES
-    ]
-    rows, cells = _filled(labelled, quantities)
-    rivals = {key: quantity for key, quantity in quantities.items() if key != "reached"}
-    return _table(
-        sources,
-        conditions,
-        name="table3_extended",
-        caption=f"Active learning of a held-out concept by every strategy, to {conditions['target']:.0%}",
-        row_heads={"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"},
-        rows=rows,
-        columns={key: quantity.column for key, quantity in quantities.items()},
-        cells=cells,
-        compared=_within(rows, rivals, 2),
-        notes=(
+    table = TableBuilder("table3_extended", {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"})
+    for source, entry in sources.items():
+        for setting in ("pretrained", "unseen"):
+            for strategy, title in strategies.items():
+                if strategy in STRATEGIES:
+                    labels = [(source, title_of(entry)), (setting, SETTINGS[setting]), (strategy, title)]
+                    of_row = rows_where(metrics, source=source, table=TABLE + setting, method=strategy)
+                    cells = _cells(of_row, quantities, conditions)
+                    table.add_row(labels, cells, rival=not STRATEGIES[strategy].oracle)
+    table.require_rows(*_NOTHING)
+    table.compare_down([key for key in quantities if key != "reached"], same=2)
+    return table.build(
+        caption=f"Active learning of a held-out concept by every strategy, to {conditions['target']:.0%}"
+        + table.stand_in_clause(sources, partly=False),
+        column_head="quantity",
+        columns=_columns(quantities),
+        footnotes=(
+            f"{mean_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
             "Labels: until the target, by the concept held out. Reached: share of the runs that reached it. Accuracy: "
             "after all labels; New: that on the concept held out. Area: mean accuracy over the budget. Gain: area "
@@ -134,7 +127,7 @@ def table3_extended(
 def table3_stream(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
 ) -> Table:
-    """The stream form: labels asked for, arrivals until a new concept is recognised, accuracy."""
+    """Return the stream form: labels asked for, arrivals until a new concept is recognised, accuracy."""
     stream = conditions["stream"]
     quantities = {
         f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **_COUNT), concept=c) for c in _concepts(metrics)
@@ -145,24 +138,20 @@ def table3_stream(
         "final_accuracy": Quantity("final_accuracy", Column("Accuracy (%)")),
         "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),
     }
-    labelled = [
-        (((source, title_of(entry)), (strategy, title)), _select(metrics, source, "pretrained", strategy))
-        for source, entry in sources.items()
-        for strategy, title in strategies.items()
-        if strategy in STREAMS
-    ]
-    rows, cells = _filled(labelled, quantities)
-    return _table(
-        sources,
-        conditions,
-        name="table3_stream",
-        caption="A new concept in a stream of registrations",
-        row_heads={"source": "Dataset", "strategy": "Strategy"},
-        rows=rows,
-        columns={key: quantity.column for key, quantity in quantities.items()},
-        cells=cells,
-        compared=_within(rows, {key: quantity for key, quantity in quantities.items() if "labels" not in key}, 1),
-        notes=(
+    table = TableBuilder("table3_stream", {"source": "Dataset", "strategy": "Strategy"})
+    for source, entry in sources.items():
+        for strategy, title in strategies.items():
+            if strategy in STREAMS:
+                of_row = rows_where(metrics, source=source, table=TABLE + "pretrained", method=strategy)
+                table.add_row([(source, title_of(entry)), (strategy, title)], _cells(of_row, quantities, conditions))
+    table.require_rows(*_NOTHING)
+    table.compare_down([key for key in quantities if "labels" not in key], same=1)
+    return table.build(
+        caption="A new concept in a stream of registrations" + table.stand_in_clause(sources, partly=False),
+        column_head="quantity",
+        columns=_columns(quantities),
+        footnotes=(
+            f"{mean_over(table.most_seeds(), conditions['test'])}.",
             f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
             f"concepts ({conditions['initial']} labelled samples at the start), of the others a third is new. A label "
             f"may be asked for at {stream['budget']:.0%} of the arrivals; the GPC learns at once.",
@@ -176,68 +165,30 @@ def table3_stream(
 
 LEARNING_TABLES = {table.__name__: table for table in (table3_active_learning, table3_extended, table3_stream)}
 
-_SHARES = ("reached", "area_under_curve", "area_gain")  # and every accuracy: in [0, 1], printed in %
-
 
 def _concepts(metrics: pd.DataFrame) -> list[str]:
     return list(dict.fromkeys(metrics["concept"]))
 
 
-def _select(metrics: pd.DataFrame, source: str, setting: str, strategy: str | None = None) -> pd.DataFrame:
-    rows = metrics[(metrics["source"] == source) & (metrics["table"] == TABLE + setting)]
-    return rows if strategy is None else rows[rows["method"] == strategy]
+def _columns(quantities: Mapping[str, Quantity]) -> dict[str, Column]:
+    return {key: quantity.column for key, quantity in quantities.items()}
 
 
-def _filled(labelled: Iterable[tuple[tuple, pd.DataFrame]], quantities: Mapping[str, Quantity]) -> tuple[tuple, dict]:
-    """Return the labels of the rows that have any cell, and the cells."""
-    rows: Rows = []
-    cells: Cells = {}
-    for labels, metrics in labelled:
-        found = {key: cell for key, quantity in quantities.items() if (cell := _cell(metrics, quantity))}
-        cells |= {(len(rows), key): cell for key, cell in found.items()}
-        rows += [labels] if found else []
-    return tuple(rows), cells
+def _cells(metrics: pd.DataFrame, quantities: Mapping[str, Quantity], conditions: Mapping) -> dict[str, Cell | None]:
+    """Return the cells of a row, given its metrics."""
+    return {key: _cell(metrics, quantity, conditions["test"]) for key, quantity in quantities.items()}
 
 
-def _cell(metrics: pd.DataFrame, quantity: Quantity) -> Cell | None:
-    """Make a cell: mean over the concepts held out that the rows hold, then over the seeds."""
-    for column, wanted in (("method", quantity.strategy), ("concept", quantity.concept)):
-        if wanted is not None:
-            metrics = metrics[metrics[column] == wanted]
-    values_R = metrics[metrics["metric"] == quantity.metric].groupby("seed")["value"].mean()
-    if values_R.empty:
-        return None
+def _cell(metrics: pd.DataFrame, quantity: Quantity, test: int) -> Cell | None:
+    """Return the mean of a quantity over the concepts held out that the rows hold, then over the seeds."""
+    if quantity.strategy is not None:
+        metrics = rows_where(metrics, method=quantity.strategy)
+    if quantity.concept is not None:
+        metrics = rows_where(metrics, concept=quantity.concept)
+    values_R = rows_where(metrics, metric=quantity.metric).groupby("seed")["value"].mean()
     scale = 100 if quantity.metric in _SHARES or "accuracy" in quantity.metric else 1
-    mean, low, _ = mean_interval(values_R * scale)
-    done = metrics.loc[metrics["metric"] == CENSORED_BY.get(quantity.metric), "value"]
-    return Cell(mean, mean - low, len(values_R), 0, at_least=bool((done < 1).any()))
-
-
-def _within(rows: tuple, quantities: Mapping[str, Quantity], labels: int) -> tuple[list, ...]:
-    """Return the groups of cells to be compared: of one quantity, in the rows whose first labels agree, no oracles."""
-    groups: dict[tuple, list] = {}
-    for number, row in enumerate(rows):
-        if row[-1][0] in STRATEGIES and STRATEGIES[row[-1][0]].oracle:
-            continue
-        for key in quantities:
-            groups.setdefault((row[:labels], key), []).append((number, key))
-    return tuple(groups.values())
-
-
-def _table(sources, conditions: Mapping, *, caption: str, notes: tuple[str, ...], rows, cells, **fields) -> Table:
-    if not cells:
-        raise InputError("metrics", f"hold nothing for {fields['name']}", "run its strategies first")
-    if any(sources[labels[0][0]]["stand_in"] for labels in rows):
-        caption += f", on {STAND_IN}s of the datasets' objects"
-    seeds = max(cell.seeds for cell in cells.values())
-    repeats = (
-        f"Mean over {seeds} seed{'s' * (seeds != 1)}, {conditions['test']} test samples each; ± is the half-width of "
-        "the 95 % t-interval over the seeds."
-    )
-    counted = {key: replace(cell, test_samples=cell.seeds * conditions["test"]) for key, cell in cells.items()}
-    return Table(
-        caption=caption, rows=rows, cells=counted, column_head="quantity", footnotes=(repeats, *notes), **fields
-    )
+    done = rows_where(metrics, metric=CENSORED_BY.get(quantity.metric))["value"]
+    return cell_of_repeats(values_R * scale, test * len(values_R), at_least=bool((done < 1).any()))
 
 
 def _protocol(conditions: Mapping) -> str:

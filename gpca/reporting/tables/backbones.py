@@ -1,17 +1,19 @@
-"""Table VI of the paper: GP-CA on depth frames by backbone and reduction, with the paper's classic features below."""
+"""Makes Table VI of the paper: GP-CA on depth frames by backbone and reduction, and below it the classic features."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf, nan
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import ALL, mean_interval
-from gpca.errors import InputError
+from gpca.attribution.metrics import ALL
+from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.table import Cell, Cells, Column, Rows, Table
+from gpca.reporting.tables.builder import INTERVAL, TableBuilder, cell_of_repeats, plain_cell, rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,81 +32,94 @@ def encoder_title(encoder: str, reduction: str) -> str:
     return named if reduction == "none" else f"{named}, {REDUCTIONS.get(reduction, reduction)}"
 
 
+def table6_of_encoders(
+    metrics: pd.DataFrame, title: str, encoders: Mapping[str, Mapping], reductions: Sequence[str]
+) -> Table:
+    """Return :func:`table6_backbones` with the parameters counted of encoders that are made from their settings."""
+    backbones = {
+        name: parameter_count(make_encoder(settings["backbone"], settings.get("options", {})))
+        for name, settings in encoders.items()
+    }
+    return table6_backbones(metrics, title, backbones, reductions)
+
+
 def table6_backbones(
     metrics: pd.DataFrame,
     title: str,
     backbones: Mapping[str, int],
     reductions: Sequence[str],
 ) -> Table:
-    """Accuracy on depth frames: backbones × reductions, and the classic features.
+    """Return the accuracy on depth frames by backbones × reductions, and of the classic features.
 
     Args:
-        metrics: tidy (:func:`gpca.attribution.metrics.collect`); methods are named ``{backbone}-{reduction}``.
-        title: of the frames.
-        backbones: name -> number of parameters, in order; differences are to the first, with the first reduction.
-        reductions: in order.
+        metrics: The tidy metrics (:func:`gpca.attribution.metrics.collect`) of methods ``{backbone}-{reduction}``.
+        title: The title of the frames.
+        backbones: The number of parameters of each name, in order. The table shows differences to the first backbone
+            with the first reduction.
+        reductions: The names of the reductions, in order.
 
     Raises:
-        InputError: the metrics hold none of these.
+        InputError: The metrics hold none of these.
     """
-    rows: Rows = []
-    cells: Cells = {}
-    methods: list[tuple[str, tuple[str, str], tuple[str, str], int | None]] = [
-        (f"{b}-{r}", (b, BACKBONES.get(b, b)), (r, REDUCTIONS[r]), n) for b, n in backbones.items() for r in reductions
-    ]
-    methods += [(name, (name, title), ("none", REDUCTIONS["none"]), None) for name, title in CLASSIC.items()]
-    reference_R = _values(metrics, methods[0][0])
-    for method, *labels, parameters in methods:
-        accuracy_R = _values(metrics, method)
-        if not len(accuracy_R):
-            continue
-        row = len(rows)
-        samples = int(_values(metrics, method, "test_samples", scale=1).sum())
-        cells[row, "accuracy"] = _cell(accuracy_R, samples)
-        if len(accuracy_R) > 1:
-            cells[row, "deviation"] = Cell(float(accuracy_R.std(ddof=1)), nan, len(accuracy_R), samples)
-        if row and len(accuracy_R) == len(reference_R):
-            cells[row, "difference"] = _cell(accuracy_R - reference_R, samples)
-        for concept in CONCEPTS:
-            if len(of_concept_R := _values(metrics, method, concept=concept)):
-                cells[row, concept] = _cell(of_concept_R, samples)
-        if parameters is not None:
-            cells[row, "parameters"] = Cell(parameters / 1000, nan, len(accuracy_R), samples)
-        rows.append(tuple(labels))
-    if not rows:
-        raise InputError("metrics", "hold no accuracy for table6_backbones", "run its explainers first")
-    first = " without reduction" if reductions[0] == "none" else f" with {REDUCTIONS[reductions[0]]}"
-    seeds, samples = cells[0, "accuracy"].seeds, cells[0, "accuracy"].test_samples
-    return Table(
-        name="table6_backbones",
+    first = next(iter(backbones))
+    reference_R = _values(metrics, f"{first}-{reductions[0]}")
+    table = TableBuilder("table6_backbones", {"backbone": "Backbone", "reduction": "Reduction"})
+    for backbone, parameters in backbones.items():
+        for reduction in reductions:
+            labels = [(backbone, BACKBONES.get(backbone, backbone)), (reduction, REDUCTIONS[reduction])]
+            table.add_row(labels, _cells(metrics, f"{backbone}-{reduction}", reference_R, not table.rows, parameters))
+    for method, name in CLASSIC.items():
+        labels = [(method, name), ("none", REDUCTIONS["none"])]
+        table.add_row(labels, _cells(metrics, method, reference_R, not table.rows))
+    table.require_rows("metrics", "hold no accuracy", "run its explainers first")
+    table.compare_down(["accuracy"])
+    shown = table.cells[0, "accuracy"]
+    rival = f"To {BACKBONES.get(first, '')}"
+    other = " without reduction" if reductions[0] == "none" else f" with {REDUCTIONS[reductions[0]]}"
+    return table.build(
         caption=f"GP-CA by backbone and dimensionality reduction, accuracy (%) on {title}",
-        row_heads={"backbone": "Backbone", "reduction": "Reduction"},
-        rows=tuple(rows),
         column_head="metric",
         columns={
             "accuracy": Column("Mean acc. (%)"),
             "deviation": Column("Std. dev. (%)", decimals=2, interval=False, limits=(0, inf)),
-            "difference": Column(f"To {BACKBONES.get(next(iter(backbones)), '')} (points)", limits=(-100, 100)),
+            "difference": Column(f"{rival} (points)", limits=(-100, 100)),
             **{concept: Column(f"{concept.capitalize()} (%)", interval=False) for concept in CONCEPTS},
             "parameters": Column("Parameters (k)", decimals=0, interval=False, limits=(0, inf)),
         },
-        cells=cells,
-        compared=([(row, "accuracy") for row in range(len(rows))],),
         footnotes=(
-            f"Mean over {seeds} seed{'s' * (seeds != 1)}, {samples // seeds} test samples each, in frames that "
-            "training does not see; ± is the half-width of the 95 % t-interval over the seeds. Each seed has its own "
-            "split of the frames, perturbations, encoders and GPCs.",
-            f"To {BACKBONES.get(next(iter(backbones)), '')}: paired difference to it{first}. By concept: the share of "
-            "its samples that is attributed to it. Parameters: of the encoder.",
+            f"Mean over {plural(shown.seeds, 'seed')}, {shown.test_samples // shown.seeds} test samples each, in "
+            f"frames that training does not see; {INTERVAL}. Each seed has its own split of the frames, "
+            "perturbations, encoders and GPCs.",
+            f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
+            "Parameters: of the encoder.",
         ),
     )
 
 
-def _values(metrics, method: str, metric: str = "accuracy", concept: str = ALL, scale: float = 100) -> np.ndarray:
-    of_cell = metrics[(metrics["method"] == method) & (metrics["metric"] == metric) & (metrics["concept"] == concept)]
-    return of_cell.sort_values("seed")["value"].to_numpy() * scale
+def _cells(
+    metrics: pd.DataFrame, method: str, reference_R: np.ndarray, is_first: bool, parameters: int | None = None
+) -> dict[str, Cell | None]:
+    """Return the cells of a method; the first row of the table is not compared with itself."""
+    accuracy_R = _values(metrics, method)
+    seeds = len(accuracy_R)
+    if not seeds:
+        return {}
+    samples = int(_values(metrics, method, "test_samples", scale=1).sum())
+    cells: dict[str, Cell | None] = {"accuracy": cell_of_repeats(accuracy_R, samples)}
+    if seeds > 1:
+        cells["deviation"] = plain_cell(float(accuracy_R.std(ddof=1)), seeds, samples)
+    if not is_first and seeds == len(reference_R):
+        cells["difference"] = cell_of_repeats(accuracy_R - reference_R, samples)
+    for concept in CONCEPTS:
+        cells[concept] = cell_of_repeats(_values(metrics, method, concept=concept), samples)
+    if parameters is not None:
+        cells["parameters"] = plain_cell(parameters / 1000, seeds, samples)
+    return cells
 
 
-def _cell(values_R: np.ndarray, samples: int) -> Cell:
-    mean, low, _ = mean_interval(values_R)
-    return Cell(mean, mean - low, len(values_R), samples)
+def _values(
+    metrics: pd.DataFrame, method: str, metric: str = "accuracy", concept: str = ALL, scale: float = 100
+) -> np.ndarray:
+    """Return the values over the seeds, in the order of the seeds."""
+    chosen = rows_where(metrics, method=method, metric=metric, concept=concept)
+    return chosen.sort_values("seed")["value"].to_numpy() * scale

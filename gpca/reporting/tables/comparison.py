@@ -1,4 +1,4 @@
-"""The comparison as Markdown: the counts of each verdict, then a table for each of the paper's, reasons below it."""
+"""Writes the comparison as Markdown: the counts of each verdict, then a table for each of the paper's with reasons."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Mappi
     """Return the page.
 
     Args:
-        comparison: as :func:`gpca.comparison.verdicts.compare` returns it.
-        tolerances: of each unit, as in the config.
+        comparison: The frame that :func:`gpca.comparison.verdicts.compare` returns.
+        tolerances: The tolerances of each unit, as in the config.
     """
     parts = ["# Published and reproduced", summary(comparison), counts_table(comparison), *_rule(tolerances)]
     for table, rows in comparison.groupby("table", sort=False):
@@ -53,16 +53,22 @@ def _name(table: str) -> str:
 
 
 def _rule(tolerances: Mapping[str, Mapping]) -> list[str]:
-    near, far = (
-        ", ".join(f"{'× ' * t.get('factor', False)}{t[key]:g} ({unit})" for unit, t in tolerances.items())
-        for key in ("reproduced", "close")
-    )
     return [
-        f"Reproduced: the mean here is within {near} of what is printed, its rounding and printed standard deviation "
-        f"included, or its 95 % interval meets it and is no wider than what is close. Close: within {far}, or a wider "
-        "interval meets it. docs/comparison.md has the whole rule.",
+        f"Reproduced: the mean here is within {_limits(tolerances, 'reproduced')} of what is printed, its rounding and "
+        "printed standard deviation included, or its 95 % interval meets it and is no wider than what is close. "
+        f"Close: within {_limits(tolerances, 'close')}, or a wider interval meets it. docs/comparison.md has the whole "
+        "rule.",
         f"Times of the paper were measured on {' and '.join(HARDWARE.values())}.",
     ]
+
+
+def _limits(tolerances: Mapping[str, Mapping], verdict: str) -> str:
+    """Return how far a number may be off for this verdict, unit by unit; × stands before a factor."""
+    limits = []
+    for unit, tolerance in tolerances.items():
+        factor = "× " if tolerance.get("factor", False) else ""
+        limits.append(f"{factor}{tolerance[verdict]:g} ({unit})")
+    return ", ".join(limits)
 
 
 def _table(rows: pd.DataFrame) -> str:
@@ -87,7 +93,8 @@ def _printed(row) -> str:
 def _here(row) -> str:
     if math.isnan(row.reproduced):
         return EMPTY
-    value = f"{'> ' * row.at_least}{_digits(row.reproduced, row.decimals)}"
+    bound = "> " if row.at_least else ""
+    value = f"{bound}{_digits(row.reproduced, row.decimals)}"
     if math.isnan(row.ci_low):
         return value
     return f"{value} ({_digits(row.ci_low, row.decimals)} to {_digits(row.ci_high, row.decimals)})"

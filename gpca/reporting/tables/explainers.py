@@ -1,11 +1,11 @@
-"""The paper's tables, from tidy metrics: each function selects and labels, :class:`Table` writes.
+"""Makes the tables of explainers from tidy metrics: each function names its rows, its columns and its notes.
 
 All take the same arguments and raise the same error:
 
-    metrics: tidy, as :mod:`gpca.attribution.metrics` collects them.
-    sources: name -> ``{"title": str, "stand_in": bool}``, in the order of the rows.
-    explainers: name -> ``{"title": str, "oracle": bool}``, in the order in which they are shown.
-    InputError: the metrics hold none of these sources and explainers.
+    metrics: The tidy metrics that :mod:`gpca.attribution.metrics` collects.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+    explainers: The ``{"title": str, "oracle": bool}`` of each name, in the order in which they are shown.
+    InputError: The metrics hold none of these sources and explainers.
 """
 
 from __future__ import annotations
@@ -14,21 +14,17 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.metrics import ALL, mean_interval
-from gpca.errors import InputError
-from gpca.objects.title import STAND_IN, title_of
-from gpca.reporting.tables.table import EMPTY, Cell, Cells, Column, Rows, Table
+from gpca.attribution.metrics import ALL
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.objects.title import title_of
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-GPCA_FORMS = ("gpca_paper", "gpca")  # whose concepts the paper's Table II looks into
-TABLE1 = (
-    "shap_additive",
-    "sa_local_additive",
-    *GPCA_FORMS,
-)  # the paper's Table I: SHAP, SA, GP-CA, and ours trained longer
-EXTENDED = {  # metric -> its column in table1_extended
+TABLE1 = ("shap_additive", "sa_local_additive", *GPCA_FORMS)  # The paper has SHAP, SA and GP-CA; ours trains longer.
+EXTENDED = {  # Each of these metrics has a column in table1_extended.
     "accuracy": Column("Accuracy (%)"),
     "permuted_accuracy": Column("Relabelled (%)"),
     "causal_accuracy": Column("Causal (%)"),
@@ -38,56 +34,49 @@ EXTENDED = {  # metric -> its column in table1_extended
     "seconds_per_sample": Column("Seconds", decimals=3, interval=False, limits=(0, inf)),
     "test_samples": Column("n", decimals=0, interval=False, limits=(0, inf)),
 }
-_SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # metrics in [0, 1], printed in %
+_SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # These are printed in %.
+_NOTHING = ("metrics", "hold no accuracy", "run its explainers first")  # The error of a table without rows says this.
 
 
 def table1_single_baselines(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
 ) -> Table:
-    """Accuracy of single-concept attribution (paper, Table I): sources by those of `TABLE1` with predictions."""
+    """Return the accuracy of single-concept attribution (Table I): sources by those of `TABLE1` with predictions."""
     shown = [name for name in TABLE1 if name in explainers and (metrics["method"] == name).any()]
-    rows: Rows = []
-    cells: Cells = {}
+    table = TableBuilder("table1_single_baselines", {"source": "Dataset"})
     for source, entry in sources.items():
-        of_row = {name: cell for name in shown if (cell := _cell(metrics, source, name))}
-        cells |= {(len(rows), name): cell for name, cell in of_row.items()}
-        rows += [((source, title_of(entry)),)] if of_row else []
-    return _table(
-        metrics,
-        sources,
-        shown,
-        name="table1_single_baselines",
-        caption="Mean accuracy of single-concept attribution (%)",
-        row_heads={"source": "Dataset"},
-        rows=tuple(rows),
+        table.add_row([(source, title_of(entry))], {name: _cell(metrics, source, name) for name in shown})
+    table.require_rows(*_NOTHING)
+    table.compare_across(shown)
+    return table.build(
+        caption="Mean accuracy of single-concept attribution (%)" + table.stand_in_clause(sources),
         column_head="explainer",
         columns={name: Column(explainers[name]["title"]) for name in shown},
-        cells=cells,
-        compared=tuple([(row, name) for name in shown] for row in range(len(rows))),
-        notes=(*_different_samples(metrics, explainers, shown), "Abstained samples count as wrong."),
+        footnotes=(
+            _repeats(table, metrics, shown),
+            *_different_samples(metrics, explainers, shown),
+            "Abstained samples count as wrong.",
+        ),
     )
 
 
 def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]) -> Table:
-    """Every explainer on every source by the metrics of `EXTENDED`; one that was not measured has no column.
+    """Return every explainer on every source by the metrics of `EXTENDED` that were measured.
 
     The best accuracy of a source is bold, oracles apart: they are told what the others have to find out.
     """
-    rows: Rows = []
-    cells: Cells = {}
-    compared: list[list[tuple[int, str]]] = []
+    table = TableBuilder("table1_extended", {"source": "Dataset", "explainer": "Explainer"})
     for source, source_entry in sources.items():
-        rivals = []
         for explainer, entry in explainers.items():
-            of_row = {metric: cell for metric in EXTENDED if (cell := _cell(metrics, source, explainer, metric=metric))}
-            cells |= {(len(rows), metric): cell for metric, cell in of_row.items()}
-            rivals += [(len(rows), "accuracy")] if of_row and not entry["oracle"] else []
-            rows += [((source, title_of(source_entry)), (explainer, entry["title"]))] if of_row else []
-        compared.append(rivals)
-    measured = {metric for _, metric in cells}
-    has_oracle = any(entry["oracle"] for entry in explainers.values())
+            labels = [(source, title_of(source_entry)), (explainer, entry["title"])]
+            cells = {metric: _cell(metrics, source, explainer, metric=metric) for metric in EXTENDED}
+            table.add_row(labels, cells, rival=not entry["oracle"])
+    table.require_rows(*_NOTHING)
+    table.compare_down(["accuracy"], same=1)
+    measured = {metric for _, metric in table.cells}
+    apart = ", oracles apart" if any(entry["oracle"] for entry in explainers.values()) else ""
     notes = {
-        "accuracy": f"Bold: best accuracy on the dataset{', oracles apart' * has_oracle}. Abstained samples are wrong.",
+        "accuracy": f"Bold: best accuracy on the dataset{apart}. Abstained samples are wrong.",
         "permuted_accuracy": (
             "Relabelled: accuracy under the best one-to-one renaming of the predicted concepts, which takes the truth "
             "to find; where it is far above the accuracy, concepts are told apart but named wrongly."
@@ -103,51 +92,41 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
         ),
         "test_samples": "n: test samples of a seed.",
     }
-    return _table(
-        metrics,
-        sources,
-        explainers,
-        name="table1_extended",
-        caption="Single-concept attribution by every explainer",
-        row_heads={"source": "Dataset", "explainer": "Explainer"},
-        rows=tuple(rows),
+    return table.build(
+        caption="Single-concept attribution by every explainer" + table.stand_in_clause(sources),
         column_head="metric",
         columns={metric: column for metric, column in EXTENDED.items() if metric in measured},
-        cells=cells,
-        compared=tuple(compared),
-        notes=tuple(note for metric, note in notes.items() if metric in measured),
+        footnotes=(
+            _repeats(table, metrics, explainers),
+            *(note for metric, note in notes.items() if metric in measured),
+        ),
     )
 
 
 def table2_per_concept(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
 ) -> Table:
-    """Accuracy per concept (paper, Table II): sources × those of `GPCA_FORMS` with predictions, by concepts and all.
+    """Return the accuracy per concept (Table II): sources × those of `GPCA_FORMS` with predictions, by concepts.
 
     The best concept of a row is bold, as in the paper.
     """
     concepts = [concept for concept in metrics["concept"].unique() if concept != ALL]
     shown = {name: entry for name, entry in explainers.items() if name in GPCA_FORMS}
-    rows: Rows = []
-    cells: Cells = {}
+    table = TableBuilder("table2_per_concept", {"source": "Dataset", "explainer": "Explainer"})
     for source, source_entry in sources.items():
         for explainer, entry in shown.items():
-            of_row = {c: cell for c in (*concepts, ALL) if (cell := _cell(metrics, source, explainer, c))}
-            cells |= {(len(rows), concept): cell for concept, cell in of_row.items()}
-            rows += [((source, title_of(source_entry)), (explainer, entry["title"]))] if of_row else []
-    return _table(
-        metrics,
-        sources,
-        shown,
-        name="table2_per_concept",
-        caption="Mean accuracy per concept (%)",
-        row_heads={"source": "Dataset", "explainer": "Explainer"},
-        rows=tuple(rows),
+            labels = [(source, title_of(source_entry)), (explainer, entry["title"])]
+            table.add_row(labels, {c: _cell(metrics, source, explainer, c) for c in (*concepts, ALL)})
+    table.require_rows(*_NOTHING)
+    table.compare_across(concepts)
+    return table.build(
+        caption="Mean accuracy per concept (%)" + table.stand_in_clause(sources),
         column_head="concept",
         columns={concept: Column(concept.capitalize()) for concept in (*concepts, ALL)},
-        cells=cells,
-        compared=tuple([(row, concept) for concept in concepts] for row in range(len(rows))),
-        notes=("Of the test samples that truly are of a concept, the share that is attributed to it.",),
+        footnotes=(
+            _repeats(table, metrics, shown),
+            "Of the test samples that truly are of a concept, the share that is attributed to it.",
+        ),
     )
 
 
@@ -157,34 +136,19 @@ TABLES = {table.__name__: table for table in (table1_single_baselines, table1_ex
 def _cell(
     metrics: pd.DataFrame, source: str, explainer: str, concept: str = ALL, metric: str = "accuracy"
 ) -> Cell | None:
-    of_cell = metrics[
-        (metrics["source"] == source) & (metrics["method"] == explainer) & (metrics["concept"] == concept)
-    ]
-    values_R = of_cell.loc[of_cell["metric"] == metric, "value"].to_numpy() * (100 if metric in _SHARES else 1)
-    if len(values_R) == 0:
-        return None
-    mean, low, _ = mean_interval(values_R)
+    of_cell = rows_where(metrics, source=source, method=explainer, concept=concept)
+    values_R = rows_where(of_cell, metric=metric)["value"].to_numpy() * (100 if metric in _SHARES else 1)
     counted = "causal_samples" if metric.startswith("causal") else "test_samples"
-    samples = int(of_cell.loc[of_cell["metric"] == counted, "value"].sum())
-    return Cell(mean, mean - low, len(values_R), samples)
+    return cell_of_repeats(values_R, int(rows_where(of_cell, metric=counted)["value"].sum()))
 
 
-def _table(metrics, sources, explainers: Iterable[str], *, caption: str, notes: tuple[str, ...], **fields) -> Table:
-    """Make a table and say what is said the same way in all of them: the objects, the repeats, what ± means."""
-    if not fields["cells"]:
-        raise InputError("metrics", f"hold no accuracy for {fields['name']}", "run its explainers first")
-    of_rows = {labels[0][0] for labels in fields["rows"]}
-    stand_ins = [bool(sources[source]["stand_in"]) for source in of_rows]
-    if any(stand_ins):
-        caption += f", {'' if all(stand_ins) else 'partly '}on {STAND_IN}s of the datasets' objects"
+def _repeats(table: TableBuilder, metrics: pd.DataFrame, explainers: Iterable[str]) -> str:
+    """Return the footnote on the repeats; seeds and test samples may differ from cell to cell."""
     of_test = _test_samples(metrics, explainers)
-    samples = _span(of_test.loc[of_test["source"].isin(of_rows), "value"])
-    seeds = _span(cell.seeds for cell in fields["cells"].values())
-    repeats = (
-        f"Mean over {seeds} seed{'s' * (seeds != '1')}, {samples} test samples each; "
-        f"± is the half-width of the 95 % t-interval over the seeds{f' ({EMPTY}: one seed)' * (seeds == '1')}."
-    )
-    return Table(caption=caption, footnotes=(repeats, *notes), **fields)
+    samples = _span(of_test.loc[of_test["source"].isin(table.first_labels()), "value"])
+    seeds = _span(cell.seeds for cell in table.cells.values())
+    no_interval = f" ({EMPTY}: one seed)" if seeds == "1" else ""
+    return f"{mean_over(seeds, samples)}{no_interval}."
 
 
 def _different_samples(metrics: pd.DataFrame, explainers: Mapping[str, Mapping], shown: Iterable[str]) -> list[str]:
@@ -198,9 +162,7 @@ def _different_samples(metrics: pd.DataFrame, explainers: Mapping[str, Mapping],
 
 
 def _test_samples(metrics: pd.DataFrame, explainers: Iterable[str]) -> pd.DataFrame:
-    return metrics[
-        (metrics["metric"] == "test_samples") & (metrics["concept"] == ALL) & metrics["method"].isin(list(explainers))
-    ]
+    return rows_where(metrics[metrics["method"].isin(list(explainers))], metric="test_samples", concept=ALL)
 
 
 def _span(numbers: Iterable[float]) -> str:

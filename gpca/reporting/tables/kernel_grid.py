@@ -1,11 +1,11 @@
-"""The tables of kernels and schedules (paper, Table IV), from the grids of :mod:`gpca.classifier.kernel_grid`.
+"""Makes the tables of kernels and schedules (Table IV) from the grids of :mod:`gpca.classifier.kernel_grid`.
 
 Both take the same arguments and raise the same error:
 
-    grid: as :func:`gpca.classifier.kernel_grid.read_grids` returns it.
-    sources: name -> ``{"title": str, "stand_in": bool}``, in the order in which they are shown.
-    test: test samples of each seed.
-    InputError: the grid holds none of the sources, or none of the rows.
+    grid: The frame that :func:`gpca.classifier.kernel_grid.read_grids` returns.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order in which they are shown.
+    test: The number of test samples of each seed.
+    InputError: The grid holds none of the sources, or none of the rows.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.metrics import mean_interval
-from gpca.errors import InputError
-from gpca.objects.title import STAND_IN, title_of
-from gpca.reporting.tables.table import Cell, Cells, Column, Rows, Table
+from gpca.objects.title import stand_in_clause, title_of
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TITLES = {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "Polynomial, p = 2"}
-PRINTED = (  # the rows of the paper's table
+PRINTED = (  # The paper's table has these rows.
     ("rbf", 0.01, 100),
     ("matern32", 0.01, 200),
     ("polynomial", 0.01, 200),
     ("rbf", 0.001, 200),
     ("polynomial", 0.001, 200),
 )
-_KEYS = ["kernel", "learning_rate", "iterations"]
-_MEASURES = {  # of the grid -> column, and the factor to its unit
+_HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
+_NOTHING = ("kernels", "hold nothing", "run its sources and iterations first")  # An empty table says this.
+_MEASURES = {  # Each measure of the grid has a column, and a factor to the column's unit.
     "accuracy": (Column("Accuracy (%)"), 100),
     "confidence": (Column("Confidence (%)"), 100),
     "ece": (Column("ECE (%)", least_is_best=True), 100),
@@ -41,57 +41,41 @@ _MEASURES = {  # of the grid -> column, and the factor to its unit
 
 
 def table4_kernels(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
-    """Accuracy of the paper's five kernels and schedules: settings by sources; those that were fitted."""
+    """Return the accuracy of those of the paper's five kernels and schedules that were fitted, by sources."""
     shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
-    rows: Rows = []
-    cells: Cells = {}
+    table = TableBuilder("table4_kernels", _HEADS)
     for setting in PRINTED:
-        of_row = {name: cell for name in shown if (cell := _cell(grid, name, setting, "accuracy", test))}
-        cells |= {(len(rows), name): cell for name, cell in of_row.items()}
-        rows += [_labels(setting)] if of_row else []
-    return _table(
-        shown,
-        rows,
-        cells,
-        test,
-        name="table4_kernels",
-        caption="Accuracy of the GPC by kernel and schedule (%)",
-        columns={name: Column(title_of(entry)) for name, entry in shown.items()},
+        table.add_row(_labels(setting), {name: _cell(grid, name, setting, "accuracy", test) for name in shown})
+    table.require_rows(*_NOTHING)
+    table.compare_down(shown)
+    return table.build(
+        caption="Accuracy of the GPC by kernel and schedule (%)" + stand_in_clause(shown.values(), partly=False),
         column_head="source",
-        row_heads=_heads(),
-        compared=tuple([(row, name) for row in range(len(rows))] for name in shown),
-        notes=("The rows that the paper prints; table4_grid has all, with their confidence.",),
+        columns={name: Column(title_of(entry)) for name, entry in shown.items()},
+        footnotes=(
+            f"{mean_over(table.most_seeds(), test)}.",
+            "The rows that the paper prints; table4_grid has all, with their confidence.",
+        ),
     )
 
 
 def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
-    """Every kernel, learning rate and number of iterations on every source, with confidence and calibration."""
+    """Return every kernel, learning rate and number of iterations on every source, with its calibration."""
     shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
-    rows: Rows = []
-    cells: Cells = {}
-    settings = list(grid[_KEYS].drop_duplicates().itertuples(index=False, name=None))
+    settings = list(grid[list(_HEADS)].drop_duplicates().itertuples(index=False, name=None))
+    table = TableBuilder("table4_grid", {"source": "Dataset", **_HEADS})
     for name, entry in shown.items():
         for setting in settings:
-            of_row = {m: cell for m in _MEASURES if (cell := _cell(grid, name, setting, m, test))}
-            cells |= {(len(rows), measure): cell for measure, cell in of_row.items()}
-            rows += [((name, title_of(entry)), *_labels(setting))] if of_row else []
-    groups = [
-        [(row, measure) for row, labels in enumerate(rows) if labels[0][0] == name]
-        for name in shown
-        for measure in ("accuracy", "nll")
-    ]
-    return _table(
-        shown,
-        rows,
-        cells,
-        test,
-        name="table4_grid",
-        caption="The GPC by kernel, learning rate and iterations",
-        columns={measure: column for measure, (column, _) in _MEASURES.items()},
+            cells = {measure: _cell(grid, name, setting, measure, test) for measure in _MEASURES}
+            table.add_row([(name, title_of(entry)), *_labels(setting)], cells)
+    table.require_rows(*_NOTHING)
+    table.compare_down(["accuracy", "nll"], same=1)
+    return table.build(
+        caption="The GPC by kernel, learning rate and iterations" + stand_in_clause(shown.values(), partly=False),
         column_head="measure",
-        row_heads={"source": "Dataset", **_heads()},
-        compared=tuple(groups),
-        notes=(
+        columns={measure: column for measure, (column, _) in _MEASURES.items()},
+        footnotes=(
+            f"{mean_over(table.most_seeds(), test)}.",
             "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins. ELBO: per "
             "training sample. Where the ELBO still rises from row to row and the confidence lies far below the "
             "accuracy, the fit was stopped before it had converged.",
@@ -111,32 +95,12 @@ def kernel_tables_of(kernels: Mapping) -> list[str]:
     return [name for name in KERNEL_TABLES if has_printed or name != "table4_kernels"]
 
 
-def _heads() -> dict[str, str]:
-    return {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
-
-
 def _labels(setting: tuple) -> tuple[tuple[str, str], ...]:
     kernel, rate, iterations = setting
     return (kernel, TITLES[kernel]), (f"{rate:g}", f"{rate:g}"), (str(iterations), str(iterations))
 
 
 def _cell(grid: pd.DataFrame, source: str, setting: tuple, measure: str, test: int) -> Cell | None:
-    chosen = (grid["source"] == source) & (grid[_KEYS] == list(setting)).all(axis=1)
-    values_R = grid.loc[chosen, measure].to_numpy() * _MEASURES[measure][1]
-    if not len(values_R):
-        return None
-    mean, low, _ = mean_interval(values_R)
-    return Cell(mean, mean - low, len(values_R), test * len(values_R))
-
-
-def _table(shown: Mapping, rows: list, cells: Mapping, test: int, *, caption: str, notes: tuple[str, ...], **fields):
-    if not cells:
-        raise InputError("kernels", f"hold nothing for {fields['name']}", "run its sources and iterations first")
-    if any(entry["stand_in"] for entry in shown.values()):
-        caption += f", on {STAND_IN}s of the datasets' objects"
-    seeds = max(cell.seeds for cell in cells.values())
-    repeats = (
-        f"Mean over {seeds} seed{'s' * (seeds != 1)}, {test} test samples each; ± is the half-width of the 95 % "
-        "t-interval over the seeds."
-    )
-    return Table(caption=caption, rows=tuple(rows), cells=cells, footnotes=(repeats, *notes), **fields)
+    of_setting = rows_where(grid, source=source, **dict(zip(_HEADS, setting, strict=True)))
+    _, factor = _MEASURES[measure]
+    return cell_of_repeats(of_setting[measure].to_numpy() * factor, test * len(of_setting))

@@ -1,16 +1,17 @@
-"""Table VIII: what policies of recovery make of the same failures with the same number of actions."""
+"""Makes Table VIII: what policies of recovery make of the same failures with the same number of actions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf, nan
+from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.metrics import ALL
-from gpca.errors import InputError
+from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import pool_share, wilson_interval
-from gpca.reporting.tables.table import Cell, Cells, Column, Rows, Table
+from gpca.reporting.tables.builder import TableBuilder, plain_cell
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,60 +20,51 @@ if TYPE_CHECKING:
 def table8_recovery(
     metrics: pd.DataFrame, seconds: Mapping[str, float], policies: Mapping[str, str], budget: int
 ) -> Table:
-    """Recovery within 1 to `budget` actions, wrong first actions, queued cases and seconds, by policy.
+    """Return recovery within 1 to `budget` actions, wrong first actions, queued cases and seconds, by policy.
 
     Args:
-        metrics: tidy, as :func:`gpca.recovery.metrics.collect_recovery` makes them.
-        seconds: policy -> mean seconds of a failure.
-        policies: name -> title, in order.
+        metrics: The tidy metrics that :func:`gpca.recovery.metrics.collect_recovery` makes.
+        seconds: The mean seconds of a failure, by policy.
+        policies: The title of each name, in order.
+        budget: The number of actions that a policy may take.
 
     Raises:
-        InputError: the metrics hold none of these.
+        InputError: The metrics hold none of these.
     """
-    rows: Rows = []
-    cells: Cells = {}
     seeds = metrics["seed"].nunique()
     within = [f"recovered_within_{k}" for k in range(1, budget + 1)]
-    shares = {key: (key, ALL) for key in (*within, "wrong_first", "queued")}
-    shares |= {f"{within[-1]}_{cause}": (within[-1], cause) for cause in CONCEPTS}
-    for name, title in policies.items():
-        if pool_share(metrics, name, within[0]) is None:
+    by_cause = {f"{within[-1]}_{cause}": cause for cause in CONCEPTS}
+    table = TableBuilder("table8_recovery", {"policy": "Policy"})
+    for policy, title in policies.items():
+        if pool_share(metrics, policy, within[0]) is None:
             continue
-        row = len(rows)
-        for key, (metric, cause) in shares.items():
-            if (found := pool_share(metrics, name, metric, cause)) is not None:
-                cells[row, key] = share_cell(*found, seeds)
-        actions = pool_share(metrics, name, "actions")
-        for key, mean in (("actions", actions and actions[0]), ("seconds", seconds.get(name))):
-            if mean is not None:
-                cells[row, key] = Cell(mean, nan, seeds, cells[row, within[0]].test_samples)
-        rows.append(((name, title),))
-    if not rows:
-        raise InputError("metrics", "hold no recovery for table8_recovery", "run the step recover first")
-    counts = failure_counts(metrics)
-    return Table(
-        name="table8_recovery",
-        caption="Failed registrations recovered (%), on tables of the virtual depth camera (procedural stand-in)",
-        row_heads={"policy": "Policy"},
-        rows=tuple(rows),
+        shares = {key: pool_share(metrics, policy, key) for key in (*within, "wrong_first", "queued")}
+        shares |= {key: pool_share(metrics, policy, within[-1], cause) for key, cause in by_cause.items()}
+        cells = {key: share_cell(*share, seeds) for key, share in shares.items() if share is not None}
+        failures = cells[within[0]].test_samples
+        if actions := pool_share(metrics, policy, "actions"):
+            cells["actions"] = plain_cell(actions[0], seeds, failures)
+        if policy in seconds:
+            cells["seconds"] = plain_cell(seconds[policy], seeds, failures)
+        table.add_row([(policy, title)], cells)
+    table.require_rows("metrics", "hold no recovery", "run the step recover first")
+    table.compare_down(within)
+    failures = table.cells[0, within[0]].test_samples
+    return table.build(
+        caption=f"Failed registrations recovered (%), on tables of the virtual depth camera ({STAND_IN})",
         column_head="metric",
         columns={
             **{key: Column(f"Within {k} (%)") for k, key in enumerate(within, start=1)},
-            **{
-                f"{within[-1]}_{cause}": Column(f"{cause.capitalize()} (%)", decimals=0, interval=False)
-                for cause in CONCEPTS
-            },
+            **{key: Column(f"{cause.capitalize()} (%)", decimals=0, interval=False) for key, cause in by_cause.items()},
             "wrong_first": Column("Wrong first (%)", decimals=0, interval=False, least_is_best=True),
             "queued": Column("Queued (%)", decimals=0, interval=False),
             "actions": Column("Actions", decimals=2, interval=False, limits=(0, inf)),
             "seconds": Column("Seconds", decimals=2, interval=False, limits=(0, inf)),
         },
-        cells=cells,
-        compared=tuple([(row, key) for row in range(len(rows))] for key in within),
         footnotes=(
-            f"{cells[0, within[0]].test_samples} failures over {seeds} seed{'s' * (seeds != 1)}: {counts}. A failure "
-            "is a pose off by more than 10 % of the diameter (ADD; ADD-S for symmetric objects) that is not off "
-            "without its cause. ± is half the width of the Wilson interval (95 %), whose bounds the CSV holds.",
+            f"{failures} failures over {plural(seeds, 'seed')}: {failure_counts(metrics)}. A failure is a pose off by "
+            "more than 10 % of the diameter (ADD; ADD-S for symmetric objects) that is not off without its cause. ± is "
+            "half the width of the Wilson interval (95 %), whose bounds the CSV holds.",
             f"Noise, Pose, Overlap: by cause, within {budget} actions. Wrong first: of the first actions, those that "
             "are not the cause's own. Queued: left to a person instead. Seconds: of explaining, acting and "
             "registering, per failure; the camera's and the robot's own times are not in them.",

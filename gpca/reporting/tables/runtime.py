@@ -1,4 +1,4 @@
-"""Table VII of the paper: what each component takes, here and as printed."""
+"""Makes Table VII of the paper: the time that each component takes, here and as printed."""
 
 from __future__ import annotations
 
@@ -9,60 +9,61 @@ from typing import TYPE_CHECKING
 from gpca.comparison.published import HARDWARE, Number, printed_seconds
 from gpca.errors import InputError
 from gpca.model.runtime_file import COMPONENTS
-from gpca.reporting.tables.table import Cell, Cells, Column, Rows, Table
+from gpca.reporting.tables.builder import TableBuilder, plain_cell
+from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number]) -> Table:
-    """Mean, standard deviation and median of each component in milliseconds, and what the paper prints.
+    """Return mean, standard deviation and median of each component in milliseconds, and what the paper prints.
 
     Args:
-        runtime: as :func:`gpca.model.runtime_file.read_runtime` reads it.
-        title: of the objects that were registered.
-        numbers: that the paper prints.
+        runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.
+        title: The title of the objects that were registered.
+        numbers: The numbers that the paper prints.
 
     Raises:
-        InputError: no rows.
+        InputError: The frame has no rows.
     """
     if runtime.empty:
         raise InputError("runtime", "holds no rows", "run the step 'runtime' first")
     published = printed_seconds(numbers)
-    rows: Rows = []
-    cells: Cells = {}
-    for row, of_row in enumerate(runtime.itertuples()):
-        printed = published.get(of_row.component)
+    table = TableBuilder(
+        "table7_runtime", {"component": "Component", "device": "Device", "published_device": "Device (paper)"}
+    )
+    for row in runtime.itertuples():
+        printed = published.get(row.component)
         published_on = printed.device if printed else ""
-        repeats = int(of_row.repeats)
-        rows.append(
-            (
-                (of_row.component, COMPONENTS[of_row.component]),
-                (of_row.device, of_row.device),
-                (published_on, published_on or "–"),
-            )
-        )
-        for name in ("mean", "deviation", "median"):
-            cells[row, name] = Cell(1e3 * getattr(of_row, f"{name}_s"), nan, 1, repeats)
+        cells = {
+            name: plain_cell(1e3 * getattr(row, f"{name}_s"), 1, int(row.repeats))
+            for name in ("mean", "deviation", "median")
+        }
         if printed:
-            cells[row, "published"] = Cell(1e3 * printed.value, nan, 1, 100, printed.upper > printed.value)
+            cells["published"] = Cell(1e3 * printed.value, nan, 1, 100, at_least=printed.upper > printed.value)
+        labels = [
+            (row.component, COMPONENTS[row.component]),
+            (row.device, row.device),
+            (published_on, published_on or EMPTY),
+        ]
+        table.add_row(labels, cells)
     here = "; ".join(f"{row.device}: {row.hardware}" for row in runtime.drop_duplicates("device").itertuples())
     there = "; ".join(f"{device}: {hardware}" for device, hardware in HARDWARE.items())
-    ranges = [
-        f"{COMPONENTS[component]} takes {number.text()} {number.unit}"
+    ranges = "".join(
+        f"; {COMPONENTS[component]} takes {number.text()} {number.unit}"
         for component, number in published.items()
         if number.upper > number.value
-    ]
-    threads, repeats = int(runtime["threads"].iloc[0]), int(runtime["repeats"].iloc[0])
+    )
+    threads = int(runtime["threads"].iloc[0])
+    repeats = int(runtime["repeats"].iloc[0])
 
     def milliseconds(name: str, decimals: int = 2) -> Column:
         return Column(f"{name} (ms)", decimals=decimals, interval=False, limits=(0, inf), least_is_best=True)
 
-    return Table(
-        name="table7_runtime",
+    return table.build(
         caption=f"Runtime per component on {title}, and as the paper prints it",
-        row_heads={"component": "Component", "device": "Device", "published_device": "Device (paper)"},
-        rows=tuple(rows),
         column_head="statistic",
         columns={
             "mean": milliseconds("Mean"),
@@ -70,10 +71,8 @@ def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number])
             "median": milliseconds("Median"),
             "published": milliseconds("Paper", decimals=0),
         },
-        cells=cells,
         footnotes=(
-            f"Over {repeats} runs, {threads} thread{'s' * (threads != 1)}. Here {here}. Paper: {there}"
-            f"{''.join(f'; {text}' for text in ranges)}.",
+            f"Over {repeats} runs, {plural(threads, 'thread')}. Here {here}. Paper: {there}{ranges}.",
             "ICP from one initial pose, between clouds of up to as many points as in the protocol; feature extraction "
             "of all draws of one cloud; sampling and scores of one registration. BALD selection scores the whole pool "
             "and picks a batch; retraining learns that batch.",

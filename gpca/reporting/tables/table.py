@@ -1,4 +1,4 @@
-"""A table of means over seeds, written as CSV for machines, Markdown for readers and LaTeX for the paper."""
+"""Writes a table of means over seeds as CSV for machines, Markdown for readers and LaTeX for the paper."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from pathlib import Path
 
 from gpca.files import whole_file
 
-EMPTY = "–"  # what is drawn where there is no number
-_COLUMN_CHARACTERS, _TEXT_CHARACTERS = 50, 100  # that fill one column and both of a two-column paper
+EMPTY = "–"  # A dash stands where there is no number.
+_COLUMN_CHARACTERS = 50  # So many fill one column of a two-column paper.
+_TEXT_CHARACTERS = 100  # So many fill both columns.
+_SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Mean over `seeds` repeats, the half-width of its 95 % t-interval (NaN for one seed), test samples in all.
+    """Holds a mean over `seeds` repeats, the half-width of its 95 % t-interval (NaN for one seed), all test samples.
 
-    A mean that is `at_least` so large, since some repeats were stopped before they were done, has no interval.
+    A mean that is `at_least` so large has no interval, since some repeats were stopped before they were done.
     An interval that is not symmetric has `bounds` too.
     """
 
@@ -33,7 +35,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """How one quantity is shown: title, digits after the point, with ± or without.
+    """Says how one quantity is shown: its title, the digits after the point, with ± or without.
 
     `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them. Of some
     quantities, as the labels that were needed, the least is best.
@@ -47,30 +49,29 @@ class Column:
 
     def text(self, cell: Cell) -> str:
         """Return e.g. ``97.7 ± 0.4``, or ``> 52.0``."""
-        if not self.interval or cell.at_least:
-            return f"{'> ' * cell.at_least}{cell.mean:.{self.decimals}f}"
+        mean = f"{cell.mean:.{self.decimals}f}"
+        if cell.at_least:
+            return f"> {mean}"
+        if not self.interval:
+            return mean
         half_width = EMPTY if math.isnan(cell.half_width) else f"{cell.half_width:.{self.decimals}f}"
-        return f"{cell.mean:.{self.decimals}f} ± {half_width}"
-
-
-Rows = list[tuple[tuple[str, str], ...]]  # for each row of a table its labels, key -> title each
-Cells = dict[tuple[int, str], Cell]
+        return f"{mean} ± {half_width}"
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows by columns of cells; every name has a key for the CSV and a title for the reader.
+    """Holds rows by columns of cells; every name has a key for the CSV and a title for the reader.
 
     Attributes:
-        name: file name without suffix, e.g. ``table1_single_baselines``.
-        caption: what the numbers are, their unit, and on which objects.
-        row_heads: key -> title of each row label, e.g. ``{"source": "Dataset"}``.
-        rows: for each row its labels, key -> title each, one label per row head.
-        column_head: key of what the columns are, e.g. ``explainer``.
-        columns: key -> :class:`Column`, in order.
-        cells: (row number, column key) -> cell; a missing one is drawn as a dash.
-        footnotes: what a reader needs to know to judge the numbers.
-        compared: groups of such keys; within each, the best printed mean is set in bold.
+        name: The file name without suffix, e.g. ``table1_single_baselines``.
+        caption: The line that says what the numbers are, their unit, and on which objects.
+        row_heads: The title of each row label by key, e.g. ``{"source": "Dataset"}``.
+        rows: The labels of each row, a key and a title for each row head.
+        column_head: The key of what the columns are, e.g. ``explainer``.
+        columns: The :class:`Column` of each key, in order.
+        cells: The cells by row number and column key; a missing one is drawn as a dash.
+        footnotes: The sentences that a reader needs to judge the numbers.
+        compared: Groups of such keys; the best printed mean of each group is set in bold.
     """
 
     name: str
@@ -134,30 +135,36 @@ class Table:
     def latex(self) -> str:
         r"""Return a floating table; it needs ``\usepackage{booktabs}`` and spans both columns when it is wide.
 
-        One that may be wider still is scaled down to the text where it is, which needs ``graphicx`` too.
+        A table that may be wider than the text is scaled down to it, which needs ``graphicx`` too.
         """
         plain = [self._heads(), *self._body(str, str)]
         characters = sum(2 + max(map(len, column)) for column in zip(*plain, strict=True))
         float_name = "table" if characters <= _COLUMN_CHARACTERS else "table*"
-        scale = characters > _TEXT_CHARACTERS
+        alignments = "l" * len(self.row_heads) + "c" * len(self.columns)
+        begin = rf"\begin{{tabular}}{{{alignments}}}"
+        end = r"\end{tabular}"
+        packages = "booktabs"
+        if characters > _TEXT_CHARACTERS:
+            begin = f"{_SCALED_DOWN}\n{begin}"
+            end += "}"
+            packages = "booktabs, graphicx"
         heads = [r"\textbf{" + _tex(title) + "}" for title in self._heads()]
         body = self._body(_tex, lambda text: r"\textbf{" + text + "}")
         return "\n".join(
             [
-                rf"% needs \usepackage{{booktabs{', graphicx' * scale}}}",
+                rf"% needs \usepackage{{{packages}}}",
                 rf"\begin{{{float_name}}}[t]",
                 r"\centering",
                 rf"\caption{{{_tex(self.caption)}}}",
                 rf"\label{{tab:{self.name}}}",
                 r"\small",
-                *([r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"] if scale else []),
-                rf"\begin{{tabular}}{{{'l' * len(self.row_heads)}{'c' * len(self.columns)}}}",
+                begin,
                 r"\toprule",
                 " & ".join(heads) + r" \\",
                 r"\midrule",
                 *(" & ".join(row) + r" \\" for row in body),
                 r"\bottomrule",
-                r"\end{tabular}" + "}" * scale,
+                end,
                 *(rf"\par\smallskip{{\footnotesize {_tex(footnote)}}}" for footnote in self.footnotes),
                 rf"\end{{{float_name}}}",
                 "",
@@ -168,7 +175,8 @@ class Table:
         return [*self.row_heads.values(), *(column.title for column in self.columns.values())]
 
     def _body(self, escape, bold) -> list[list[str]]:
-        body, best = [], self.best()
+        body = []
+        best = self.best()
         for row, labels in enumerate(self.rows):
             texts = [escape(title) for _, title in labels]
             for name, column in self.columns.items():

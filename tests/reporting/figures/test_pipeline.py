@@ -6,7 +6,8 @@ from gpca.active_learning.acquisition import EXPANSION
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.errors import InputError
 from gpca.reporting.figures import style
-from gpca.reporting.figures.pipeline import draw_pipeline, next_round
+from gpca.reporting.figures.label_round import next_round
+from gpca.reporting.figures.pipeline import draw_pipeline
 from gpca.reporting.figures.shown_sample import Stages
 
 BATCH = 3

@@ -1,0 +1,132 @@
+"""Builds a table row by row: it knows which rows have cells, which compete for bold, and what all tables say below."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from math import nan
+from typing import TYPE_CHECKING
+
+from gpca.attribution.metrics import mean_interval
+from gpca.errors import InputError
+from gpca.objects.title import stand_in_clause
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+INTERVAL = "± is the half-width of the 95 % t-interval over the seeds"
+Label = tuple[str, str]  # key for the CSV, title for the reader
+
+
+class TableBuilder:
+    """Collects labelled rows of cells and makes a :class:`Table` of them.
+
+    Attributes:
+        name: The name of the table, which the error for an empty one mentions.
+        row_heads: The title of each row label, by key.
+        rows: The labels of the rows so far.
+        cells: The cells so far, by row number and column key.
+    """
+
+    def __init__(self, name: str, row_heads: Mapping[str, str]) -> None:
+        self.name = name
+        self.row_heads = row_heads
+        self.rows: list[tuple[Label, ...]] = []
+        self.cells: dict[tuple[int, str], Cell] = {}
+        self._rivals: set[int] = set()
+        self._compared: list[list[tuple[int, str]]] = []
+
+    def add_row(self, labels: Sequence[Label], cells: Mapping[str, Cell | None], rival: bool = True) -> None:
+        """Add a row, unless it has no cell at all.
+
+        Args:
+            labels: The key and the title of one label per row head.
+            cells: The cell of each column key, or None where there is no number.
+            rival: Whether the row competes with others for bold, as an oracle does not.
+        """
+        found = {key: cell for key, cell in cells.items() if cell is not None}
+        if not found:
+            return
+        row = len(self.rows)
+        self.rows.append(tuple(labels))
+        self.cells |= {(row, key): cell for key, cell in found.items()}
+        if rival:
+            self._rivals.add(row)
+
+    def compare_across(self, columns: Iterable[str]) -> None:
+        """Let these columns compete for bold within each row."""
+        columns = list(columns)
+        self._compared += [[(row, key) for key in columns] for row in range(len(self.rows))]
+
+    def compare_down(self, columns: Iterable[str], same: int = 0) -> None:
+        """Let the rivals whose first `same` labels agree compete for bold within each of these columns."""
+        groups: dict[tuple, list[tuple[int, str]]] = {}
+        for key in columns:
+            for row in sorted(self._rivals):
+                groups.setdefault((self.rows[row][:same], key), []).append((row, key))
+        self._compared += groups.values()
+
+    def require_rows(self, subject: str, verb: str, remedy: str) -> None:
+        """Raise an InputError, such as "metrics: hold no accuracy for table1_extended", if no row was added."""
+        if not self.rows:
+            raise InputError(subject, f"{verb} for {self.name}", remedy)
+
+    def first_labels(self) -> list[str]:
+        """Return the different keys of the rows' first labels, in the order of the rows."""
+        return list(dict.fromkeys(labels[0][0] for labels in self.rows))
+
+    def stand_in_clause(self, sources: Mapping[str, Mapping], partly: bool = True) -> str:
+        """Return what the caption says of stand-ins among the sources that name the rows."""
+        return stand_in_clause((sources[name] for name in self.first_labels()), partly)
+
+    def most_seeds(self) -> int:
+        """Return over how many seeds the cell with the most of them is a mean."""
+        return max(cell.seeds for cell in self.cells.values())
+
+    def build(self, caption: str, column_head: str, columns: Mapping[str, Column], footnotes: Iterable[str]) -> Table:
+        """Return the table with its columns, which may depend on the cells that were found."""
+        return Table(
+            name=self.name,
+            caption=caption,
+            row_heads=self.row_heads,
+            rows=tuple(self.rows),
+            column_head=column_head,
+            columns=columns,
+            cells=self.cells,
+            footnotes=tuple(footnotes),
+            compared=tuple(self._compared),
+        )
+
+
+def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bool = False) -> Cell | None:
+    """Return the mean over R repeats with the half-width of its t-interval, or None without any repeat.
+
+    Args:
+        values_R: One value per seed, in the column's unit.
+        test_samples: The number of test samples of all seeds together.
+        at_least: Whether some repeat was stopped before it was done, which makes the mean a lower bound.
+    """
+    if len(values_R) == 0:
+        return None
+    mean, low, _ = mean_interval(values_R)
+    return Cell(mean, mean - low, len(values_R), test_samples, at_least)
+
+
+def plain_cell(value: float, seeds: int, test_samples: int) -> Cell:
+    """Return a number that has no interval."""
+    return Cell(value, nan, seeds, test_samples)
+
+
+def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
+    """Return the rows whose columns hold what is wanted, e.g. ``rows_where(metrics, source="ycb", concept="all")``."""
+    chosen = None
+    for column, value in wanted.items():
+        holds = frame[column] == value
+        chosen = holds if chosen is None else chosen & holds
+    return frame if chosen is None else frame[chosen]
+
+
+def mean_over(seeds: int | str, samples: int | str) -> str:
+    """Return the start of the footnote that most tables begin with; it ends with what ± means, without a full stop."""
+    return f"Mean over {plural(seeds, 'seed')}, {samples} test samples each; {INTERVAL}"

@@ -1,0 +1,16 @@
+from gpca.objects.title import stand_in_clause, title_of
+
+REAL = {"title": "YCB", "stand_in": False}
+STAND_IN = {"title": "YCB", "stand_in": True}
+
+
+def test_only_a_stand_in_is_called_one():
+    assert title_of(REAL) == "YCB"
+    assert title_of(STAND_IN) == "YCB (procedural stand-in)"
+
+
+def test_a_caption_tells_stand_ins_from_a_mixture():
+    assert stand_in_clause([REAL, REAL]) == stand_in_clause([]) == ""
+    assert stand_in_clause([STAND_IN, STAND_IN]) == ", on procedural stand-ins of the datasets' objects"
+    assert stand_in_clause([STAND_IN, REAL]) == ", partly on procedural stand-ins of the datasets' objects"
+    assert stand_in_clause([STAND_IN, REAL], partly=False) == ", on procedural stand-ins of the datasets' objects"

@@ -1,0 +1,136 @@
+import math
+
+import pandas as pd
+import pytest
+
+from gpca.errors import InputError
+from gpca.reporting.tables.builder import (
+    INTERVAL,
+    TableBuilder,
+    cell_of_repeats,
+    mean_over,
+    plain_cell,
+    rows_where,
+)
+from gpca.reporting.tables.table import Column
+
+HEADS = {"source": "Dataset", "explainer": "Explainer"}
+SOURCES = {"ycb": {"title": "YCB", "stand_in": True}, "linemod": {"title": "LINEMOD", "stand_in": False}}
+
+
+def labels(source, explainer):
+    return [(source, source.upper()), (explainer, explainer.title())]
+
+
+def cells(**means):
+    return {key: None if mean is None else plain_cell(mean, 3, 600) for key, mean in means.items()}
+
+
+@pytest.fixture
+def builder():
+    builder = TableBuilder("table9", HEADS)
+    builder.add_row(labels("ycb", "oracle"), cells(a=99, b=1), rival=False)
+    builder.add_row(labels("ycb", "gpca"), cells(a=90, b=95))
+    builder.add_row(labels("ycb", "shap"), cells(a=80, b=None))
+    builder.add_row(labels("linemod", "gpca"), cells(a=70, b=60))
+    builder.add_row(labels("linemod", "shap"), cells(a=71, b=61))
+    return builder
+
+
+def built(builder, **options):
+    columns = {"a": Column("A"), "b": Column("B")}
+    return builder.build(**{"caption": "T", "column_head": "metric", "columns": columns, "footnotes": ["n"]} | options)
+
+
+def test_a_table_has_the_rows_and_cells_that_were_added_in_their_order(builder):
+    table = built(builder)
+    assert (table.name, table.caption, table.row_heads, table.column_head) == ("table9", "T", HEADS, "metric")
+    assert [row[0][0] + " " + row[1][1] for row in table.rows] == [
+        "ycb Oracle", "ycb Gpca", "ycb Shap", "linemod Gpca", "linemod Shap",
+    ]  # fmt: skip
+    assert table.cells[1, "b"].mean == 95
+    assert (2, "b") not in table.cells
+    assert table.footnotes == ("n",)
+    assert "| YCB | Shap | 80.0 ± – | – |" in table.markdown()
+
+
+def test_a_row_without_any_cell_is_left_out(builder):
+    builder.add_row(labels("cups", "gpca"), cells(a=None, b=None))
+    builder.add_row(labels("cups", "shap"), {})
+    builder.add_row(labels("cups", "oracle"), cells(b=5))
+    assert builder.first_labels() == ["ycb", "linemod", "cups"]
+    assert built(builder).cells[5, "b"].mean == 5
+
+
+def test_across_the_columns_of_a_row_compete_and_oracles_too(builder):
+    builder.compare_across(["a", "b"])
+    assert built(builder).best() == {(0, "a"), (1, "b"), (3, "a"), (4, "a")}
+
+
+def test_down_a_column_the_rivals_compete_whose_first_labels_agree(builder):
+    builder.compare_down(["a"], same=1)
+    assert built(builder).best() == {(1, "a"), (4, "a")}
+
+
+def test_down_a_column_all_rivals_compete_where_no_label_has_to_agree(builder):
+    builder.compare_down(["a", "b"])
+    assert built(builder).best() == {(1, "a"), (1, "b")}
+
+
+def test_comparisons_add_up_and_without_one_nothing_is_bold(builder):
+    assert built(builder).best() == set()
+    builder.compare_down(["b"])
+    builder.compare_across(["a", "b"])
+    assert len(built(builder).compared) == 1 + 5
+
+
+def test_a_table_without_rows_is_refused_by_its_name(builder):
+    builder.require_rows("metrics", "hold no accuracy", "run its explainers first")
+    with pytest.raises(InputError, match=r"^metrics: hold no accuracy for table0; run its explainers first$"):
+        TableBuilder("table0", HEADS).require_rows("metrics", "hold no accuracy", "run its explainers first")
+
+
+def test_the_caption_speaks_of_the_stand_ins_among_the_rows(builder):
+    assert builder.stand_in_clause(SOURCES) == ", partly on procedural stand-ins of the datasets' objects"
+    assert builder.stand_in_clause(SOURCES, partly=False) == ", on procedural stand-ins of the datasets' objects"
+    others = SOURCES | {"ycb": SOURCES["linemod"], "absent": SOURCES["ycb"]}
+    assert builder.stand_in_clause(others) == ""
+
+
+def test_the_most_seeds_of_any_cell_are_found(builder):
+    builder.add_row(labels("cups", "gpca"), {"a": plain_cell(1, 5, 10), "b": plain_cell(1, 2, 10)})
+    assert builder.most_seeds() == 5
+
+
+def test_a_cell_of_repeats_has_their_mean_and_t_interval():
+    cell = cell_of_repeats([97.0, 98.0, 99.0], 600)
+    assert (cell.mean, cell.seeds, cell.test_samples, cell.at_least) == (98, 3, 600, False)
+    assert cell.half_width == pytest.approx(4.302653 / math.sqrt(3), abs=1e-5)
+    assert cell_of_repeats(pd.Series([1.0, 2.0]), 2, at_least=True).at_least
+
+
+def test_one_repeat_has_no_interval_and_none_makes_no_cell():
+    assert math.isnan(cell_of_repeats([5.0], 200).half_width)
+    assert cell_of_repeats([], 200) is None
+    assert math.isnan(plain_cell(0.25, 3, 600).half_width)
+
+
+def test_rows_are_found_by_all_that_is_wanted():
+    frame = pd.DataFrame({"source": ["a", "a", "b"], "seed": [0, 1, 1], "value": [1.0, 2.0, 3.0]})
+    assert rows_where(frame, source="a", seed=1)["value"].tolist() == [2.0]
+    assert rows_where(frame, source="a")["value"].tolist() == [1.0, 2.0]
+    assert rows_where(frame, source=None).empty
+    assert len(rows_where(frame)) == 3
+
+
+@pytest.mark.parametrize(
+    ("seeds", "samples", "words"),
+    [
+        (1, 200, "Mean over 1 seed, 200 test samples each"),
+        ("1", "200", "Mean over 1 seed, 200 test samples each"),
+        (5, 200, "Mean over 5 seeds, 200 test samples each"),
+        ("2 to 3", "60 to 200", "Mean over 2 to 3 seeds, 60 to 200 test samples each"),
+    ],
+)
+def test_the_footnote_counts_seeds_and_samples(seeds, samples, words):
+    assert mean_over(seeds, samples) == f"{words}; {INTERVAL}"
