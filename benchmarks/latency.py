@@ -110,7 +110,7 @@ def make_explainer(options: argparse.Namespace):
     from gpca.recovery.policy import RecoveryPolicy
 
     torch.manual_seed(0)
-    settings = EncoderSettings(points=options.points)
+    settings = EncoderSettings(draw_points=options.points)
     encoder = make_model(settings).encoder.train()
     clouds = [make_pair(options.points, "training", n)[0].astype(np.float32) for n in range(TRAINING)]
     with torch.no_grad():

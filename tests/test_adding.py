@@ -89,7 +89,7 @@ def test_an_encoder(config, added_modules, registrations, monkeypatch):
     update_config(config, yaml.safe_load(block("config/config.yaml", "pointwise")))
     check(config)
     assert config["embedding"]["encoder"] in config["encoders"]
-    settings = EncoderSettings(**config["encoders"]["pointwise"] | {"epochs": 1, "points": 64})
+    settings = EncoderSettings(**config["encoders"]["pointwise"] | {"epochs": 1, "draw_points": 64})
     model, curve = train_encoder(registrations, "tiny", 0, settings)
     assert len(curve) == 1
     h_S_d, _ = embed(model, registrations, "tiny", 0, settings)

@@ -98,5 +98,5 @@ def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
             rows[column] = numbers(path, rows, column)
         parts.append(rows.assign(source=source, seed=seed, iterations=rows["iterations"].astype(int)))
     if not parts:
-        raise InputError("kernels", "no files were given", "name a source in kernels.sources")
+        raise InputError("kernels", "no files were given", "name a source in kernel_grid.sources")
     return pd.concat(parts, ignore_index=True)

@@ -76,9 +76,9 @@ def check(config: dict) -> dict[str, dict]:
     }
     if (name := config["figures"]["source"]) not in sources:
         raise InputError("config key figures.source", f"no source '{name}'", f"known are {', '.join(sources)}")
-    for name in config["kernels"]["sources"]:
+    for name in config["kernel_grid"]["sources"]:
         if name not in sources:
-            raise InputError("config key kernels.sources", f"no source '{name}'", f"known are {', '.join(sources)}")
+            raise InputError("config key kernel_grid.sources", f"no source '{name}'", f"known are {', '.join(sources)}")
     for key, names in {"source": (*sources, REAL_WORLD), "encoder": tuple(config["encoders"])}.items():
         if (name := config["model"][key]) not in names:
             raise InputError(f"config key model.{key}", f"no {key} '{name}'", f"known are {', '.join(names)}")

@@ -30,7 +30,7 @@ class EncoderSettings:
 
     Attributes:
         backbone: name in :mod:`gpca.encoders.registry`.
-        points: N, points of a cloud that the encoder sees at once.
+        draw_points: N, points of a cloud that the encoder sees at once.
         draws: an embedding is the mean over so many draws of N points from the cloud.
         epochs, batch_size: length of the training.
         learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
@@ -39,7 +39,7 @@ class EncoderSettings:
     """
 
     backbone: str = "dgcnn"
-    points: int = 512
+    draw_points: int = 512
     draws: int = 4
     epochs: int = 10
     batch_size: int = 16
@@ -96,7 +96,7 @@ def train_encoder(
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
-            points_B_N_3 = draw_points(registrations, batch_rows, settings.points, source, seed, "epoch", epoch)
+            points_B_N_3 = draw_points(registrations, batch_rows, settings.draw_points, source, seed, "epoch", epoch)
             logits_B_C, labels_B = model(points_B_N_3.to(device)), labels_S[batch_rows].to(device)
             loss = nn.functional.cross_entropy(logits_B_C, labels_B)
             optimiser.zero_grad()
@@ -134,13 +134,13 @@ def embed(
     of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. As the head is
     linear, its logits at h are the mean over the draws too.
     """
-    device = best_device()
+    device, n_points = best_device(), settings.draw_points
     model.to(device).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            model.encoder(draw_points(registrations, rows, settings.points, source, seed, "embedding", draw).to(device))
+            model.encoder(draw_points(registrations, rows, n_points, source, seed, "embedding", draw).to(device))
             for draw in range(settings.draws)
         ]
         parts.append(torch.stack(draws).mean(dim=0))

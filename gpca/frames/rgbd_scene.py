@@ -31,7 +31,7 @@ class SceneSettings:
 
     Attributes:
         families: of procedural objects.
-        scenes, views: scenes, and frames of each.
+        count, views: scenes, and frames of each.
         objects: range of their number in a scene.
         distance_m: range from the camera to the middle of the objects.
         elevation_deg: range above the table; the azimuth goes all around.
@@ -41,7 +41,7 @@ class SceneSettings:
     """
 
     families: tuple[str, ...] = ("ycb",)
-    scenes: int = 12
+    count: int = 12
     views: int = 4
     objects: tuple[int, int] = (4, 8)
     distance_m: tuple[float, float] = (0.6, 0.9)
@@ -80,8 +80,9 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     surfaces = [centre(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
-        _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **asdict(settings)})
-        for scene in progress(range(settings.scenes), f"scenes of {source}"):
+        drawn = {"scenes" if name == "count" else name: value for name, value in asdict(settings).items()}
+        _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **drawn})
+        for scene in progress(range(settings.count), f"scenes of {source}"):
             standing = lay_table(surfaces, settings, source, scene)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
             views = camera_poses(settings, middle_m, source, scene)

@@ -189,7 +189,7 @@ class Situations:
 
     def _clean(self, random: np.random.Generator, axes: tuple) -> Situation | None:
         scenes = self._settings.scenes
-        number = int(random.integers(scenes.scenes))
+        number = int(random.integers(scenes.count))
         if number not in self._tables:
             source = "/".join(map(str, self._part))
             self._tables[number] = lay_table(self._shelf.surfaces, scenes, source, number, self._shelf.resting)

@@ -79,8 +79,8 @@ def _register_one(
     index = int(instances.object_index[i])
     diameter_m, given = float(objects.diameters_m[index]), settings.registration
     T_init_camera = inverse(instances.T_camera_object_init[i])
-    rows = random.permutation(len(instances.cloud_m(i)))[: given.points]
-    target_rows = random.permutation(len(objects.points(index)))[: given.points]
+    rows = random.permutation(len(instances.cloud_m(i)))[: given.cloud_points]
+    target_rows = random.permutation(len(objects.points(index)))[: given.cloud_points]
     points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
     perturbed, lost_to = None, ""
     if concept == "overlap":

@@ -125,7 +125,7 @@ class Explainer:
         the same.
         """
         settings = self.model.encoder_settings
-        draws, n = (1 if len(aligned) == settings.points else settings.draws), settings.points
+        draws, n = (1 if len(aligned) == settings.draw_points else settings.draws), settings.draw_points
         repeated = len(aligned) < n
         rows_D_N = [
             generator("explanation", "draw", draw).choice(len(aligned), n, replace=repeated, shuffle=False)
@@ -135,7 +135,7 @@ class Explainer:
         return self.model.encoder(clouds_D_N_3.to(self._device)).mean(dim=0, keepdim=True).cpu().numpy()
 
     def _thinned(self, points: np.ndarray, role: str, notes: list[str]) -> np.ndarray:
-        kept = thin(points, self.model.points, role)
+        kept = thin(points, self.model.cloud_points, role)
         if len(kept) < len(points):
             notes.append(f"{role}: {len(kept)} of {len(points)} points, drawn at random")
         return kept
@@ -156,7 +156,7 @@ def _spread(
     icp: BatchedICP, source: np.ndarray, T_icp: np.ndarray, settings: UncertaintySettings, diameter: float
 ) -> Spread:
     xi_n_6 = generator("explanation", "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
-    runs = run_from_starts(icp, thin(source, settings.points, "spread"), np.eye(4), xi_n_6)
+    runs = run_from_starts(icp, thin(source, settings.icp_points, "spread"), np.eye(4), xi_n_6)
     return Spread(runs.covariance(T_icp), settings.starts, diameter)
 
 

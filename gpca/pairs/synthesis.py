@@ -24,14 +24,14 @@ class RegistrationSettings:
 
     Attributes:
         train, test: samples of each split, balanced over concepts and objects.
-        points: points of source and target (fewer where the object has fewer than twice as many).
+        cloud_points: of source and of target (fewer where the object has fewer than twice as many).
         severities: ranges of the perturbations.
         icp: how ICP runs.
     """
 
     train: int = 800
     test: int = 200
-    points: int = 2048
+    cloud_points: int = 2048
     severities: Severities = field(default_factory=Severities)
     icp: ICPSettings = field(default_factory=ICPSettings)
 
@@ -72,7 +72,7 @@ def _register_one(
     objects: ObjectClouds, object_index: int, concept: str, settings: RegistrationSettings, random: np.random.Generator
 ) -> dict:
     points = objects.points(object_index) / float(objects.diameters_m[object_index])
-    n_points = min(settings.points, len(points) // 2)
+    n_points = min(settings.cloud_points, len(points) // 2)
     # Disjoint draws: a point seen in both clouds would have distance zero, and that gives the concept away.
     order = random.permutation(len(points))
     source_rows, target_rows = order[:n_points], order[n_points : 2 * n_points]

@@ -42,14 +42,14 @@ class LoopSettings:
     Attributes:
         failures: wanted for each cause. tries: registrations made for them, at most, for each cause.
         budget: actions for each failure, at most.
-        points: of source and target.
+        cloud_points: of source and of target.
         icp: how ICP runs.
     """
 
     failures: int = 8
     tries: int = 120
     budget: int = 3
-    points: int = 2048
+    cloud_points: int = 2048
     icp: ICPSettings = field(default_factory=ICPSettings)
 
 
@@ -69,7 +69,7 @@ class Episode:
         """Return the outcome after these actions, of which all but the last were taken."""
         if actions not in self.outcomes:
             given = (self.situation, self.outcomes[actions[:-1]], known[actions[-1]], actions)
-            self.outcomes[actions] = register_after(*given, settings.points, settings.icp)
+            self.outcomes[actions] = register_after(*given, settings.cloud_points, settings.icp)
         return self.outcomes[actions]
 
 
@@ -88,10 +88,10 @@ def find_failures(situations: Situations, settings: LoopSettings) -> list[Episod
                 break
             tried[cause] = number + 1
             disturbed, clean = situations.draw(cause, cause, number)
-            start = register_first(disturbed, settings.points, settings.icp)
+            start = register_first(disturbed, settings.cloud_points, settings.icp)
             if start is None or start.error <= CORRECT:
                 continue
-            without = register_first(clean, settings.points, settings.icp)
+            without = register_first(clean, settings.cloud_points, settings.icp)
             if without is not None and without.error <= CORRECT:
                 found.append((disturbed, start))
         episodes += [Episode(len(episodes) + n, *failure, tried[cause]) for n, failure in enumerate(found)]
@@ -236,7 +236,7 @@ def register_situations(
             cause, start, redraw = CONCEPTS[number % len(CONCEPTS)], None, 0
             while start is None:
                 situation, _ = situations[split].draw(cause, cause, number, redraw)
-                start, redraw = register_first(situation, settings.points, settings.icp), redraw + 1
+                start, redraw = register_first(situation, settings.cloud_points, settings.icp), redraw + 1
             records.append(start.record | {"sample": number, "split": split})
             failed.append(start.error > CORRECT)
     return as_registrations(records)[0], np.array(failed)

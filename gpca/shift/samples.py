@@ -28,7 +28,7 @@ class ShiftSettings:
         held_out_share: of the objects, at least one, that this encoder and the learners on it never see.
         train: training samples of that encoder, at most.
         neighbours: of the mean distance to the nearest training samples.
-        points: at which the local shape of a cloud is measured for the distances.
+        shape_points: at which the local shape of a cloud is measured for the distances.
     """
 
     beyond: RegistrationSettings
@@ -37,7 +37,7 @@ class ShiftSettings:
     held_out_share: float = 0.2
     train: int = 300
     neighbours: int = 10
-    points: int = 128
+    shape_points: int = 128
 
 
 def make_sets(
@@ -105,7 +105,7 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
     """Join sets of one encoder, the one with its training samples first, and measure the distances to these."""
     spaces = {
         "analytical": {
-            name: analytical_features(part, source, seed, "distance", name, points=settings.points)
+            name: analytical_features(part, source, seed, "distance", name, shape_points=settings.shape_points)
             for name, part in parts.items()
         },
         "embedding": {name: part.embedding for name, part in parts.items()},

@@ -61,7 +61,7 @@ def run(options: Namespace) -> None:
             encoder_settings=settings,
             gpc=fit_gpc(train),
             icp=ICPSettings(**given["registrations"].get("icp", {})),
-            points=given["registrations"].get("points", 2048),
+            cloud_points=given["registrations"].get("cloud_points", 2048),
             policy=_policy(given["recovery"], train, fit_gpc, h_S_d),
             title=options.title,
             stand_in=options.stand_in,

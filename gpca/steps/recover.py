@@ -60,7 +60,7 @@ def run(options: Namespace) -> None:
     entries = {name: policy_entry(name, tuple(actions)) for name in policies}
     registration = RegistrationSettings.from_dict(given["registrations"])
     situation = situation_settings(given, registration)
-    loop = LoopSettings(**recovery["loop"], points=registration.points, icp=registration.icp)
+    loop = LoopSettings(**recovery["loop"], cloud_points=registration.cloud_points, icp=registration.icp)
     outputs = [options.out, options.timings, options.policy, options.example]
     axes = (SOURCE, options.seed)
     with record_provenance(outputs, [], given, seed=options.seed):
@@ -90,7 +90,7 @@ def situation_settings(given: dict, registration: RegistrationSettings) -> Situa
     """Build from the sections ``real_world.scenes`` and ``recovery`` of the config."""
     recovery = given["recovery"]
     scenes = replace(
-        SceneSettings.from_dict(given["scenes"]), scenes=recovery["tables"], camera=Camera(**recovery["camera"])
+        SceneSettings.from_dict(given["scenes"]), count=recovery["tables"], camera=Camera(**recovery["camera"])
     )
     ranges = {name: tuple(recovery[name]) for name in ("noise_scale", "hidden")}
     return SituationSettings(scenes, **ranges, severities=registration.severities)

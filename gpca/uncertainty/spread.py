@@ -30,7 +30,7 @@ class UncertaintySettings:
     Attributes:
         starts: n, initial poses per condition.
         start_rotation_deg, start_translation: root mean square angle and length of the starts' offsets.
-        points: points of source and of target in these runs (fewer where a cloud has fewer).
+        icp_points: of source and of target in these runs (fewer where a cloud has fewer).
         floor: ε, variance below which a spread is no uncertainty: (1e-3)² is 0.06° and a thousandth of the diameter.
         icp: how ICP runs.
     """
@@ -38,7 +38,7 @@ class UncertaintySettings:
     starts: int = 50
     start_rotation_deg: float = 10.0
     start_translation: float = 0.05
-    points: int = 512
+    icp_points: int = 512
     floor: float = 1e-6
     icp: ICPSettings = field(default_factory=ICPSettings)
 

@@ -53,7 +53,7 @@ def test_the_shipped_configs_are_sound(name):
 def test_a_source_that_is_false_is_left_out_as_if_it_were_not_there():
     config, never_there = changed("sources.linemod", False), changed("sources.linemod", MISSING)
     for given in (config, never_there):
-        given["kernels"]["sources"] = ["ycb"]
+        given["kernel_grid"]["sources"] = ["ycb"]
     assert run_config.check(config) == run_config.check(never_there)
     assert config["sources"]["linemod"] is False  # for a Snakemake that is given this config once more
 
@@ -111,7 +111,7 @@ FAULTS = [
     ("real_world.initial_pose.form", "results", "real_world.datasets.scenes.results: is needed by initial_pose form"),
     ("real_world.reductions", ["tsne"], "real_world.reductions.0: 'tsne' is not one of"),
     ("sources.real_rgbd", folder(), "sources.real_rgbd: is the name of real_world's frames"),
-    ("kernels.kernel", ["rbf"], "kernels.kernel: unknown; did you mean kernels?"),
+    ("kernel_grid.kernel", ["rbf"], "kernel_grid.kernel: unknown; did you mean kernels?"),
     ("shift.severities.crops", [0.6, 0.7], "shift.severities.crops: unknown; did you mean crop?"),
     ("shift.encoder.options", {"k": 8}, "shift.encoder.options: unknown"),
     # missing keys
@@ -130,9 +130,9 @@ FAULTS = [
     ("explainers.gpca", [1], "explainers.gpca: [1] is not of type 'object', 'null'"),
     ("seeds", 3, "seeds: 3 is not of type 'array'"),
     # out of range
-    ("kernels.kernels", ["cubic"], "kernels.kernels.0: 'cubic' is not one of"),
-    ("kernels.iterations", [0], "kernels.iterations.0: 0 is less than the minimum of 1"),
-    ("kernels.learning_rates", [], "kernels.learning_rates: [] should be non-empty"),
+    ("kernel_grid.kernels", ["cubic"], "kernel_grid.kernels.0: 'cubic' is not one of"),
+    ("kernel_grid.iterations", [0], "kernel_grid.iterations.0: 0 is less than the minimum of 1"),
+    ("kernel_grid.learning_rates", [], "kernel_grid.learning_rates: [] should be non-empty"),
     ("learners.gpca", {"draws": 0}, "learners.gpca: setting draws: 0 is less than the minimum of 2"),
     ("shift.held_out_share", 1, "shift.held_out_share: 1 is "),
     ("shift.severities.noise", [0.5, 0.4], "shift.severities: severity noise: [0.5, 0.4] runs downwards"),
@@ -156,7 +156,7 @@ FAULTS = [
         "cubic",
         "explainers.gpca.kernel: 'cubic' is not one of ['rbf', 'matern32', 'polynomial']",
     ),
-    ("objects.points", 100, "objects.points: 100 is less than the minimum of 256"),
+    ("objects.surface_points", 100, "objects.surface_points: 100 is less than the minimum of 256"),
     ("seeds", [], "seeds: [] should be non-empty"),
     ("seeds", [0, 1, 0], "seeds: [0, 1, 0] has non-unique elements"),
     ("seeds", [-1], "seeds.0: -1 is less than the minimum of 0"),
@@ -170,7 +170,7 @@ FAULTS = [
     ("model.source", "lab", "model.source: no source 'lab'; known are coffee_cup, linemod, ycb, real_rgbd"),
     ("model.encoder", "voxelnet", "model.encoder: no encoder 'voxelnet'; known are dgcnn"),
     ("runtime.repeats", 1, "runtime.repeats: 1 is less than the minimum of 2"),
-    ("kernels.sources", ["ycbv"], "kernels.sources: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    ("kernel_grid.sources", ["ycbv"], "kernel_grid.sources: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
     ("learners.learner_tree", {}, "learners.learner_tree: explainer 'learner_tree': unknown; known are gpca_paper"),
     ("learners.learner_forest", {"tree": 3}, "learners.learner_forest: explainer 'learner_forest': got an unexpected"),
     ("learners.residuals_forest", {}, "learners.residuals_forest: does not read embeddings; choose another"),
@@ -218,7 +218,7 @@ def test_what_is_allowed_passes(key, value):
 def test_settings_given_by_hand_need_not_be_complete():
     check_settings({}, "registrations")
     check_settings({"train": 12, "severities": {"noise": [0.1, 0.2]}}, "registrations")
-    check_settings({"points": 64, "options": {"k": 8}}, "encoders", "any")
+    check_settings({"draw_points": 64, "options": {"k": 8}}, "encoders", "any")
     check_settings({"kind": "mesh_folder", "location": "parts"}, "sources", "any")
     check_settings({"whatever": 1}, "explainers", "an_own_one")
 

@@ -8,7 +8,7 @@ import torch
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.training import EncoderSettings, draw_points, embed
 
-SETTINGS = EncoderSettings(points=64, draws=2, batch_size=12, options={"k": 8, "point_features": 16})
+SETTINGS = EncoderSettings(draw_points=64, draws=2, batch_size=12, options={"k": 8, "point_features": 16})
 
 
 @pytest.fixture(scope="module")

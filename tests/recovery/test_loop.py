@@ -24,14 +24,14 @@ from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds
 from ..documents import block
 from ..frames.tiny import scene_settings, surfaces
 
-LOOP = LoopSettings(failures=1, tries=12, budget=3, points=400)
+LOOP = LoopSettings(failures=1, tries=12, budget=3, cloud_points=400)
 ICP = ICPSettings()
 
 
 @pytest.fixture(scope="module")
 def situations():
     shelf = Shelf(surfaces(), "tiny", 1024, InitialPoseSettings(tries=2))
-    scenes = scene_settings(noise=DepthNoise(), objects=(3, 3), scenes=2, camera=Camera(160, 120, 285))
+    scenes = scene_settings(noise=DepthNoise(), objects=(3, 3), count=2, camera=Camera(160, 120, 285))
     settings = SituationSettings(scenes=scenes, noise_scale=(5.0, 8.0), hidden=(0.5, 0.95))
     return {part: Situations(shelf, settings, ("tiny", 1, part)) for part in ("train", "test", "failures")}
 
@@ -41,7 +41,7 @@ def start(situations):
     """A bad initial pose of the bracket, which no rotation leaves as it is, and the first registration from it."""
     for number in range(60):
         disturbed, _ = situations["failures"].draw("pose", "pose", number)
-        outcome = register_first(disturbed, LOOP.points, ICP)
+        outcome = register_first(disturbed, LOOP.cloud_points, ICP)
         if outcome is not None and outcome.error > CORRECT:
             return disturbed, outcome
     raise AssertionError("no failure")
@@ -57,13 +57,13 @@ def test_a_registration_is_that_of_its_row(start):
     if not situation.shelf.symmetric[situation.model]:
         assert outcome.error > 0.5 * np.linalg.norm(T_error[:3, 3]) / d - 0.5
     right = replace(held, T_world_object_init=situation.T_world_object)
-    assert register_held(situation, right, LOOP.points, ICP).error < 0.05
+    assert register_held(situation, right, LOOP.cloud_points, ICP).error < 0.05
 
 
 def test_a_broader_search_finds_what_explains_the_shots(start):
     situation, outcome = start
     found = ACTIONS["reinitialise"](outcome.holding, RobotIn(situation), np.random.default_rng(0), starts=48)
-    assert register_held(situation, found, LOOP.points, ICP).error < outcome.error
+    assert register_held(situation, found, LOOP.cloud_points, ICP).error < outcome.error
     assert found.shots is outcome.holding.shots
 
 
@@ -81,11 +81,11 @@ def test_a_new_view_is_fused_with_the_old_one_and_shows_more(start):
 
 def test_denoising_takes_more_frames_each_time_and_keeps_doing_so(start):
     situation, outcome = start
-    once = register_after(situation, outcome, ACTIONS["denoise"], ("denoise",), LOOP.points, ICP)
-    twice = register_after(situation, once, ACTIONS["denoise"], ("denoise", "denoise"), LOOP.points, ICP)
+    once = register_after(situation, outcome, ACTIONS["denoise"], ("denoise",), LOOP.cloud_points, ICP)
+    twice = register_after(situation, once, ACTIONS["denoise"], ("denoise", "denoise"), LOOP.cloud_points, ICP)
     assert (once.holding.frames, twice.holding.frames) == (10, 20)
     assert once.holding.filtered
-    looked = register_after(situation, once, ACTIONS["new_view"], ("denoise", "new_view"), LOOP.points, ICP)
+    looked = register_after(situation, once, ACTIONS["new_view"], ("denoise", "new_view"), LOOP.cloud_points, ICP)
     assert looked.holding.frames == 10
 
 
@@ -93,7 +93,7 @@ def test_the_action_of_the_documentation_sees_the_object_from_closer(start):
     situation, outcome = start
     added = dict(vars(actions)) | {"ACTIONS": dict(ACTIONS)}
     exec(block("gpca/recovery/actions.py"), added)
-    result = register_after(situation, outcome, added["ACTIONS"]["closer"], ("closer",), LOOP.points, ICP)
+    result = register_after(situation, outcome, added["ACTIONS"]["closer"], ("closer",), LOOP.cloud_points, ICP)
     away, near = result.holding.shots
     assert away is outcome.holding.shots[0]
     assert near.mask.sum() > 1.5 * away.mask.sum()
@@ -107,7 +107,8 @@ def test_the_pose_that_explains_the_shots_is_started_from(start):
 
 def test_an_action_gives_the_same_again(start):
     situation, outcome = start
-    a, b = (register_after(situation, outcome, ACTIONS["new_view"], ("new_view",), LOOP.points, ICP) for _ in range(2))
+    given = (situation, outcome, ACTIONS["new_view"], ("new_view",), LOOP.cloud_points, ICP)
+    a, b = (register_after(*given) for _ in range(2))
     assert (a.record["cloud"] == b.record["cloud"]).all()
     assert a.error == b.error
 
@@ -176,7 +177,7 @@ def test_a_policy_does_not_insist_on_what_did_not_help(loop):
 
 
 def test_failures_have_their_cause_and_are_bounded(situations):
-    episodes = find_failures(situations["failures"], LoopSettings(failures=1, tries=8, points=400))
+    episodes = find_failures(situations["failures"], LoopSettings(failures=1, tries=8, cloud_points=400))
     for episode in episodes:
         assert episode.outcomes[()].error > CORRECT
         assert episode.tries <= 8

@@ -10,7 +10,7 @@ from gpca.uncertainty.designs import CORNERS
 from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbours, denoise, trim
 from gpca.uncertainty.spread import Runs, UncertaintySettings
 
-SETTINGS = UncertaintySettings(starts=13, points=100)
+SETTINGS = UncertaintySettings(starts=13, icp_points=100)
 
 
 def sphere(n, seed=0, radius=0.5):

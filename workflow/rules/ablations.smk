@@ -22,7 +22,7 @@ rule kernels:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=settings("kernels"),
+        settings=settings("kernel_grid"),
         seeds=SEEDS,
     shell:
         "python -m gpca kernels --threads {threads} --source {wildcards.source} --seeds {params.seeds} "

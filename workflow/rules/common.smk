@@ -204,16 +204,16 @@ def real_world_predictions(methods):
     )
 
 
-KERNEL_TABLES = kernel_tables_of(config["kernels"])
+KERNEL_TABLES = kernel_tables_of(config["kernel_grid"])
 KERNEL_GRIDS = collect(
     "results/{{run}}/kernels/{source}/seed{seed}.csv",
-    source=config["kernels"]["sources"],
+    source=config["kernel_grid"]["sources"],
     seed=SEEDS,
 )
 KERNEL_SOURCES = {
     name: entry
     for name, entry in SHOWN_SOURCES.items()
-    if name in config["kernels"]["sources"]
+    if name in config["kernel_grid"]["sources"]
 }
 # A learner that is an explainer of the config too has its settings, and those of its own besides.
 LEARNER_SETTINGS = {

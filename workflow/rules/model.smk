@@ -33,7 +33,7 @@ rule model:
                 "encoder": config["encoders"][MODEL_ENCODER],
                 "gpc": config["explainers"].get("gpca") or {},
                 "registrations": {
-                    name: config["registrations"][name] for name in ("points", "icp")
+                    name: config["registrations"][name] for name in ("cloud_points", "icp")
                 },
                 "recovery": {
                     "thresholds": RECOVERY["thresholds"],

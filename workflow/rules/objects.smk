@@ -21,7 +21,7 @@ rule objects:
             config["sources"][wildcards.source], sort_keys=True
         ),
         data=data_option,
-        points=config["objects"]["points"],
+        surface_points=config["objects"]["surface_points"],
     shell:
         "python -m gpca objects --threads {threads} --source {wildcards.source} --settings {params.settings:q} "
-        "{params.data} --points {params.points} --out {output} 2> {log}"
+        "{params.data} --surface-points {params.surface_points} --out {output} 2> {log}"

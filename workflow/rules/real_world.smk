@@ -56,10 +56,10 @@ rule instances:
         ),
         source=REAL_WORLD,
         frames=frames_option,
-        points=config["objects"]["points"],
+        surface_points=config["objects"]["surface_points"],
     shell:
         "python -m gpca instances --threads {threads} --source {params.source} --settings {params.settings:q} "
-        "{params.frames} --points {params.points} --out {output.instances} --objects {output.objects} 2> {log}"
+        "{params.frames} --surface-points {params.surface_points} --out {output.instances} --objects {output.objects} 2> {log}"
 
 
 rule frame_registrations:
