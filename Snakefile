@@ -11,7 +11,7 @@ configfile: "config/config.yaml"
 
 
 try:
-    SOURCES = run_config.check(config)
+    GIVEN_CONFIG, config, SOURCES = run_config.read(config, workflow.config_settings.config)
 except InputError as fault:
     sys.exit(f"gpca: {fault}")
 run_config.export(config)

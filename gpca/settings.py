@@ -63,6 +63,8 @@ def require_valid(instance: dict, schema: dict, subject: str, complete: bool = T
         raise InputError(
             f"{subject} {path}", "unknown", f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
         )
+    if fault.validator == "type" and fault.schema["type"] == "array" and isinstance(fault.instance, str | int | float):
+        raise InputError(f"{subject} {key}", fault.message, f"give a list: [{fault.instance}]")
     raise InputError(f"{subject} {key}", fault.message, "see gpca/config/config.schema.yaml")
 
 

@@ -1,5 +1,3 @@
-import copy
-
 import pytest
 import yaml
 
@@ -8,37 +6,9 @@ from gpca.errors import InputError
 from gpca.settings import SCHEMA, check_settings
 from gpca.uncertainty.designs import DESIGNS
 
-CONFIG = SCHEMA.parents[2] / "config"
-MISSING = object()
+from .configs import MISSING, changed, load
+
 NAN = float("nan")
-
-
-def merged(*parts):
-    """Snakemake's way of laying one config over another."""
-    whole = {}
-    for part in parts:
-        for key, value in part.items():
-            both = isinstance(value, dict) and isinstance(whole.get(key), dict)
-            whole[key] = merged(whole[key], value) if both else copy.deepcopy(value)
-    return whole
-
-
-def load(*names):
-    return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in ("sources", "config", *names)))
-
-
-def changed(key, value):
-    """The default config with the key (a path with dots) set to the value, or removed."""
-    config = load()
-    *path, last = key.split(".")
-    section = config
-    for name in path:
-        section = section[name]
-    if value is MISSING:
-        del section[last]
-    else:
-        section[last] = value
-    return config
 
 
 @pytest.mark.parametrize("name", ["config", "smoke", "real"])
@@ -48,14 +18,6 @@ def test_the_shipped_configs_are_sound(name):
     for entry in sources.values():
         assert entry["stand_in"] == (name != "real")
         assert entry["origin"] == ("download" if name == "real" else "procedural")
-
-
-def test_a_source_that_is_false_is_left_out_as_if_it_were_not_there():
-    config, never_there = changed("sources.linemod", False), changed("sources.linemod", MISSING)
-    for given in (config, never_there):
-        given["kernel_grid"]["sources"] = ["ycb"]
-    assert run_config.check(config) == run_config.check(never_there)
-    assert config["sources"]["linemod"] is False  # for a Snakemake that is given this config once more
 
 
 def test_local_data_comes_before_the_download(tmp_path):

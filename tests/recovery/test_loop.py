@@ -186,7 +186,7 @@ def test_failures_have_their_cause_and_are_bounded(situations):
 
 
 def test_no_failure_at_all_is_one_line(situations, monkeypatch):
-    monkeypatch.setattr("gpca.recovery.loop.first", lambda *given: None)
+    monkeypatch.setattr("gpca.recovery.loop.register_first", lambda *given: None)
     with pytest.raises(InputError, match=r"no registration failed \(2 of noise, 2 of pose, 2 of overlap\)"):
         find_failures(situations["failures"], LoopSettings(tries=2))
 

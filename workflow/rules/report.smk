@@ -74,7 +74,7 @@ rule report:
         mem_mb=2000,
         runtime=10,
     params:
-        config=json.dumps(config, sort_keys=True),
+        config=json.dumps(GIVEN_CONFIG, sort_keys=True),
     shell:
         "(printf '%s' {params.config:q} > {log.config} && python -m snakemake all --report {output} "
         "--configfile {log.config} --nolock) > {log.text} 2>&1"
