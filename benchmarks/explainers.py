@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
     for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ[variable] = "1"
     registrations, icp_seconds_S = make_registrations(options.samples)
-    from gpca.uncertainty.spread import UncertaintySettings
+    from gpca.uncertainty.settings import UncertaintySettings
 
     settings = UncertaintySettings(starts=options.starts, icp_points=options.points)
     speedup, error = compare_icp(registrations, settings)
@@ -141,7 +141,8 @@ def embedded(registrations):
     import torch
 
     from gpca.encoders.registry import make_encoder
-    from gpca.encoders.training import EncoderSettings, embed
+    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.training import embed
     from gpca.pairs.perturbation import CONCEPTS
 
     torch.set_num_threads(1)

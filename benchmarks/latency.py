@@ -102,8 +102,10 @@ def make_explainer(options: argparse.Namespace):
     import torch
 
     from gpca.alignment.icp import ICPSettings
-    from gpca.classifier.gpc import GPC, GPCSettings
-    from gpca.encoders.training import EncoderSettings, make_model
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.training import make_model
     from gpca.model.explainer import Explainer
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS

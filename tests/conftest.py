@@ -46,8 +46,10 @@ def model(registrations):
     import torch
 
     from gpca.alignment.icp import ICPSettings
-    from gpca.classifier.gpc import GPC, GPCSettings
-    from gpca.encoders.training import EncoderSettings, embed, make_model
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.training import embed, make_model
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS
     from gpca.recovery.policy import RecoveryPolicy, Thresholds

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -16,36 +16,13 @@ import torch
 from torch import nn
 
 from gpca.encoders.registry import make_encoder
+from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
-
-
-@dataclass(frozen=True)
-class EncoderSettings:
-    """What is trained and how.
-
-    Attributes:
-        backbone: name in :mod:`gpca.encoders.registry`.
-        draw_points: N, points of a cloud that the encoder sees at once.
-        draws: an embedding is the mean over so many draws of N points from the cloud.
-        epochs, batch_size: length of the training.
-        learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
-        weight_decay: of AdamW.
-        options: further arguments of the backbone.
-    """
-
-    backbone: str = "dgcnn"
-    draw_points: int = 512
-    draws: int = 4
-    epochs: int = 10
-    batch_size: int = 16
-    learning_rate: float = 4e-3
-    weight_decay: float = 1e-2
-    options: dict = field(default_factory=dict)
 
 
 def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object) -> torch.Tensor:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,8 +20,11 @@ from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
 from gpca.progress import progress
 from gpca.seeds import generator
+from gpca.settings import Bounds, Count
 
 DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
+Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in metres
+Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
 TABLE_M = 1.2  # edge length of the table
 TABLE_COLOUR = (0.72, 0.65, 0.55)
 
@@ -41,12 +45,12 @@ class SceneSettings:
     """
 
     families: tuple[str, ...] = ("ycb",)
-    count: int = 12
-    views: int = 4
-    objects: tuple[int, int] = (4, 8)
-    distance_m: tuple[float, float] = (0.6, 0.9)
-    elevation_deg: tuple[float, float] = (15.0, 50.0)
-    gap_m: float = 0.01
+    count: Annotated[int, Bounds(minimum=2)] = 12
+    views: Count = 4
+    objects: tuple[Count, Count] = (4, 8)
+    distance_m: tuple[Distance, Distance] = (0.6, 0.9)
+    elevation_deg: tuple[Elevation, Elevation] = (15.0, 50.0)
+    gap_m: Annotated[float, Bounds(minimum=0, maximum=1)] = 0.01
     camera: Camera = field(default_factory=Camera)
     noise: DepthNoise = field(default_factory=DepthNoise)
 

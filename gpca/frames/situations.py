@@ -18,8 +18,9 @@ from gpca.frames.shots import Shot, median_depth
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
-from gpca.pairs.perturbation import Severities, move
+from gpca.pairs.perturbation import Hidden, Severities, move
 from gpca.seeds import generator, seed_of
+from gpca.settings import NotNegative
 
 COARSE = 4  # the factor by which the image is thinned where only shares of pixels count
 LEAST_VISIBLE = 0.7  # of the object, before anything is put in front of it
@@ -40,8 +41,8 @@ class SituationSettings:
     """
 
     scenes: SceneSettings = field(default_factory=SceneSettings)
-    noise_scale: tuple[float, float] = (3.0, 8.0)
-    hidden: tuple[float, float] = (0.5, 0.9)
+    noise_scale: tuple[NotNegative, NotNegative] = (3.0, 8.0)
+    hidden: tuple[Hidden, Hidden] = (0.5, 0.9)
     severities: Severities = field(default_factory=Severities)
 
     def __post_init__(self) -> None:

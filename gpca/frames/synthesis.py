@@ -18,6 +18,7 @@ from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
 from gpca.pairs.synthesis import RegistrationSettings, align_pair, as_registrations
 from gpca.progress import progress
 from gpca.seeds import generator
+from gpca.settings import OpenShare, Share
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,8 +37,8 @@ class FrameSettings:
         registration: numbers of samples, points, severities, ICP.
     """
 
-    test_share: float = 0.4
-    occluders: float = 0.5
+    test_share: OpenShare = 0.4
+    occluders: Share = 0.5
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
 
 

@@ -25,7 +25,8 @@ from gpca.model.file import Model, model_path
 from gpca.objects.canonical import estimate_normals
 from gpca.recovery.policy import RecoveryPolicy
 from gpca.seeds import generator
-from gpca.uncertainty.spread import UncertaintySettings, run_from_starts
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import run_from_starts
 
 LARGEST_RATIO = 8.0  # of the extents of source and target, either way; in the wrong unit it is 10 or more
 

@@ -16,7 +16,7 @@ from torch import nn
 from gpca.alignment.icp import ICPSettings
 from gpca.classifier.gpc import GPC
 from gpca.encoders.registry import make_encoder
-from gpca.encoders.training import EncoderSettings
+from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.recovery.policy import RecoveryPolicy, Thresholds

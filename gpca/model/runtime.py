@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import select
-from gpca.active_learning.rounds import ActiveLearningSettings, Task, initial_gpc, pool_of
+from gpca.active_learning.rounds import Task, initial_gpc, pool_of
+from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.icp import ICP

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from gpca.pairs.dataset import REGISTRATION_COLUMNS, SPLITS, Registrations, ragg
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed, Severities
 from gpca.progress import progress
 from gpca.seeds import generator
+from gpca.settings import Bounds
+
+TrainSamples = Annotated[int, Bounds(minimum=9)]
+TestSamples = Annotated[int, Bounds(minimum=3)]
 
 
 @dataclass(frozen=True)
@@ -29,9 +33,9 @@ class RegistrationSettings:
         icp: how ICP runs.
     """
 
-    train: int = 800
-    test: int = 200
-    cloud_points: int = 2048
+    train: TrainSamples = 800
+    test: TestSamples = 200
+    cloud_points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 2048
     severities: Severities = field(default_factory=Severities)
     icp: ICPSettings = field(default_factory=ICPSettings)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from gpca.recovery.cases import Attempt, register_after, register_first
 from gpca.recovery.policies import Case, policy_entry
 from gpca.recovery.policy import QUEUE, RecoveryPolicy
 from gpca.seeds import generator
+from gpca.settings import Bounds, Count
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,9 +47,9 @@ class LoopSettings:
         icp: how ICP runs.
     """
 
-    failures: int = 8
-    tries: int = 120
-    budget: int = 3
+    failures: Count = 8
+    tries: Count = 120
+    budget: Annotated[int, Bounds(minimum=1, maximum=9)] = 3
     cloud_points: int = 2048
     icp: ICPSettings = field(default_factory=ICPSettings)
 

@@ -9,8 +9,10 @@ import numpy as np
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.classifier.gpc import GPC, GPCSettings
-from gpca.encoders.training import EncoderSettings, load_model
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import load_model
 from gpca.model.file import Model
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS

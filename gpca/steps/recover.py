@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.encoders.training import EncoderSettings
+from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file, write_csv
 from gpca.frames.camera import Camera
@@ -28,7 +28,7 @@ from gpca.recovery.loop_explainers import LoopExplainers, learn_explainers
 from gpca.recovery.policies import policy_entry
 from gpca.recovery.policy import RecoveryPolicy
 from gpca.settings import check_settings
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
 SOURCE = "recovery"  # names every random number of this step, tables included
 FEWEST_FAILED = 10  # calibration samples, for a threshold to be chosen on the failed ones alone

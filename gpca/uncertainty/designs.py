@@ -18,7 +18,8 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
 from gpca.uncertainty.remedies import Remedies, RemedyRuns
-from gpca.uncertainty.spread import Outcome, UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Outcome
 
 STEP = 0.1  # of a local derivative, in the knob's range
 LATIN = 24  # settings of the knobs in a Latin hypercube

@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import transform
-from gpca.uncertainty.spread import Outcome, Runs, UncertaintySettings, run_from_starts, summarise_runs
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarise_runs
 
 NEIGHBOURS = 24  # of a point, for the plane that it is moved to
 OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbour distance

@@ -3,7 +3,7 @@ import pytest
 
 from baselines.analytical import AnalyticalGPC
 from baselines.registry import explainer_entry
-from gpca.classifier.gpc import GPCSettings
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.settings import check_settings
 

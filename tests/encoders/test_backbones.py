@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from gpca.encoders.registry import ENCODERS, make_encoder, parameter_count
-from gpca.encoders.training import EncoderSettings, embed, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations

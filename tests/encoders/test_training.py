@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from gpca.encoders import training
-from gpca.encoders.training import EncoderSettings, load_model, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import load_model, train_encoder
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations

@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.encoders.training import EncoderSettings, embed, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
 from gpca.shift.samples import held_out_objects, make_sets, settings_from
 from gpca.shift.sets import TRAINED_ON
 

@@ -8,7 +8,7 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import CORNERS, DESIGNS, KNOB_RANGE, LATIN, SALTELLI, STEP, Pair, sample_knobs
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()

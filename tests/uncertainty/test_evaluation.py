@@ -9,7 +9,8 @@ from gpca.uncertainty import evaluation
 from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.evaluation import design_rows, evaluate_design
 from gpca.uncertainty.outcomes import Outcomes
-from gpca.uncertainty.spread import UncertaintySettings, divergence
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import divergence
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 COLUMNS = tuple(field.name for field in fields(Outcomes))

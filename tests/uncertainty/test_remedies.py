@@ -8,7 +8,8 @@ from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.uncertainty import remedies as mitigation
 from gpca.uncertainty.designs import CORNERS
 from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbours, denoise, trim
-from gpca.uncertainty.spread import Runs, UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Runs
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=100)
 
