@@ -3,7 +3,7 @@
 import sys
 
 sys.path.insert(0, str(workflow.current_basedir))
-from gpca.config.check import check
+from gpca.config.check import read
 from gpca.config.jobs import export_to_jobs
 from gpca.errors import InputError
 
@@ -13,7 +13,7 @@ configfile: f"{workflow.current_basedir}/config/config.yaml"
 
 
 try:
-    SOURCES = check(config)
+    config, SOURCES = read(config, workflow.config_settings.config)
 except InputError as fault:
     sys.exit(f"gpca: {fault}")
 export_to_jobs(config)

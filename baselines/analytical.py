@@ -26,17 +26,25 @@ class AnalyticalGPC:
     Args:
         source, seed: name the draws.
         point_count: whether the point-count ratio is among the features.
-        points: source points at which local shape is measured, drawn by split and sample; all where there are fewer.
+        shape_points: source points at which local shape is measured, drawn by split and sample; all where there are
+            fewer.
         neighbours: how many points, itself included, make a point's local shape.
         settings: those of the GPC, as for GP-CA.
     """
 
     def __init__(
-        self, source: str, seed: int, *, point_count: bool = True, points: int = 256, neighbours: int = 16, **settings
+        self,
+        source: str,
+        seed: int,
+        *,
+        point_count: bool = True,
+        shape_points: int = 256,
+        neighbours: int = 16,
+        **settings,
     ) -> None:
         self._axes = (source, seed, "analytical")
         self._point_count = point_count
-        self._points = points
+        self._shape_points = shape_points
         self._neighbours = neighbours
         self._gpca = GPCA(source, seed, **settings)
 
@@ -57,7 +65,7 @@ class AnalyticalGPC:
         return analytical_features(
             registrations,
             *self._axes,
-            points=self._points,
+            shape_points=self._shape_points,
             neighbours=self._neighbours,
             point_count=self._point_count,
         )

@@ -62,7 +62,8 @@ def make_pool(options: argparse.Namespace):
     """Return a GPC that knows two of three blobs, and as projections the pool and a few more labelled samples."""
     import numpy as np
 
-    from gpca.classifier.gpc import GPC, GPCSettings
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
     from gpca.pairs.perturbation import CONCEPTS
 
     random = np.random.default_rng(0)

@@ -33,9 +33,9 @@ def main(arguments: list[str] | None = None) -> None:
     for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ[variable] = "1"
     registrations, icp_seconds_S = make_registrations(options.samples)
-    from gpca.uncertainty.spread import UncertaintySettings
+    from gpca.uncertainty.settings import UncertaintySettings
 
-    settings = UncertaintySettings(starts=options.starts, points=options.points)
+    settings = UncertaintySettings(starts=options.starts, icp_points=options.points)
     speedup, error = compare_icp(registrations, settings)
     print(f"\nICP from {options.starts} initial poses, {options.points} points: {speedup:.1f} times as fast as Open3D")
     print(f"called for each; largest difference of a pose: {error:.1e}\n")
@@ -83,7 +83,7 @@ def compare_icp(registrations, settings) -> tuple[float, float]:
     starts_n = exp(np.random.default_rng(SEED).normal(size=(settings.starts, 6)) * settings.deviation_6())
     ratios, errors = [], []
     for row in registrations.rows("test"):
-        source, target, T_init, _ = Pair(registrations, row).observed(settings.points, np.random.default_rng(row))
+        source, target, T_init, _ = Pair(registrations, row).observed(settings.icp_points, np.random.default_rng(row))
         poses_n = starts_n @ T_init
         started = perf_counter()
         batched_n, *_ = BatchedICP(target, settings.icp).register(source, poses_n)
@@ -141,7 +141,8 @@ def embedded(registrations):
     import torch
 
     from gpca.encoders.registry import make_encoder
-    from gpca.encoders.training import EncoderSettings, embed
+    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.training import embed
     from gpca.pairs.perturbation import CONCEPTS
 
     torch.set_num_threads(1)

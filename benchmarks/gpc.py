@@ -32,7 +32,8 @@ def main(arguments: list[str] | None = None) -> None:
     import numpy as np
     import torch
 
-    from gpca.classifier.gpc import GPC, GPCSettings
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
     from gpca.pairs.perturbation import CONCEPTS
 
     torch.set_num_threads(1)

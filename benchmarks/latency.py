@@ -102,15 +102,17 @@ def make_explainer(options: argparse.Namespace):
     import torch
 
     from gpca.alignment.icp import ICPSettings
-    from gpca.classifier.gpc import GPC, GPCSettings
-    from gpca.encoders.training import EncoderSettings, make_model
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.training import make_model
     from gpca.model.explainer import Explainer
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS
     from gpca.recovery.policy import RecoveryPolicy
 
     torch.manual_seed(0)
-    settings = EncoderSettings(points=options.points)
+    settings = EncoderSettings(draw_points=options.points)
     encoder = make_model(settings).encoder.train()
     clouds = [make_pair(options.points, "training", n)[0].astype(np.float32) for n in range(TRAINING)]
     with torch.no_grad():

@@ -105,7 +105,7 @@ def _mapping(text: str) -> dict:
     except json.JSONDecodeError as fault:
         raise InputError("--settings", f"not JSON: {fault}", "give a JSON object") from fault
     if not isinstance(settings, dict):
-        raise InputError("--settings", "not a JSON object", 'give one, such as {"points": 512}')
+        raise InputError("--settings", "not a JSON object", 'give one, such as {"draw_points": 512}')
     return settings
 
 

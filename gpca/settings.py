@@ -9,10 +9,29 @@ import math
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
 import yaml
 
 from gpca.errors import InputError
+
+
+class Bounds:
+    """What the values of a settings class's field may be, in the words of JSON schema.
+
+    A field says it with its type, ``train: Annotated[int, Bounds(minimum=9)]``; the config's schema is made from that.
+    """
+
+    def __init__(self, **keywords: object) -> None:
+        self.keywords = keywords
+
+
+Count = Annotated[int, Bounds(minimum=1)]
+NotNegative = Annotated[float, Bounds(minimum=0)]
+Positive = Annotated[float, Bounds(exclusiveMinimum=0)]
+Share = Annotated[float, Bounds(minimum=0, maximum=1)]
+PositiveShare = Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]
+OpenShare = Annotated[float, Bounds(exclusiveMinimum=0, exclusiveMaximum=1)]
 
 SCHEMA = Path(__file__).parent / "config" / "config.schema.yaml"
 
@@ -63,6 +82,8 @@ def require_valid(instance: dict, schema: dict, subject: str, complete: bool = T
         raise InputError(
             f"{subject} {path}", "unknown", f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
         )
+    if fault.validator == "type" and fault.schema["type"] == "array" and isinstance(fault.instance, str | int | float):
+        raise InputError(f"{subject} {key}", fault.message, f"give a list: [{fault.instance}]")
     raise InputError(f"{subject} {key}", fault.message, "see gpca/config/config.schema.yaml")
 
 

@@ -37,7 +37,7 @@ def registrations(objects):
     """36 training and 18 test registrations of clouds of up to 256 points."""
     from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
-    return make_registrations(objects, "tiny", 0, RegistrationSettings(train=36, test=18, points=256))[0]
+    return make_registrations(objects, "tiny", 0, RegistrationSettings(train=36, test=18, cloud_points=256))[0]
 
 
 @pytest.fixture(scope="session")
@@ -46,13 +46,15 @@ def model(registrations):
     import torch
 
     from gpca.alignment.icp import ICPSettings
-    from gpca.classifier.gpc import GPC, GPCSettings
-    from gpca.encoders.training import EncoderSettings, embed, make_model
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.training import embed, make_model
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS
     from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
-    settings = EncoderSettings(points=64, draws=2, options={"k": 8, "point_features": 16})
+    settings = EncoderSettings(draw_points=64, draws=2, options={"k": 8, "point_features": 16})
     torch.manual_seed(0)
     network = make_model(settings).eval()
     train = registrations.subset(registrations.rows("train"))

@@ -81,7 +81,8 @@ def test_an_explainer(config, added_modules, registrations, tmp_path):
 def test_an_encoder(config, added_modules, registrations, monkeypatch):
 
     from gpca.encoders import registry
-    from gpca.encoders.training import EncoderSettings, embed, train_encoder
+    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.training import embed, train_encoder
 
     added_modules("gpca/encoders/pointwise.py")
     monkeypatch.setattr(registry, "ENCODERS", dict(registry.ENCODERS))
@@ -89,7 +90,7 @@ def test_an_encoder(config, added_modules, registrations, monkeypatch):
     update_config(config, yaml.safe_load(block("config/config.yaml", "pointwise")))
     check(config)
     assert config["embedding"]["encoder"] in config["encoders"]
-    settings = EncoderSettings(**config["encoders"]["pointwise"] | {"epochs": 1, "points": 64})
+    settings = EncoderSettings(**config["encoders"]["pointwise"] | {"epochs": 1, "draw_points": 64})
     model, curve = train_encoder(registrations, "tiny", 0, settings)
     assert len(curve) == 1
     h_S_d, _ = embed(model, registrations, "tiny", 0, settings)
@@ -100,8 +101,9 @@ def test_an_encoder(config, added_modules, registrations, monkeypatch):
 def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     from gpca.active_learning.curves import POOL_COLUMNS, write_curves
     from gpca.active_learning.metrics import collect_curves
-    from gpca.active_learning.rounds import ActiveLearningSettings, initial_gpc, make_task, run_rounds
-    from gpca.classifier.gpc import GPCSettings
+    from gpca.active_learning.rounds import initial_gpc, make_task, run_rounds
+    from gpca.active_learning.settings import ActiveLearningSettings
+    from gpca.classifier.settings import GPCSettings
     from gpca.reporting.tables.active_learning import LEARNING_TABLES
 
     monkeypatch.setitem(acquisition.STRATEGIES, "bald_dense", None)  # taken out again at the end

@@ -1,4 +1,4 @@
-"""The folders are as docs/architecture.md says: all there, in an order in which arrows point one way, of small files."""
+"""The folders are those of docs/architecture.md, in an order in which arrows point one way, and their files small."""
 
 import ast
 import re

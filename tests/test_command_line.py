@@ -20,7 +20,7 @@ from gpca.files import save_arrays
 from gpca.model.file import Model
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
-ENCODER = {"points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
+ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {
     "thresholds": {"uncertain": None, "queued_share": 0.1, "dominant": 0.4, "improvement": 0.1},
     "treatments": {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"},
@@ -33,16 +33,16 @@ LEARNING = {
 }  # fmt: skip
 SHIFT = {
     "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
-    "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "points": 16,
+    "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "shape_points": 16,
 }  # fmt: skip
 COMMON = {"--source": "tiny"}
 STEP_OPTIONS = {
     "objects": COMMON | {
         "--settings": {"kind": "mesh_folder", "location": "meshes", "unit": "mm"}, "--data-dir": ".",
-        "--points": 600, "--out": "objects.npz",
+        "--surface-points": 600, "--out": "objects.npz",
     },
     "registrations": COMMON | {
-        "--settings": {"train": 18, "test": 6, "points": 128}, "--seed": 0, "--objects": "objects.npz",
+        "--settings": {"train": 18, "test": 6, "cloud_points": 128}, "--seed": 0, "--objects": "objects.npz",
         "--out": "registrations.npz", "--timings": "icp.csv",
     },
     "train": COMMON | {
@@ -59,9 +59,9 @@ STEP_OPTIONS = {
         "--embeddings": "embeddings.npz", "--out": "reduced.npz",
     },
     "uncertainty": COMMON | {
-        "--settings": {"starts": 13, "points": 40, "icp": {"max_iterations": 20}}, "--design": "removal", "--seeds": 0,
-        "--registrations": "registrations.npz", "--out": "uncertainty.npz", "--tables": "uncertainty.csv",
-        "--timings": "uncertainty_timings.csv",
+        "--settings": {"starts": 13, "icp_points": 40, "icp": {"max_iterations": 20}},
+        "--design": "removal", "--seeds": 0, "--registrations": "registrations.npz",
+        "--out": "uncertainty.npz", "--tables": "uncertainty.csv", "--timings": "uncertainty_timings.csv",
     },
     "attribute": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
@@ -82,7 +82,7 @@ STEP_OPTIONS = {
         "--seeds": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "grid.csv",
     },
     "shift": COMMON | {
-        "--settings": {"shift": SHIFT, "registrations": {"points": 128}, "encoder": ENCODER}, "--seeds": 0,
+        "--settings": {"shift": SHIFT, "registrations": {"cloud_points": 128}, "encoder": ENCODER}, "--seeds": 0,
         "--objects": "objects.npz", "--registrations": "registrations.npz",
         "--other-registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--encoders": "weights.pt",
         "--out": "shifted.npz",
@@ -98,7 +98,7 @@ STEP_OPTIONS = {
     },
     "model": COMMON | {
         "--settings": {"encoder": ENCODER, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
-                       "registrations": {"points": 128}, "recovery": POLICY},
+                       "registrations": {"cloud_points": 128}, "recovery": POLICY},
         "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
         "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--out": "model.pt",
     },
@@ -295,7 +295,7 @@ FAULTS = {
         (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
         (arrays_changed("registrations.npz", concept=lambda c: np.full_like(c, "x")), {}, r"unknown concept 'x'"),
         (untouched, settings("train", epochs="two"), r"setting epochs: 'two' is not of type 'integer'"),
-        (untouched, settings("train", layers=3), r"setting layers: unknown; known are backbone, points"),
+        (untouched, settings("train", layers=3), r"setting layers: unknown; known are backbone, draw_points"),
         (untouched, settings("train", backbone="dgcn"), r"backbone 'dgcn': unknown; known are dgcnn"),
         (untouched, settings("train", backbone="dgcnn", options={"kk": 8}), r"options.kk: unknown; did you mean k\?"),
     ],

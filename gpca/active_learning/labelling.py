@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, select
-from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.files import read_csv
 from gpca.seeds import generator

@@ -7,39 +7,19 @@ labelled ones and the GPC is retrained; its accuracy on the test samples over th
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, require_strategy, select
-from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
-
-
-@dataclass(frozen=True)
-class ActiveLearningSettings:
-    """How the rounds go; the same for every strategy.
-
-    Attributes:
-        initial: labelled samples of the known concepts before the first query, balanced.
-        labels: L, the budget of queries.
-        batch: B, labels per round.
-        iterations, tolerance: the most passes over the labels in a retraining, and when it ends before.
-        gpc: the classifier that knows two concepts; its covariance and inducing inputs stay from then on.
-    """
-
-    initial: int = 120
-    labels: int = 60
-    batch: int = 4
-    iterations: int = 100
-    tolerance: float = 1e-3
-    gpc: GPCSettings = field(default_factory=lambda: GPCSettings(learning_rate=0.1))
-
 
 Inputs = TypeVar("Inputs", np.ndarray, Projection)
 

@@ -7,34 +7,15 @@ sample arrives; where its uncertainty passes a threshold, and the budget allows,
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.active_learning.rounds import ActiveLearningSettings, Task, accuracies
+from gpca.active_learning.rounds import Task, accuracies
+from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.errors import InputError
 from gpca.seeds import generator
-
-
-@dataclass(frozen=True)
-class StreamSettings:
-    """How samples arrive and how many labels may be asked for.
-
-    Attributes:
-        arrivals: length of the stream.
-        quiet: arrivals before the first of the new concept; after them it is a third of what arrives.
-        budget: share of the arrivals that may be asked about; a threshold keeps to it on average.
-        window: arrivals whose BALD sets the threshold, and over which the running accuracy is taken.
-        every: arrivals between two rows of the result.
-    """
-
-    arrivals: int = 300
-    quiet: int = 60
-    budget: float = 0.1
-    window: int = 50
-    every: int = 10
 
 
 def arrival_order(task: Task, stream: StreamSettings, *axes: object) -> np.ndarray:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.settings import Bounds, Count
 
-METHODS = ("point_to_point", "point_to_plane", "generalized")
+Method = Literal["point_to_point", "point_to_plane", "generalized"]
+METHODS = get_args(Method)
 
 
 @dataclass(frozen=True)
@@ -21,9 +24,9 @@ class ICPSettings:
         max_iterations: upper limit; Open3D stops earlier when fitness and RMSE change by less than 1e-6.
     """
 
-    method: str = "point_to_point"
-    correspondence_distance: float = 0.10
-    max_iterations: int = 50
+    method: Method = "point_to_point"
+    correspondence_distance: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.10
+    max_iterations: Count = 50
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

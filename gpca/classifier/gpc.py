@@ -9,7 +9,7 @@ inducing inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import numpy as np
 import torch
@@ -17,35 +17,14 @@ from sklearn.cluster import KMeans
 from sklearn.preprocessing import StandardScaler
 
 from gpca.attribution.scores import summarise_marginals
-from gpca.classifier.covariances import COVARIANCES, make_covariance
+from gpca.classifier.covariances import make_covariance
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
+from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import SparseGPs
 from gpca.errors import InputError
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
-
-
-@dataclass(frozen=True)
-class GPCSettings:
-    """How the classifier is built and fitted; the defaults are the paper's.
-
-    Attributes:
-        kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
-        learning_rate, iterations: how Adam climbs the ELBO of the whole training set.
-        inducing: number of shared inducing inputs N_Z.
-        draws: M, posterior draws per explanation.
-    """
-
-    kernel: str = "rbf"
-    learning_rate: float = 0.01
-    iterations: int = 100
-    inducing: int = 64
-    draws: int = 1000
-
-    def __post_init__(self) -> None:
-        if self.kernel not in COVARIANCES:
-            raise InputError(f"kernel '{self.kernel}'", "unknown", f"known are {', '.join(COVARIANCES)}")
 
 
 class GPC:

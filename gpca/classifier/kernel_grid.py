@@ -11,8 +11,10 @@ import numpy as np
 
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
 from gpca.attribution.metrics import source_method_seed
+from gpca.classifier.settings import Draws, Kernel, LearningRate
 from gpca.errors import InputError
 from gpca.files import numbers, read_csv, write_csv
+from gpca.settings import Count
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,11 +35,11 @@ class KernelGrid:
         inducing, draws: see :class:`gpca.classifier.gpc.GPCSettings`.
     """
 
-    kernels: tuple[str, ...] = ("rbf", "matern32", "polynomial")
-    learning_rates: tuple[float, ...] = (0.01, 0.001)
-    iterations: tuple[int, ...] = (10, 20, 50, 100, 200)
-    inducing: int = 64
-    draws: int = 1000
+    kernels: tuple[Kernel, ...] = ("rbf", "matern32", "polynomial")
+    learning_rates: tuple[LearningRate, ...] = (0.01, 0.001)
+    iterations: tuple[Count, ...] = (10, 20, 50, 100, 200)
+    inducing: Count = 64
+    draws: Draws = 1000
 
 
 def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, seed: int) -> pd.DataFrame:
@@ -51,7 +53,8 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
     """
     import pandas as pd
 
-    from gpca.classifier.gpc import GPC, GPCSettings
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
     from gpca.pairs.perturbation import CONCEPTS
 
     train, test = registrations.rows("train"), registrations.rows("test")
@@ -99,5 +102,5 @@ def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
             rows[column] = numbers(path, rows, column)
         parts.append(rows.assign(source=source, seed=seed, iterations=rows["iterations"].astype(int)))
     if not parts:
-        raise InputError("kernels", "no files were given", "name a source in kernels.sources")
+        raise InputError("kernels", "no files were given", "name a source in kernel_grid.sources")
     return pd.concat(parts, ignore_index=True)

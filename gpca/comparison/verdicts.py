@@ -18,6 +18,7 @@ from gpca.comparison.reasons import Reason, reason_of
 from gpca.errors import InputError
 from gpca.model.runtime_file import read_runtime
 from gpca.objects.title import STAND_IN, title_of
+from gpca.settings import NotNegative
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,8 +38,8 @@ RUNTIME = "runtime.csv"
 class Tolerance:
     """Distances up to which a number counts as reproduced and as close, in its unit or, with `factor`, as a ratio."""
 
-    reproduced: float
-    close: float
+    reproduced: NotNegative
+    close: NotNegative
     factor: bool = False
 
     def __post_init__(self):

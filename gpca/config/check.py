@@ -2,144 +2,69 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping
 
-from baselines.registry import explainer_entry, require_settings
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
-from gpca.comparison.verdicts import Tolerance
-from gpca.encoders.registry import require_backbone
-from gpca.errors import InputError
-from gpca.frames.rgbd_scene import SceneSettings
-from gpca.frames.situations import SituationSettings
-from gpca.frames.source import REAL_WORLD, resolve_datasets
-from gpca.objects import procedural
-from gpca.objects.source import resolve
-from gpca.pairs.synthesis import RegistrationSettings
-from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
-from gpca.recovery.actions import action_of
-from gpca.recovery.policies import policy_entry
-from gpca.recovery.policy import Thresholds
-from gpca.settings import check_settings, load_schema, require_valid
+from gpca.config.checks.explainers import (
+    check_encoders,
+    check_explainers,
+    check_learners,
+    check_registrations,
+    check_strategies,
+    check_tolerances,
+)
+from gpca.config.checks.frames import check_real_world
+from gpca.config.checks.left_out import check_left_out
+from gpca.config.checks.recovery import check_recovery
+from gpca.config.checks.sources import check_named_sources, resolve_sources
+from gpca.config.command_line import with_types
+from gpca.config.leave_out import names_left_out, without_false
+from gpca.settings import load_schema, require_valid
 
-# Where data lies, and how results are judged: two runs that differ in nothing else are runs of one config.
-_OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
+
+def read(config: dict, command_line: Mapping) -> tuple[dict, dict[str, dict]]:
+    """Read the config of a run as Snakemake merged it.
+
+    Args:
+        command_line: what was given with ``--config``, whose numbers are text yet.
+
+    Returns:
+        the config of this run, without what it leaves out; the sources that :func:`check` returns.
+
+    Raises:
+        InputError: what :func:`check` raises.
+    """
+    given = with_types(config, command_line)
+    sources = check(given)
+    return without_false(given), sources
 
 
 def check(config: dict) -> dict[str, dict]:
-    """Check a configuration against the schema and against what exists; a source that is false is left out.
+    """Check a configuration against the schema and against what exists.
+
+    Args:
+        config: as it was given; what it leaves out with ``false`` is not checked, and it stays as it is.
 
     Returns:
         the resolved entry of every source, by name, with ``stand_in`` set.
 
     Raises:
-        InputError: unknown key, wrong type, value out of range; unknown source, family, kind, explainer or backbone;
-            data that is neither in its folder nor downloadable. The line names the key.
+        InputError: unknown key, wrong type, value out of range; unknown source, family, kind, explainer or backbone,
+            or one that is left out; data that is neither in its folder nor downloadable. The line names the key.
     """
-    if isinstance(config.get("sources"), dict):  # whatever else it is, the schema says so
-        # A copy: a Snakemake that is given this config, as for the report, has to leave the source out once more.
-        config = config | {"sources": {name: entry for name, entry in config["sources"].items() if entry is not False}}
-    require_valid(config, load_schema(), "config key")
-    with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
-    for name, encoder in config["encoders"].items():
-        with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
-    if (name := config["embedding"]["encoder"]) not in config["encoders"]:
-        known = ", ".join(config["encoders"])
-        raise InputError("config key embedding.encoder", f"no encoder '{name}'", f"known are {known}")
-    for name, settings in config["explainers"].items():
-        with_key(f"explainers.{name}", require_settings, name, settings or {})
-        design = explainer_entry(name).design
-        if design and design not in config["uncertainty"]:
-            known = ", ".join(config["uncertainty"])
-            raise InputError(f"config key explainers.{name}", f"no uncertainty '{design}'", f"known are {known}")
-    for strategy in config["active_learning"]["strategies"]:
-        if strategy not in (strategies := {**STRATEGIES, **STREAMS}):
-            known = ", ".join(strategies)
-            raise InputError("config key active_learning.strategies", f"no strategy '{strategy}'", f"known are {known}")
-    for name, settings in config["learners"].items():
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(f"learners.{name}", require_settings, name, own)
-        with_key(f"learners.{name}", check_settings, own, "explainers", name)
-        if explainer_entry(name).reads != "embeddings":
-            raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
-    with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
-    for unit, tolerance in config["comparison"]["tolerances"].items():
-        with_key(f"comparison.tolerances.{unit}", lambda given: Tolerance(**given), tolerance)
-    _check_real_world(config)
-    _check_recovery(config)
-    sources = {
-        name: {"stand_in": entry["kind"] == "procedural"}
-        | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
-        for name, entry in config["sources"].items()
-    }
-    if (name := config["figures"]["source"]) not in sources:
-        raise InputError("config key figures.source", f"no source '{name}'", f"known are {', '.join(sources)}")
-    for name in config["kernels"]["sources"]:
-        if name not in sources:
-            raise InputError("config key kernels.sources", f"no source '{name}'", f"known are {', '.join(sources)}")
-    for key, names in {"source": (*sources, REAL_WORLD), "encoder": tuple(config["encoders"])}.items():
-        if (name := config["model"][key]) not in names:
-            raise InputError(f"config key model.{key}", f"no {key} '{name}'", f"known are {', '.join(names)}")
-    return sources
-
-
-def _check_real_world(config: dict) -> None:
-    section = config["real_world"]
-    for backbone in section["backbones"]:
-        if backbone not in config["encoders"]:
-            known = ", ".join(config["encoders"])
-            raise InputError("config key real_world.backbones", f"no encoder '{backbone}'", f"known are {known}")
-    if REAL_WORLD in config["sources"]:
-        raise InputError(f"config key sources.{REAL_WORLD}", "is the name of real_world's frames", "take another")
-    with_key("real_world.scenes", SceneSettings.from_dict, section["scenes"])
-    for family in section["scenes"].get("families", ()):
-        with_key("real_world.scenes.families", procedural.require_family, family)
-    with_key("real_world.datasets", resolve_datasets, section["datasets"], config["data_dir"])
-    if section["initial_pose"].get("form") == "results":
-        for name, entry in (section["datasets"] or {"scenes": {}}).items():
-            if not entry.get("results"):
-                key = f"config key real_world.datasets.{name}.results"
-                raise InputError(key, "is needed by initial_pose form results", "name the file, or take another form")
-
-
-def _check_recovery(config: dict) -> None:
-    section = config["recovery"]
-    for name, settings in section["actions"].items():
-        with_key(f"recovery.actions.{name}", action_of, name, settings or {})
-    for concept, action in section["treatments"].items():
-        if action not in section["actions"]:
-            known = ", ".join(section["actions"])
-            raise InputError(f"config key recovery.treatments.{concept}", f"no action '{action}'", f"known are {known}")
-    if len(set(section["treatments"].values())) < len(section["treatments"]):
-        raise InputError("config key recovery.treatments", "one action treats two concepts", "give each its own")
-    for name in section["policies"]:
-        entry = with_key("recovery.policies", policy_entry, name, tuple(section["actions"]))
-        if entry.explainer:
-            given = config["explainers"].get(entry.explainer) or {}
-            with_key(f"explainers.{entry.explainer}", require_settings, entry.explainer, given)
-            if (design := explainer_entry(entry.explainer).design) and design not in config["uncertainty"]:
-                raise InputError(f"config key recovery.policies: {name}", f"no uncertainty '{design}'", "name it there")
-    declared = {name: section["thresholds"][name] for name in ("uncertain", "dominant", "improvement")}
-    declared = {name: value for name, value in declared.items() if value is not None}
-    with_key("recovery.thresholds", lambda: Thresholds(**declared))
-    ranges: dict[str, Any] = {name: tuple(section[name]) for name in ("noise_scale", "hidden")}
-    with_key("recovery", lambda: SituationSettings(**ranges))
-
-
-def with_key(key: str, function, *arguments):
-    """Call the function and name the config's key in front of its InputError."""
-    try:
-        return function(*arguments)
-    except InputError as fault:
-        raise InputError(f"config key {key}", str(fault)) from fault
-
-
-def export(config: dict) -> None:
-    """Set what the jobs of a run inherit: the configuration's hash, for their provenance, and this very Python.
-
-    Jobs call ``python``, which need not be the one that runs the workflow where its environment is not activated.
-    """
-    os.environ[CONFIG_VARIABLE] = sha256_of_settings({k: v for k, v in config.items() if k not in _OF_NO_RESULT})
-    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    whole = without_false(config)
+    require_valid(whole, load_schema(), "config key")
+    encoders, designs, sources, actions = (
+        names_left_out(config, key) for key in ("encoders", "uncertainty", "sources", "recovery.actions")
+    )
+    check_left_out(config)
+    check_registrations(whole)
+    check_encoders(whole, encoders)
+    check_explainers(whole, designs)
+    check_strategies(whole)
+    check_learners(whole)
+    check_tolerances(whole)
+    check_real_world(whole, encoders)
+    check_recovery(whole, actions, designs)
+    resolved = resolve_sources(whole)
+    check_named_sources(whole, sources, encoders)
+    return resolved

@@ -36,7 +36,7 @@ def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
     x_B_N_F = x_B_N_F.detach()
     n_points = x_B_N_F.shape[1]
     if n_points < k:
-        raise InputError(f"cloud of {n_points} points", f"has no {k} neighbours", "raise encoder.points or lower k")
+        raise InputError(f"cloud of {n_points} points", f"has no {k} neighbours", "raise draw_points or lower k")
     squares_B_1_N = (x_B_N_F * x_B_N_F).sum(-1)[:, None, :]
     # |x_i|² is the same for a whole row and does not change which points are nearest.
     distances_B_N_N = torch.baddbmm(squares_B_1_N, x_B_N_F, x_B_N_F.transpose(1, 2), alpha=-2)

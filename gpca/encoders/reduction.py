@@ -10,11 +10,13 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from typing import Annotated
 
 import numpy as np
 
 from gpca.errors import InputError
 from gpca.seeds import generator, seed_of
+from gpca.settings import Bounds, Count
 
 Transform = Callable[[np.ndarray], np.ndarray]
 
@@ -23,7 +25,7 @@ Transform = Callable[[np.ndarray], np.ndarray]
 class PCA:
     """Principal component analysis (Jolliffe 2002), by a full singular value decomposition."""
 
-    components: int = 64
+    components: Count = 64
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
         """Return the projection on the components; nothing here is random."""
@@ -42,8 +44,8 @@ class UMAP:
         neighbours: how many a sample has in the graph; 15 is usual.
     """
 
-    components: int = 16
-    neighbours: int = 15
+    components: Count = 16
+    neighbours: Annotated[int, Bounds(minimum=2)] = 15
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
         """Return the transform of new samples, which training samples pass as well.
@@ -78,8 +80,8 @@ class Autoencoder:
     Adam trains it (learning rate 1e-3, batches of 32) on the mean squared error of the standardised embeddings.
     """
 
-    components: int = 64
-    epochs: int = 100
+    components: Count = 64
+    epochs: Count = 100
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
         """Train for all epochs and return the encoder."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -16,36 +16,13 @@ import torch
 from torch import nn
 
 from gpca.encoders.registry import make_encoder
+from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
-
-
-@dataclass(frozen=True)
-class EncoderSettings:
-    """What is trained and how.
-
-    Attributes:
-        backbone: name in :mod:`gpca.encoders.registry`.
-        points: N, points of a cloud that the encoder sees at once.
-        draws: an embedding is the mean over so many draws of N points from the cloud.
-        epochs, batch_size: length of the training.
-        learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
-        weight_decay: of AdamW.
-        options: further arguments of the backbone.
-    """
-
-    backbone: str = "dgcnn"
-    points: int = 512
-    draws: int = 4
-    epochs: int = 10
-    batch_size: int = 16
-    learning_rate: float = 4e-3
-    weight_decay: float = 1e-2
-    options: dict = field(default_factory=dict)
 
 
 def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object) -> torch.Tensor:
@@ -96,7 +73,7 @@ def train_encoder(
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
-            points_B_N_3 = draw_points(registrations, batch_rows, settings.points, source, seed, "epoch", epoch)
+            points_B_N_3 = draw_points(registrations, batch_rows, settings.draw_points, source, seed, "epoch", epoch)
             logits_B_C = model(points_B_N_3.to(device))
             labels_B = labels_S[batch_rows].to(device)
             loss = nn.functional.cross_entropy(logits_B_C, labels_B)
@@ -135,13 +112,13 @@ def embed(
     of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. As the head is
     linear, its logits at h are the mean over the draws too.
     """
-    device = best_device()
+    device, n_points = best_device(), settings.draw_points
     model.to(device).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            model.encoder(draw_points(registrations, rows, settings.points, source, seed, "embedding", draw).to(device))
+            model.encoder(draw_points(registrations, rows, n_points, source, seed, "embedding", draw).to(device))
             for draw in range(settings.draws)
         ]
         parts.append(torch.stack(draws).mean(dim=0))

@@ -13,14 +13,15 @@ from gpca.seeds import generator
 
 
 def analytical_features(
-    registrations: Registrations, *axes: object, points: int = 256, neighbours: int = 16, point_count: bool = True
+    registrations: Registrations, *axes: object, shape_points: int = 256, neighbours: int = 16, point_count: bool = True
 ) -> np.ndarray:
     """Return (N, F): inlier RMSE (of diameters), then those of :func:`compare`, the point-count ratio last.
 
     Args:
         registrations: N of them.
         axes: name the draws.
-        points: source points at which local shape is measured, drawn by split and sample; all where there are fewer.
+        shape_points: source points at which local shape is measured, drawn by split and sample; all where there are
+            fewer.
         neighbours: how many points, itself included, make a point's local shape.
         point_count: whether the point-count ratio is among the features.
     """
@@ -28,7 +29,7 @@ def analytical_features(
     for i in range(len(registrations)):
         source, target = registrations.cloud(i), registrations.target(i)
         random = generator(*axes, registrations.split[i], registrations.sample[i])
-        drawn = random.permutation(len(source))[:points]
+        drawn = random.permutation(len(source))[:shape_points]
         row = [registrations.inlier_rmse[i], *compare(source, target, drawn, neighbours)]
         rows.append(row + [len(source) / len(target)] * point_count)
     return np.array(rows)

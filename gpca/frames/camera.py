@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from gpca.environment import require_open3d
+from gpca.settings import Bounds, Positive
+
+Pixels = Annotated[int, Bounds(minimum=16, maximum=4096)]
 
 NOTHING = -1  # the mesh of a pixel that sees none
 
@@ -21,9 +25,9 @@ class Camera:
         focal_px: focal length of both axes.
     """
 
-    width: int = 640
-    height: int = 480
-    focal_px: float = 570.0
+    width: Pixels = 640
+    height: Pixels = 480
+    focal_px: Positive = 570.0
 
     @property
     def matrix_3_3(self) -> np.ndarray:
@@ -114,9 +118,9 @@ class DepthNoise:
         dropout: share of pixels that measure nothing anyway.
     """
 
-    scale: float = 1.0
-    grazing_deg: float = 80.0
-    dropout: float = 0.01
+    scale: Annotated[float, Bounds(minimum=0, maximum=10)] = 1.0
+    grazing_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=90)] = 80.0
+    dropout: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)] = 0.01
 
     def measure(self, view: View, random: np.random.Generator) -> np.ndarray:
         """Return measured depth (H, W) in metres, 0 where nothing was measured."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,9 +16,12 @@ from scipy.spatial.transform import Rotation
 from gpca.alignment.rigid import inverse, random_direction, require_rotation, transform
 from gpca.errors import InputError
 from gpca.files import read_csv
+from gpca.pairs.perturbation import HalfTurn, Shift
+from gpca.settings import Count, PositiveShare
 
 RESULTS_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
-FORMS = ("results", "true_pose", "global_registration")
+Form = Literal["results", "true_pose", "global_registration"]
+FORMS = get_args(Form)
 
 
 @dataclass(frozen=True)
@@ -31,11 +35,11 @@ class InitialPoseSettings:
         tries: random starts of RANSAC, of which the best is taken.
     """
 
-    form: str = "global_registration"
-    rotation_deg: float = 5.0
-    translation: float = 0.03
-    voxel: float = 0.05
-    tries: int = 20
+    form: Form = "global_registration"
+    rotation_deg: HalfTurn = 5.0
+    translation: Shift = 0.03
+    voxel: PositiveShare = 0.05
+    tries: Count = 20
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:

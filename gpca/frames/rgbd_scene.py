@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,8 +20,11 @@ from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
 from gpca.progress import progress
 from gpca.seeds import generator
+from gpca.settings import Bounds, Count
 
 DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
+Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in metres
+Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
 TABLE_M = 1.2  # edge length of the table
 TABLE_COLOUR = (0.72, 0.65, 0.55)
 
@@ -31,7 +35,7 @@ class SceneSettings:
 
     Attributes:
         families: of procedural objects.
-        scenes, views: scenes, and frames of each.
+        count, views: scenes, and frames of each.
         objects: range of their number in a scene.
         distance_m: range from the camera to the middle of the objects.
         elevation_deg: range above the table; the azimuth goes all around.
@@ -41,12 +45,12 @@ class SceneSettings:
     """
 
     families: tuple[str, ...] = ("ycb",)
-    scenes: int = 12
-    views: int = 4
-    objects: tuple[int, int] = (4, 8)
-    distance_m: tuple[float, float] = (0.6, 0.9)
-    elevation_deg: tuple[float, float] = (15.0, 50.0)
-    gap_m: float = 0.01
+    count: Annotated[int, Bounds(minimum=2)] = 12
+    views: Count = 4
+    objects: tuple[Count, Count] = (4, 8)
+    distance_m: tuple[Distance, Distance] = (0.6, 0.9)
+    elevation_deg: tuple[Elevation, Elevation] = (15.0, 50.0)
+    gap_m: Annotated[float, Bounds(minimum=0, maximum=1)] = 0.01
     camera: Camera = field(default_factory=Camera)
     noise: DepthNoise = field(default_factory=DepthNoise)
 
@@ -81,8 +85,9 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     surfaces = [centre(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
-        _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **asdict(settings)})
-        for scene in progress(range(settings.scenes), f"scenes of {source}"):
+        drawn = {"scenes" if name == "count" else name: value for name, value in asdict(settings).items()}
+        _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **drawn})
+        for scene in progress(range(settings.count), f"scenes of {source}"):
             standing = lay_table(surfaces, settings, source, scene)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
             views = camera_poses(settings, middle_m, source, scene)

@@ -18,8 +18,9 @@ from gpca.frames.shots import Shot, median_depth
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
-from gpca.pairs.perturbation import Severities, misplace
+from gpca.pairs.perturbation import Hidden, Severities, misplace
 from gpca.seeds import generator, seed_of
+from gpca.settings import NotNegative
 
 COARSE = 4  # images are thinned by this factor where only shares of pixels count
 LEAST_VISIBLE = 0.7  # so much of an object must be seen before anything is put in front of it
@@ -40,8 +41,8 @@ class SituationSettings:
     """
 
     scenes: SceneSettings = field(default_factory=SceneSettings)
-    noise_scale: tuple[float, float] = (3.0, 8.0)
-    hidden: tuple[float, float] = (0.5, 0.9)
+    noise_scale: tuple[NotNegative, NotNegative] = (3.0, 8.0)
+    hidden: tuple[Hidden, Hidden] = (0.5, 0.9)
     severities: Severities = field(default_factory=Severities)
 
     def __post_init__(self) -> None:
@@ -192,7 +193,7 @@ class Situations:
 
     def _clean(self, random: np.random.Generator, axes: tuple) -> Situation | None:
         scenes = self._settings.scenes
-        number = int(random.integers(scenes.scenes))
+        number = int(random.integers(scenes.count))
         if number not in self._tables:
             source = "/".join(map(str, self._part))
             self._tables[number] = lay_table(self._shelf.surfaces, scenes, source, number, self._shelf.resting)

@@ -18,6 +18,7 @@ from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
 from gpca.pairs.synthesis import RegistrationSettings, align_pair, as_registrations
 from gpca.progress import progress
 from gpca.seeds import generator
+from gpca.settings import OpenShare, Share
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,8 +37,8 @@ class FrameSettings:
         registration: numbers of samples, points, severities, ICP.
     """
 
-    test_share: float = 0.4
-    occluders: float = 0.5
+    test_share: OpenShare = 0.4
+    occluders: Share = 0.5
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
 
 
@@ -80,8 +81,8 @@ def _register_one(
     diameter_m = float(objects.diameters_m[index])
     given = settings.registration
     T_init_camera = inverse(instances.T_camera_object_init[i])
-    rows = random.permutation(len(instances.cloud_m(i)))[: given.points]
-    target_rows = random.permutation(len(objects.points(index)))[: given.points]
+    rows = random.permutation(len(instances.cloud_m(i)))[: given.cloud_points]
+    target_rows = random.permutation(len(objects.points(index)))[: given.cloud_points]
     points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
     perturbed = None
     lost_to = ""

@@ -25,7 +25,8 @@ from gpca.model.file import Model, model_path
 from gpca.objects.canonical import estimate_normals
 from gpca.recovery.policy import RecoveryPolicy
 from gpca.seeds import generator
-from gpca.uncertainty.spread import UncertaintySettings, run_from_starts
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import run_from_starts
 
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
@@ -125,8 +126,8 @@ class Explainer:
         the same.
         """
         settings = self.model.encoder_settings
-        draws = 1 if len(aligned) == settings.points else settings.draws
-        n = settings.points
+        draws = 1 if len(aligned) == settings.draw_points else settings.draws
+        n = settings.draw_points
         repeated = len(aligned) < n
         rows_D_N = [
             generator("explanation", "draw", draw).choice(len(aligned), n, replace=repeated, shuffle=False)
@@ -136,7 +137,7 @@ class Explainer:
         return self.model.encoder(clouds_D_N_3.to(self._device)).mean(dim=0, keepdim=True).cpu().numpy()
 
     def _thinned(self, points: np.ndarray, role: str, notes: list[str]) -> np.ndarray:
-        kept = thin(points, self.model.points, role)
+        kept = thin(points, self.model.cloud_points, role)
         if len(kept) < len(points):
             notes.append(f"{role}: {len(kept)} of {len(points)} points, drawn at random")
         return kept
@@ -157,7 +158,7 @@ def _spread(
     icp: BatchedICP, source: np.ndarray, T_icp: np.ndarray, settings: UncertaintySettings, diameter: float
 ) -> PoseSpread:
     xi_n_6 = generator("explanation", "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
-    runs = run_from_starts(icp, thin(source, settings.points, "spread"), np.eye(4), xi_n_6)
+    runs = run_from_starts(icp, thin(source, settings.icp_points, "spread"), np.eye(4), xi_n_6)
     return PoseSpread(runs.covariance(T_icp), settings.starts, diameter)
 
 

@@ -16,7 +16,7 @@ from torch import nn
 from gpca.alignment.icp import ICPSettings
 from gpca.classifier.gpc import GPC
 from gpca.encoders.registry import make_encoder
-from gpca.encoders.training import EncoderSettings
+from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
@@ -37,7 +37,7 @@ class Model:
         encoder_settings: also how many points it sees and how many draws make an embedding.
         gpc: the classifier; its classes are the concepts.
         icp: how ICP ran.
-        points: of source and of target, at most.
+        cloud_points: of source and of target, at most.
         policy: what to do about which scores.
         title, stand_in: of the objects of the training, and whether they were drawn by the package.
     """
@@ -46,7 +46,7 @@ class Model:
     encoder_settings: EncoderSettings
     gpc: GPC
     icp: ICPSettings
-    points: int
+    cloud_points: int
     policy: RecoveryPolicy
     title: str
     stand_in: bool
@@ -62,10 +62,10 @@ class Model:
             "format": FORMAT,
             "version": VERSION,
             "encoder": self.encoder.state_dict(),
-            "encoder_settings": asdict(self.encoder_settings),
+            "encoder_settings": _renamed(asdict(self.encoder_settings), "draw_points", "points"),
             "gpc": self.gpc.state(),
             "icp": asdict(self.icp),
-            "points": self.points,
+            "points": self.cloud_points,
             "thresholds": asdict(self.policy.thresholds),
             "treatments": dict(self.policy.treatments),
             "title": self.title,
@@ -93,7 +93,7 @@ class Model:
         if (version := content.get("version")) != VERSION:
             raise InputError(path, f"is a model of version {version}, not of version {VERSION}", REMEDY)
         try:
-            settings = EncoderSettings(**content["encoder_settings"])
+            settings = EncoderSettings(**_renamed(content["encoder_settings"], "points", "draw_points"))
             encoder = make_encoder(settings.backbone, settings.options)
             encoder.load_state_dict(content["encoder"])
             return cls(
@@ -102,10 +102,16 @@ class Model:
                 gpc=GPC.from_state(content["gpc"]),
                 icp=ICPSettings(**content["icp"]),
                 policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
-                **{name: content[name] for name in ("points", "title", "stand_in")},
+                cloud_points=content["points"],
+                **{name: content[name] for name in ("title", "stand_in")},
             )
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
             raise InputError(path, f"is a model with something missing or damaged ({fault})", REMEDY) from fault
+
+
+def _renamed(settings: Mapping, old: str, new: str) -> dict:
+    """Rename one setting in its place: files of this version say `points`, whatever the config calls it now."""
+    return {new if name == old else name: value for name, value in settings.items()}
 
 
 def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path:

@@ -7,7 +7,8 @@ from copy import copy
 import numpy as np
 
 from gpca.active_learning.acquisition import select
-from gpca.active_learning.rounds import ActiveLearningSettings, Task, pool_of
+from gpca.active_learning.rounds import Task, pool_of
+from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.model.stage_times import Times, timed

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.active_learning.rounds import ActiveLearningSettings, Task, initial_gpc
+from gpca.active_learning.rounds import Task, initial_gpc
+from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model

@@ -8,14 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse, random_direction, transform
 from gpca.errors import InputError
+from gpca.settings import Bounds, Share
 
-CONCEPTS = ("noise", "pose", "overlap")
+Concept = Literal["noise", "pose", "overlap"]
+CONCEPTS: tuple[str, ...] = get_args(Concept)
+HalfTurn = Annotated[float, Bounds(minimum=0, maximum=180)]  # in degrees
+Shift = Annotated[float, Bounds(minimum=0, maximum=10)]  # in diameters
+Hidden = Annotated[float, Bounds(minimum=0, maximum=0.95)]  # share; of what is left a pose has to be found
 
 
 @dataclass(frozen=True)
@@ -29,10 +35,10 @@ class Severities:
         crop: share of the points cut off by a half-space in a random direction.
     """
 
-    noise: tuple[float, float] = (0.01, 0.03)
-    rotation_deg: tuple[float, float] = (15.0, 60.0)
-    translation: tuple[float, float] = (0.05, 0.30)
-    crop: tuple[float, float] = (0.20, 0.60)
+    noise: tuple[Share, Share] = (0.01, 0.03)
+    rotation_deg: tuple[HalfTurn, HalfTurn] = (15.0, 60.0)
+    translation: tuple[Shift, Shift] = (0.05, 0.30)
+    crop: tuple[Hidden, Hidden] = (0.20, 0.60)
 
     def __post_init__(self) -> None:
         for severity in fields(self):

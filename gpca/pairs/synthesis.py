@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from gpca.pairs.dataset import REGISTRATION_COLUMNS, SPLITS, Registrations, ragg
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed, Severities
 from gpca.progress import progress
 from gpca.seeds import generator
+from gpca.settings import Bounds
+
+TrainSamples = Annotated[int, Bounds(minimum=9)]
+TestSamples = Annotated[int, Bounds(minimum=3)]
 
 
 @dataclass(frozen=True)
@@ -24,14 +28,14 @@ class RegistrationSettings:
 
     Attributes:
         train, test: samples of each split, balanced over concepts and objects.
-        points: points of source and target (fewer where the object has fewer than twice as many).
+        cloud_points: of source and of target (fewer where the object has fewer than twice as many).
         severities: ranges of the perturbations.
         icp: how ICP runs.
     """
 
-    train: int = 800
-    test: int = 200
-    points: int = 2048
+    train: TrainSamples = 800
+    test: TestSamples = 200
+    cloud_points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 2048
     severities: Severities = field(default_factory=Severities)
     icp: ICPSettings = field(default_factory=ICPSettings)
 
@@ -72,7 +76,7 @@ def _register_one(
     objects: ObjectClouds, object_index: int, concept: str, settings: RegistrationSettings, random: np.random.Generator
 ) -> dict:
     points = objects.points(object_index) / float(objects.diameters_m[object_index])
-    n_points = min(settings.points, len(points) // 2)
+    n_points = min(settings.cloud_points, len(points) // 2)
     # The draws are disjoint: a point in both clouds would have distance zero, and that gives the concept away.
     order = random.permutation(len(points))
     source_rows, target_rows = order[:n_points], order[n_points : 2 * n_points]

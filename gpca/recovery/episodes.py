@@ -38,7 +38,7 @@ class Episode:
         if actions not in self.outcomes:
             before = self.outcomes[actions[:-1]]
             action = known[actions[-1]]
-            outcome = register_after(self.situation, before, action, actions, settings.points, settings.icp)
+            outcome = register_after(self.situation, before, action, actions, settings.cloud_points, settings.icp)
             self.outcomes[actions] = outcome
         return self.outcomes[actions]
 
@@ -58,10 +58,10 @@ def find_failures(situations: Situations, settings: LoopSettings) -> list[Episod
                 break
             tried[cause] = number + 1
             disturbed, clean = situations.draw(cause, cause, number)
-            start = register_first(disturbed, settings.points, settings.icp)
+            start = register_first(disturbed, settings.cloud_points, settings.icp)
             if start is None or start.error <= CORRECT:
                 continue
-            without = register_first(clean, settings.points, settings.icp)
+            without = register_first(clean, settings.cloud_points, settings.icp)
             if without is not None and without.error <= CORRECT:
                 found.append((disturbed, start))
         episodes += [

@@ -10,11 +10,12 @@ import numpy as np
 
 from baselines.registry import explainer_entry
 from gpca.attribution.scores import Attribution
-from gpca.encoders.training import EncoderSettings, embed, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
 from gpca.pairs.dataset import Registrations
 from gpca.recovery.answers import Explain
 from gpca.uncertainty.evaluation import evaluate_design
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
 
 @dataclass(frozen=True)

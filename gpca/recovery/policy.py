@@ -15,6 +15,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.settings import NotNegative, Share
 
 QUEUE = "queue"  # the branch that acts no more: a person labels the case, and the classifier learns it
 TREATMENTS = {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"}  # the paper maps them so
@@ -31,9 +32,9 @@ class Thresholds:
         attempts: after so many actions without improvement the case is queued.
     """
 
-    uncertain: float = np.inf
-    dominant: float = 0.0
-    improvement: float = 0.1
+    uncertain: NotNegative = np.inf
+    dominant: Share = 0.0
+    improvement: Share = 0.1
     attempts: int = 3
 
     def __post_init__(self) -> None:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 from gpca.alignment.icp import ICPSettings
-from gpca.encoders.training import EncoderSettings
+from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.frames.camera import Camera
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.situations import SituationSettings
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.settings import check_settings
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.settings import Bounds, Count, check_settings
+from gpca.uncertainty.settings import UncertaintySettings
 
 SECTIONS = {
     "recovery": ("recovery",),
@@ -32,14 +33,14 @@ class LoopSettings:
         failures: how many are wanted for each cause.
         tries: how many registrations may be made to find them, for each cause.
         budget: how many actions each failure may take.
-        points: of source and target.
+        cloud_points: how many source and target have.
         icp: how ICP runs.
     """
 
-    failures: int = 8
-    tries: int = 120
-    budget: int = 3
-    points: int = 2048
+    failures: Count = 8
+    tries: Count = 120
+    budget: Annotated[int, Bounds(minimum=1, maximum=9)] = 3
+    cloud_points: int = 2048
     icp: ICPSettings = field(default_factory=ICPSettings)
 
 
@@ -78,9 +79,9 @@ class RecoverySettings:
         scenes = SceneSettings.from_dict(given["scenes"])
         return cls(
             section=recovery,
-            loop=LoopSettings(**recovery["loop"], points=registration.points, icp=registration.icp),
+            loop=LoopSettings(**recovery["loop"], cloud_points=registration.cloud_points, icp=registration.icp),
             situation=SituationSettings(
-                replace(scenes, scenes=recovery["tables"], camera=Camera(**recovery["camera"])),
+                replace(scenes, count=recovery["tables"], camera=Camera(**recovery["camera"])),
                 noise_scale=tuple(recovery["noise_scale"]),
                 hidden=tuple(recovery["hidden"]),
                 severities=registration.severities,

@@ -52,7 +52,7 @@ def register_situations(
             start, redraw = None, 0
             while start is None:
                 situation, _ = situations[split].draw(cause, cause, number, redraw)
-                start = register_first(situation, settings.points, settings.icp)
+                start = register_first(situation, settings.cloud_points, settings.icp)
                 redraw += 1
             records.append(start.record | {"sample": number, "split": split})
             failed.append(start.error > CORRECT)

@@ -25,7 +25,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         config: that :func:`gpca.config.check.check` has checked.
         sources: name -> its resolved entry.
     """
-    frames, kernels = config["real_world"], config["kernels"]
+    frames, kernels = config["real_world"], config["kernel_grid"]
     backbones = [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
     strategies = list(config["active_learning"]["strategies"])
     return {
@@ -75,7 +75,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "target": learning["target"],
         "batch": learning["batch"],
         "test_samples": config["registrations"]["test"],
-        "kernel_sources": {name: shown[name] for name in shown if name in config["kernels"]["sources"]},
+        "kernel_sources": {name: shown[name] for name in shown if name in config["kernel_grid"]["sources"]},
         "encoder_title": encoder_title(**config["embedding"]),
         "backbones": {name: config["encoders"][name] for name in frames["backbones"]},
         "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],

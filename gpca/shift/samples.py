@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gpca.encoders.training import Classifier, EncoderSettings, embed, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import Classifier, embed, train_encoder
 from gpca.explainers.analytical_features import analytical_features
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
@@ -15,29 +16,7 @@ from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.seeds import generator
 from gpca.shift.distance import knn_distance, mahalanobis_distance, principal_components
 from gpca.shift.sets import SPACES, ShiftedSets
-
-
-@dataclass(frozen=True)
-class ShiftSettings:
-    """How many samples are made, how unlike they are and how far is measured.
-
-    Attributes:
-        beyond: how the registrations with larger severities are made; their number is `beyond.test`.
-        encoder: how the encoder that never sees some objects is trained.
-        samples: at most so many of another source, and of objects that an encoder never saw.
-        held_out_share: of the objects, at least one, that this encoder and the learners on it never see.
-        train: training samples of that encoder, at most.
-        neighbours: of the mean distance to the nearest training samples.
-        points: at which the local shape of a cloud is measured for the distances.
-    """
-
-    beyond: RegistrationSettings
-    encoder: EncoderSettings
-    samples: int = 90
-    held_out_share: float = 0.2
-    train: int = 300
-    neighbours: int = 10
-    points: int = 128
+from gpca.shift.settings import ShiftSettings
 
 
 def make_sets(
@@ -105,7 +84,7 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
     """Join sets of one encoder, the one with its training samples first, and measure the distances to these."""
     spaces = {
         "analytical": {
-            name: analytical_features(part, source, seed, "distance", name, points=settings.points)
+            name: analytical_features(part, source, seed, "distance", name, shape_points=settings.shape_points)
             for name, part in parts.items()
         },
         "embedding": {name: part.embedding for name, part in parts.items()},

@@ -11,10 +11,12 @@ import torch
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
-from gpca.active_learning.rounds import ActiveLearningSettings, Task, initial_gpc, make_task, run_rounds
-from gpca.active_learning.stream import StreamSettings, run_stream
-from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.active_learning.rounds import Task, initial_gpc, make_task, run_rounds
+from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.active_learning.stream import run_stream
+from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS

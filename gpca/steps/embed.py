@@ -9,7 +9,8 @@ from time import perf_counter
 import torch
 
 from gpca.attribution.predictions import read_timings, write_timings
-from gpca.encoders.training import EncoderSettings, embed, load_model
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, load_model
 from gpca.files import save_arrays
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance

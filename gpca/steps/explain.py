@@ -14,7 +14,7 @@ from gpca.model.explainer import Explainer
 from gpca.model.file import Model, model_path
 from gpca.model.point_file import read_points, read_pose
 from gpca.objects.mesh_folder import METRES_PER_UNIT
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
 
 def add_arguments(parser: ArgumentParser) -> None:

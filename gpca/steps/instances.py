@@ -22,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--scenes", type=Path, help="the folder that the step scenes wrote, in place of datasets")
     parser.add_argument("--data-dir", help="folder that holds the datasets; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", type=Path, help="where downloads are kept")
-    parser.add_argument("--points", type=int, default=16384, help="points sampled on each model")
+    parser.add_argument("--surface-points", type=int, default=16384, help="points sampled on each model")
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--objects", required=True, type=Path, help="canonical clouds, to be written")
 
@@ -37,7 +37,8 @@ def run(options: Namespace) -> None:
     if options.scenes:
         inputs = sorted(path for pattern in patterns() for path in options.scenes.glob(pattern))
     initial_pose = InitialPoseSettings(**options.settings.get("initial_pose", {}))
-    with record_provenance([options.out, options.objects], inputs, {**options.settings, "points": options.points}):
+    declared = {**options.settings, "surface_points": options.surface_points}
+    with record_provenance([options.out, options.objects], inputs, declared):
         datasets = {
             name: Dataset(name, tuple(folders(entry, options.downloads)), **_given(entry))
             for name, entry in entries.items()
@@ -49,7 +50,7 @@ def run(options: Namespace) -> None:
             frames = dataset.frames()
             read[name] = (dataset, frames, read_models(dataset, frames))
         surfaces = (model.surface for _, _, models in read.values() for model in models.values())
-        write_objects(surfaces, options.source, options.objects, options.points)
+        write_objects(surfaces, options.source, options.objects, options.surface_points)
         objects = ObjectClouds.load(options.objects)
         instances = read_instances(read, objects, initial_pose, options.settings.get("gap", 10))
         instances.save(options.out)

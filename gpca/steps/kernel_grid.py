@@ -16,7 +16,7 @@ from gpca.steps import per_seed
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names, one of each per seed; ``--settings`` is the config's section ``kernels``."""
+    """Declare files and names, one of each per seed; ``--settings`` is the config's section ``kernel_grid``."""
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=int, nargs="+")
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
@@ -27,7 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Evaluate the grid, seed by seed."""
     torch.set_num_threads(options.threads)
-    check_settings(options.settings, "kernels")
+    check_settings(options.settings, "kernel_grid")
     known = {field.name for field in fields(KernelGrid)}
     grid = KernelGrid(**{name: value for name, value in options.settings.items() if name in known})
     for seed, registrations, embeddings, out in per_seed(options, "registrations", "embeddings", "out"):

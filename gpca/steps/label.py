@@ -18,7 +18,7 @@ import torch
 from gpca.active_learning.labelling import SKIPPED, LabelFile, Question, Session, require_name
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
-from gpca.classifier.gpc import GPCSettings
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS

@@ -9,8 +9,10 @@ import numpy as np
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.classifier.gpc import GPC, GPCSettings
-from gpca.encoders.training import EncoderSettings, load_model
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import load_model
 from gpca.model.file import Model
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
@@ -61,7 +63,7 @@ def run(options: Namespace) -> None:
             encoder_settings=settings,
             gpc=fit_gpc(train),
             icp=ICPSettings(**given["registrations"].get("icp", {})),
-            points=given["registrations"].get("points", 2048),
+            cloud_points=given["registrations"].get("cloud_points", 2048),
             policy=_policy(given["recovery"], train, fit_gpc, h_S_d),
             title=options.title,
             stand_in=options.stand_in,

@@ -16,7 +16,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
     parser.add_argument("--data-dir", help="folder that holds the data; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", help="where downloads are kept")
-    parser.add_argument("--points", type=int, default=16384, help="points sampled on each mesh")
+    parser.add_argument("--surface-points", type=int, default=16384, help="points sampled on each mesh")
     parser.add_argument("--out", required=True, type=Path)
 
 
@@ -24,5 +24,6 @@ def run(options: Namespace) -> None:
     """Read the source's surfaces, sample them and write the canonical clouds."""
     check_settings(options.settings, "sources", "*")
     entry = resolve(options.settings, options.data_dir)
-    with record_provenance([options.out], data_files(entry), {"entry": entry, "points": options.points}):
-        write_objects(surfaces(entry, Path(options.downloads)), options.source, options.out, options.points)
+    declared = {"entry": entry, "surface_points": options.surface_points}
+    with record_provenance([options.out], data_files(entry), declared):
+        write_objects(surfaces(entry, Path(options.downloads)), options.source, options.out, options.surface_points)

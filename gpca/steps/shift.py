@@ -8,7 +8,8 @@ from pathlib import Path
 
 import torch
 
-from gpca.encoders.training import EncoderSettings, load_model
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import load_model
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, load_embeddings

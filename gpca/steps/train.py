@@ -8,7 +8,8 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from gpca.encoders.training import EncoderSettings, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import train_encoder
 from gpca.files import whole_file
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance

@@ -13,7 +13,7 @@ from gpca.steps import per_seed
 from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.evaluation import design_rows, evaluate_design
 from gpca.uncertainty.outcomes import write_seconds
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.encoders.training import EncoderSettings, embed, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
 from gpca.files import save_arrays
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

@@ -18,7 +18,8 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
 from gpca.uncertainty.remedies import Remedies, RemedyRuns
-from gpca.uncertainty.spread import Outcome, UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Outcome
 
 STEP = 0.1  # a local derivative takes this step, in the knob's range
 LATIN = 24  # settings of the knobs in a Latin hypercube
@@ -92,7 +93,7 @@ class Pair:
 def _additive(
     pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
 ) -> list[Outcome]:
-    runs = KnobRuns(*pair.observed(settings.points, random), xi_n_6, settings, random)
+    runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
     corners = [Knobs(*np.where(switches, MIDDLE, UNTOUCHED)) for switches in CORNERS]
     steps = [Knobs(*np.where(row, UNTOUCHED + STEP * KNOB_RANGE, UNTOUCHED)) for row in np.eye(3, dtype=bool)]
     return [runs(knobs) for knobs in (*corners, *steps)]
@@ -101,7 +102,7 @@ def _additive(
 def _sweep(
     kind: str, pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
 ) -> list[Outcome]:
-    runs = KnobRuns(*pair.observed(settings.points, random), xi_n_6, settings, random)
+    runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
     return [runs(Knobs(*knobs)) for knobs in (UNTOUCHED, *sample_knobs(kind))]
 
 
@@ -115,7 +116,7 @@ def _removal(
 def _oracle(
     pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
 ) -> list[Outcome]:
-    runs = KnobRuns(*pair.clean(settings.points), xi_n_6, settings, random)
+    runs = KnobRuns(*pair.clean(settings.icp_points), xi_n_6, settings, random)
     true = pair.true_knobs(settings)
     corners = [Knobs(*np.where(switches, true, UNTOUCHED)) for switches in CORNERS]
     # Two of the three knobs are at rest, so the eight corners are two settings, and each is run once.
@@ -125,7 +126,8 @@ def _oracle(
 def _causal(
     pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
 ) -> list[Outcome]:
-    pairs = (pair.clean(settings.points, 1), pair.clean(settings.points, 2), pair.observed(settings.points, random))
+    n = settings.icp_points
+    pairs = (pair.clean(n, 1), pair.clean(n, 2), pair.observed(n, random))
     return [KnobRuns(*clouds, xi_n_6, settings, random)(UNTOUCHED) for clouds in pairs]
 
 

@@ -11,7 +11,8 @@ from gpca.progress import progress
 from gpca.seeds import generator
 from gpca.uncertainty.designs import DESIGNS, Pair
 from gpca.uncertainty.outcomes import Outcomes
-from gpca.uncertainty.spread import UncertaintySettings, divergence
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import divergence
 
 
 def design_rows(registrations: Registrations, design: str, samples: int | None) -> np.ndarray:

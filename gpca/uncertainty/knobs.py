@@ -17,7 +17,8 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import random_direction
 from gpca.errors import InputError
-from gpca.uncertainty.spread import Outcome, UncertaintySettings, run_from_starts, summarise_runs
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Outcome, run_from_starts, summarise_runs
 
 
 class Knobs(NamedTuple):

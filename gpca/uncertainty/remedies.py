@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import transform
-from gpca.uncertainty.spread import Outcome, Runs, UncertaintySettings, run_from_starts, summarise_runs
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarise_runs
 
 NEIGHBOURS = 24  # so many span the plane that a point is moved to
 OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbour distance
@@ -65,7 +66,7 @@ class RemedyRuns:
         tree, points = self._denoised if remedies.denoise else self._observed
         icp, target = self._trimmed if remedies.trim else self._whole
         xi_n_6 = BROADER * self._xi_n_6 if remedies.restart else self._xi_n_6
-        runs = run_from_starts(icp, points[: self._settings.points], self._T_init, xi_n_6)
+        runs = run_from_starts(icp, points[: self._settings.icp_points], self._T_init, xi_n_6)
         if remedies.restart:
             runs = best_of_neighbours(runs, self._settings.icp.correspondence_distance)
         return summarise_runs(runs, tree, target, self._T_icp, self._settings, started)
@@ -81,13 +82,13 @@ class RemedyRuns:
 
     @cached_property
     def _whole(self) -> tuple[BatchedICP, np.ndarray]:
-        return BatchedICP(self._target[: self._settings.points], self._settings.icp), self._target
+        return BatchedICP(self._target[: self._settings.icp_points], self._settings.icp), self._target
 
     @cached_property
     def _trimmed(self) -> tuple[BatchedICP, np.ndarray]:
         aligned = transform(self._T_icp, self._source)
         points = trim(self._target, aligned, self._settings.icp.correspondence_distance)
-        return BatchedICP(points[: self._settings.points], self._settings.icp), points
+        return BatchedICP(points[: self._settings.icp_points], self._settings.icp), points
 
 
 def denoise(points: np.ndarray) -> np.ndarray:

@@ -7,52 +7,18 @@ u = KL(N(0, Σ_clean + εI) ‖ N(0, Σ + εI)). Lengths are relative to the obj
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp, log
-from gpca.errors import InputError
+from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_RESIDUAL = 1e-6  # diameters; a cloud on itself counts as this far off, or the logarithm would be infinite
-FEWEST_STARTS = 13  # the 2·6 + 1 of an unscented estimate; a 6×6 covariance of 6 samples or fewer is singular
-
-
-@dataclass(frozen=True)
-class UncertaintySettings:
-    """How the spread is measured.
-
-    Attributes:
-        starts: n, initial poses per condition.
-        start_rotation_deg, start_translation: root mean square angle and length of the starts' offsets.
-        points: points of source and of target in these runs (fewer where a cloud has fewer).
-        floor: ε, variance below which a spread is no uncertainty: (1e-3)² is 0.06° and a thousandth of the diameter.
-        icp: how ICP runs.
-    """
-
-    starts: int = 50
-    start_rotation_deg: float = 10.0
-    start_translation: float = 0.05
-    points: int = 512
-    floor: float = 1e-6
-    icp: ICPSettings = field(default_factory=ICPSettings)
-
-    def __post_init__(self) -> None:
-        if self.starts < FEWEST_STARTS:
-            remedy = f"give at least {FEWEST_STARTS}: fewer do not determine a 6×6 covariance"
-            raise InputError("uncertainty setting 'starts'", f"{self.starts}", remedy)
-        if self.floor <= 0:
-            raise InputError("uncertainty setting 'floor'", f"{self.floor}", "give a positive variance")
-
-    def deviation_6(self) -> np.ndarray:
-        """Return the standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
-        per_axis = np.array([np.deg2rad(self.start_rotation_deg), self.start_translation]) / np.sqrt(3)
-        return np.repeat(per_axis, 3)
 
 
 @dataclass(frozen=True)

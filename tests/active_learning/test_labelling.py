@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.active_learning.labelling import LabelFile, Session, require_name
-from gpca.classifier.gpc import GPCSettings
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 
 NAMES = ("noise", "pose", "overlap")

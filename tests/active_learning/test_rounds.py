@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 import gpca.active_learning.rounds
-from gpca.active_learning.rounds import ActiveLearningSettings, Samples, accuracies, initial_gpc, make_task, run_rounds
-from gpca.classifier.gpc import GPCSettings
+from gpca.active_learning.rounds import Samples, accuracies, initial_gpc, make_task, run_rounds
+from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -3,9 +3,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gpca.active_learning.rounds import ActiveLearningSettings, Samples, Task, initial_gpc
-from gpca.active_learning.stream import StreamSettings, arrival_order, run_stream
-from gpca.classifier.gpc import GPCSettings
+from gpca.active_learning.rounds import Samples, Task, initial_gpc
+from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.active_learning.stream import arrival_order, run_stream
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from gpca.classifier.covariances import COVARIANCES
-from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 
 CLASSES = ("noise", "pose", "overlap")

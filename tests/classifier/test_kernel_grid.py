@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
-from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.gpc import GPC
 from gpca.classifier.kernel_grid import GRID_COLUMNS, KernelGrid, evaluate_grid, read_grids, write_grid
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -7,9 +7,10 @@ from scipy.special import log_softmax, softmax
 from scipy.stats import norm, qmc
 from torch.distributions import MultivariateNormal, kl_divergence
 
-from gpca.classifier.gpc import GPC, GPCSettings
+from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
+from gpca.classifier.settings import GPCSettings
 
 from .gpytorch_form import LatentGPs
 

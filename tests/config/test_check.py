@@ -1,44 +1,12 @@
-import copy
-
 import pytest
-import yaml
 
 from gpca.config import check as run_config
 from gpca.errors import InputError
-from gpca.settings import SCHEMA, check_settings
-from gpca.uncertainty.designs import DESIGNS
+from gpca.settings import check_settings
 
-CONFIG = SCHEMA.parents[2] / "config"
-MISSING = object()
+from .configs import MISSING, changed, load
+
 NAN = float("nan")
-
-
-def merged(*parts):
-    """Snakemake's way of laying one config over another."""
-    whole = {}
-    for part in parts:
-        for key, value in part.items():
-            both = isinstance(value, dict) and isinstance(whole.get(key), dict)
-            whole[key] = merged(whole[key], value) if both else copy.deepcopy(value)
-    return whole
-
-
-def load(*names):
-    return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in ("sources", "config", *names)))
-
-
-def changed(key, value):
-    """The default config with the key (a path with dots) set to the value, or removed."""
-    config = load()
-    *path, last = key.split(".")
-    section = config
-    for name in path:
-        section = section[name]
-    if value is MISSING:
-        del section[last]
-    else:
-        section[last] = value
-    return config
 
 
 @pytest.mark.parametrize("name", ["config", "smoke", "real"])
@@ -48,14 +16,6 @@ def test_the_shipped_configs_are_sound(name):
     for entry in sources.values():
         assert entry["stand_in"] == (name != "real")
         assert entry["origin"] == ("download" if name == "real" else "procedural")
-
-
-def test_a_source_that_is_false_is_left_out_as_if_it_were_not_there():
-    config, never_there = changed("sources.linemod", False), changed("sources.linemod", MISSING)
-    for given in (config, never_there):
-        given["kernels"]["sources"] = ["ycb"]
-    assert run_config.check(config) == run_config.check(never_there)
-    assert config["sources"]["linemod"] is False  # for a Snakemake that is given this config once more
 
 
 def test_local_data_comes_before_the_download(tmp_path):
@@ -111,7 +71,7 @@ FAULTS = [
     ("real_world.initial_pose.form", "results", "real_world.datasets.scenes.results: is needed by initial_pose form"),
     ("real_world.reductions", ["tsne"], "real_world.reductions.0: 'tsne' is not one of"),
     ("sources.real_rgbd", folder(), "sources.real_rgbd: is the name of real_world's frames"),
-    ("kernels.kernel", ["rbf"], "kernels.kernel: unknown; did you mean kernels?"),
+    ("kernel_grid.kernel", ["rbf"], "kernel_grid.kernel: unknown; did you mean kernels?"),
     ("shift.severities.crops", [0.6, 0.7], "shift.severities.crops: unknown; did you mean crop?"),
     ("shift.encoder.options", {"k": 8}, "shift.encoder.options: unknown"),
     # missing keys
@@ -130,9 +90,9 @@ FAULTS = [
     ("explainers.gpca", [1], "explainers.gpca: [1] is not of type 'object', 'null'"),
     ("seeds", 3, "seeds: 3 is not of type 'array'"),
     # out of range
-    ("kernels.kernels", ["cubic"], "kernels.kernels.0: 'cubic' is not one of"),
-    ("kernels.iterations", [0], "kernels.iterations.0: 0 is less than the minimum of 1"),
-    ("kernels.learning_rates", [], "kernels.learning_rates: [] should be non-empty"),
+    ("kernel_grid.kernels", ["cubic"], "kernel_grid.kernels.0: 'cubic' is not one of"),
+    ("kernel_grid.iterations", [0], "kernel_grid.iterations.0: 0 is less than the minimum of 1"),
+    ("kernel_grid.learning_rates", [], "kernel_grid.learning_rates: [] should be non-empty"),
     ("learners.gpca", {"draws": 0}, "learners.gpca: setting draws: 0 is less than the minimum of 2"),
     ("shift.held_out_share", 1, "shift.held_out_share: 1 is "),
     ("shift.severities.noise", [0.5, 0.4], "shift.severities: severity noise: [0.5, 0.4] runs downwards"),
@@ -156,7 +116,7 @@ FAULTS = [
         "cubic",
         "explainers.gpca.kernel: 'cubic' is not one of ['rbf', 'matern32', 'polynomial']",
     ),
-    ("objects.points", 100, "objects.points: 100 is less than the minimum of 256"),
+    ("objects.surface_points", 100, "objects.surface_points: 100 is less than the minimum of 256"),
     ("seeds", [], "seeds: [] should be non-empty"),
     ("seeds", [0, 1, 0], "seeds: [0, 1, 0] has non-unique elements"),
     ("seeds", [-1], "seeds.0: -1 is less than the minimum of 0"),
@@ -170,7 +130,7 @@ FAULTS = [
     ("model.source", "lab", "model.source: no source 'lab'; known are coffee_cup, linemod, ycb, real_rgbd"),
     ("model.encoder", "voxelnet", "model.encoder: no encoder 'voxelnet'; known are dgcnn"),
     ("runtime.repeats", 1, "runtime.repeats: 1 is less than the minimum of 2"),
-    ("kernels.sources", ["ycbv"], "kernels.sources: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
+    ("kernel_grid.sources", ["ycbv"], "kernel_grid.sources: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
     ("learners.learner_tree", {}, "learners.learner_tree: explainer 'learner_tree': unknown; known are gpca_paper"),
     ("learners.learner_forest", {"tree": 3}, "learners.learner_forest: explainer 'learner_forest': got an unexpected"),
     ("learners.residuals_forest", {}, "learners.residuals_forest: does not read embeddings; choose another"),
@@ -218,7 +178,7 @@ def test_what_is_allowed_passes(key, value):
 def test_settings_given_by_hand_need_not_be_complete():
     check_settings({}, "registrations")
     check_settings({"train": 12, "severities": {"noise": [0.1, 0.2]}}, "registrations")
-    check_settings({"points": 64, "options": {"k": 8}}, "encoders", "any")
+    check_settings({"draw_points": 64, "options": {"k": 8}}, "encoders", "any")
     check_settings({"kind": "mesh_folder", "location": "parts"}, "sources", "any")
     check_settings({"whatever": 1}, "explainers", "an_own_one")
 
@@ -253,11 +213,6 @@ def test_jobs_inherit_the_hash_of_the_config_and_this_python(monkeypatch):
     assert len(set(hashes[:4])) == 1
     assert hashes[4] != hashes[0]
     assert os.path.dirname(shutil.which("python")) == os.path.dirname(sys.executable)
-
-
-def test_the_schema_knows_every_design_and_no_other():
-    schema = yaml.safe_load(SCHEMA.read_text())
-    assert set(schema["properties"]["uncertainty"]["propertyNames"]["enum"]) == set(DESIGNS)
 
 
 def test_an_explainer_whose_design_is_not_configured_stops_at_load():

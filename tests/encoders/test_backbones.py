@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from gpca.encoders.registry import ENCODERS, make_encoder, parameter_count
-from gpca.encoders.training import EncoderSettings, embed, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
@@ -106,7 +107,7 @@ def easy(objects):
 
 @backbones
 def test_concepts_are_learnt_and_embeddings_repeat(easy, backbone):
-    settings = EncoderSettings(backbone, points=64, draws=1, epochs=12, batch_size=12, options=SMALL[backbone])
+    settings = EncoderSettings(backbone, draw_points=64, draws=1, epochs=12, batch_size=12, options=SMALL[backbone])
     model, curve = train_encoder(easy, "tiny", 0, settings)
     assert curve[-1]["loss"] < 0.7 * curve[0]["loss"]
     assert max(epoch["accuracy"] for epoch in curve[-4:]) > 0.7  # a single epoch's goes up and down

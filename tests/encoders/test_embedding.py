@@ -6,9 +6,10 @@ import pytest
 import torch
 
 from gpca.encoders.registry import make_encoder
-from gpca.encoders.training import EncoderSettings, draw_points, embed
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import draw_points, embed
 
-SETTINGS = EncoderSettings(points=64, draws=2, batch_size=12, options={"k": 8, "point_features": 16})
+SETTINGS = EncoderSettings(draw_points=64, draws=2, batch_size=12, options={"k": 8, "point_features": 16})
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,13 @@ import pytest
 import torch
 
 from gpca.encoders import training
-from gpca.encoders.training import EncoderSettings, load_model, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import load_model, train_encoder
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
-SETTINGS = EncoderSettings(points=64, draws=2, epochs=6, batch_size=12, options={"k": 8, "point_features": 16})
+SETTINGS = EncoderSettings(draw_points=64, draws=2, epochs=6, batch_size=12, options={"k": 8, "point_features": 16})
 KEEP = training._keep
 
 
@@ -127,7 +128,7 @@ def test_weights_survive_the_file_and_others_are_refused(tmp_path, unbroken):
     [
         ({"backbone": "dgcn"}, "backbone 'dgcn': unknown; known are .*dgcnn"),
         ({"options": {"neighbours": 8}}, "backbone 'dgcnn': .*neighbours"),
-        ({"points": 16, "options": {"k": 20}}, "cloud of 16 points: has no 20 neighbours"),
+        ({"draw_points": 16, "options": {"k": 20}}, "cloud of 16 points: has no 20 neighbours"),
     ],
 )
 def test_wrong_settings_are_refused(registrations, changed, expected):

@@ -54,14 +54,14 @@ def test_visible_masks_are_disjoint_parts_of_the_whole_ones(scenes):
 
 
 def test_a_scene_is_the_same_whatever_others_there_are_and_however_often_it_is_drawn(scenes, tmp_path):
-    write_scenes(surfaces(), "tiny", scene_settings(scenes=1), tmp_path / "fewer")
+    write_scenes(surfaces(), "tiny", scene_settings(count=1), tmp_path / "fewer")
     expected, drawn = files(scenes), files(tmp_path / "fewer")
     assert all(drawn[name] == expected[name] for name in drawn if name != "dataset_info.json")
     assert "test/000000/depth/000001.png" in drawn
 
 
 def test_noise_changes_depth_and_nothing_else(scenes, tmp_path):
-    write_scenes(surfaces(), "tiny", scene_settings(noise=DepthNoise(), scenes=1), tmp_path / "noisy")
+    write_scenes(surfaces(), "tiny", scene_settings(noise=DepthNoise(), count=1), tmp_path / "noisy")
     expected, noisy = files(scenes / "test/000000"), files(tmp_path / "noisy/test/000000")
     assert {name.split("/")[0] for name in noisy if noisy[name] != expected[name]} == {"depth", "scene_gt_info.json"}
 

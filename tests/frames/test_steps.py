@@ -11,7 +11,7 @@ from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 
-REGISTRATIONS = {"train": 9, "test": 6, "points": 128, "test_share": 0.4, "occluders": 1.0}
+REGISTRATIONS = {"train": 9, "test": 6, "cloud_points": 128, "test_share": 0.4, "occluders": 1.0}
 
 
 def settings(**given):
@@ -29,7 +29,7 @@ def read(scenes, tmp_path):
             "tiny",
             "--settings",
             json.dumps(given),
-            "--points",
+            "--surface-points",
             "1024",
             *files,
             *more,
@@ -69,7 +69,7 @@ def test_scenes_are_drawn_by_a_command(tmp_path, monkeypatch):
 
     monkeypatch.setattr(procedural, "surfaces", lambda family: iter(surfaces()))
     given = settings(
-        scenes=2, views=1, objects=[2, 2], camera={"width": 64, "height": 48, "focal_px": 60}, families=["ycb"]
+        count=2, views=1, objects=[2, 2], camera={"width": 64, "height": 48, "focal_px": 60}, families=["ycb"]
     )
     assert main(["scenes", "--source", "tiny", "--settings", given, "--out", str(tmp_path / "drawn")]) == 0
     assert len(list((tmp_path / "drawn/test/000000/mask_visib").iterdir())) == 2

@@ -10,7 +10,7 @@ from gpca.frames.synthesis import HALF_SPACE, OCCLUDER, FrameSettings, make_fram
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings
 
-SETTINGS = FrameSettings(registration=RegistrationSettings(train=24, test=12, points=256))
+SETTINGS = FrameSettings(registration=RegistrationSettings(train=24, test=12, cloud_points=256))
 
 
 @pytest.fixture(scope="module")

@@ -32,7 +32,7 @@ def surfaces():
 
 
 def scene_settings(noise=PERFECT, **changes):
-    return SceneSettings(**{"scenes": 3, "views": 2, "objects": (4, 5), "camera": CAMERA, "noise": noise} | changes)
+    return SceneSettings(**{"count": 3, "views": 2, "objects": (4, 5), "camera": CAMERA, "noise": noise} | changes)
 
 
 def read(folder, out, settings=None, results=None):

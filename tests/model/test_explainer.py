@@ -14,7 +14,7 @@ from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.model.explanation import WORDS
 from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
 
 @pytest.fixture(scope="module")

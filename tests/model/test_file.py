@@ -28,7 +28,7 @@ def test_a_loaded_model_says_the_same(model, path):
         model.gpc.attribute(embeddings(model)), loaded.gpc.attribute(embeddings(model)), strict=True
     ):
         np.testing.assert_array_equal(actual, expected)
-    for name in ("encoder_settings", "icp", "points", "policy", "title", "stand_in", "concepts"):
+    for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in", "concepts"):
         assert getattr(loaded, name) == getattr(model, name)
 
 

@@ -2,8 +2,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.active_learning.rounds import ActiveLearningSettings, make_task
-from gpca.classifier.gpc import GPCSettings
+from gpca.active_learning.rounds import make_task
+from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.files import write_csv
 from gpca.model.runtime import measure

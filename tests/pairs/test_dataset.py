@@ -29,7 +29,7 @@ def test_concepts_and_objects_are_balanced_in_both_splits(registrations):
 
 
 def test_a_sample_does_not_depend_on_how_many_there_are(objects, registrations):
-    few, _ = make_registrations(objects, "tiny", 0, RegistrationSettings(train=6, test=3, points=256))
+    few, _ = make_registrations(objects, "tiny", 0, RegistrationSettings(train=6, test=3, cloud_points=256))
     for split, n in (("train", 6), ("test", 3)):
         one, other = few.subset(few.rows(split)), registrations.subset(registrations.rows(split)[:n])
         for name in {*REGISTRATION_COLUMNS, "points", "offsets"} - {"sample"}:
@@ -38,7 +38,7 @@ def test_a_sample_does_not_depend_on_how_many_there_are(objects, registrations):
 
 @pytest.mark.parametrize(("source", "seed"), [("tiny", 1), ("other", 0)])
 def test_another_seed_or_source_gives_other_samples(objects, registrations, source, seed):
-    other, _ = make_registrations(objects, source, seed, RegistrationSettings(train=3, test=3, points=256))
+    other, _ = make_registrations(objects, source, seed, RegistrationSettings(train=3, test=3, cloud_points=256))
     drawn = np.concatenate([getattr(other, name) for name in ("severity_noise", "severity_crop")])
     assert not set(drawn[drawn > 0]) & {*registrations.severity_noise, *registrations.severity_crop}
 
@@ -78,7 +78,7 @@ def test_source_and_target_share_no_point_and_icp_gives_the_stored_cloud(objects
             return result
 
     monkeypatch.setattr(synthesis, "ICP", Recorded)
-    settings = RegistrationSettings(train=6, test=6, points=2048)
+    settings = RegistrationSettings(train=6, test=6, cloud_points=2048)
     made, icp_seconds = make_registrations(objects, "tiny", 0, settings)
     assert (icp_seconds > 0).all()
     for row, (target, source, T_init, result) in enumerate(seen):

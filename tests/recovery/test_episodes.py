@@ -7,7 +7,7 @@ from gpca.recovery.settings import LoopSettings
 
 
 def test_failures_have_their_cause_and_are_bounded(situations):
-    episodes = find_failures(situations["failures"], LoopSettings(failures=1, tries=8, points=400))
+    episodes = find_failures(situations["failures"], LoopSettings(failures=1, tries=8, cloud_points=400))
     for episode in episodes:
         assert episode.outcomes[()].error > CORRECT
         assert episode.tries <= 8

@@ -1,18 +1,18 @@
 import numpy as np
 import pytest
 
-from gpca.encoders.training import EncoderSettings
+from gpca.encoders.settings import EncoderSettings
 from gpca.recovery.loop_explainers import learn_explainers
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
-ENCODER = EncoderSettings(points=32, draws=1, epochs=1, batch_size=12, options={"k": 4, "point_features": 16})
+ENCODER = EncoderSettings(draw_points=32, draws=1, epochs=1, batch_size=12, options={"k": 4, "point_features": 16})
 SETTINGS = {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}}
 
 
 @pytest.fixture(scope="module")
 def learnt(registrations):
     names = ("gpca", "sa_supervised")
-    uncertainty = UncertaintySettings(starts=13, points=32)
+    uncertainty = UncertaintySettings(starts=13, icp_points=32)
     return learn_explainers(names, registrations, ENCODER, SETTINGS, uncertainty, 9, "tiny", 0)
 
 

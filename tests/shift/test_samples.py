@@ -3,11 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.encoders.training import EncoderSettings, embed, train_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
 from gpca.shift.samples import held_out_objects, make_sets, settings_from
 from gpca.shift.sets import TRAINED_ON
 
-ENCODER = {"points": 32, "draws": 1, "epochs": 1, "batch_size": 16, "options": {"k": 4, "point_features": 8}}
+ENCODER = {"draw_points": 32, "draws": 1, "epochs": 1, "batch_size": 16, "options": {"k": 4, "point_features": 8}}
 SHIFT = {
     "samples": 6,
     "severities": {"noise": [0.1, 0.2], "rotation_deg": [60, 90], "translation": [0.3, 0.5], "crop": [0.6, 0.8]},
@@ -15,9 +16,9 @@ SHIFT = {
     "train": 18,
     "encoder": {"epochs": 2},
     "neighbours": 3,
-    "points": 16,
+    "shape_points": 16,
 }
-SETTINGS = settings_from(SHIFT, {"points": 256, "train": 36, "test": 18}, ENCODER)
+SETTINGS = settings_from(SHIFT, {"cloud_points": 256, "train": 36, "test": 18}, ENCODER)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +37,7 @@ def sets(objects, embedded):
 def test_settings_join_what_the_sections_say():
     assert SETTINGS.beyond.train == 0
     assert SETTINGS.beyond.test == SETTINGS.samples == 6
-    assert SETTINGS.beyond.points == 256
+    assert SETTINGS.beyond.cloud_points == 256
     assert SETTINGS.beyond.severities.crop == (0.6, 0.8)
     assert SETTINGS.encoder == EncoderSettings(**ENCODER | {"epochs": 2})
 

@@ -30,13 +30,13 @@ def settings(**changed):
         "tables": 1,
         "noise_scale": [5, 8],
     }
-    encoder = config["encoders"]["dgcnn"] | {"points": 32, "epochs": 1, "draws": 1, "options": {"k": 4}}
+    encoder = config["encoders"]["dgcnn"] | {"draw_points": 32, "epochs": 1, "draws": 1, "options": {"k": 4}}
     given = {
         "recovery": recovery | changed,
         "scenes": config["real_world"]["scenes"] | {"objects": [3, 3]},
-        "registrations": config["registrations"] | {"points": 256},
+        "registrations": config["registrations"] | {"cloud_points": 256},
         "encoder": encoder,
-        "uncertainty": {"starts": 13, "points": 32},
+        "uncertainty": {"starts": 13, "icp_points": 32},
         "explainers": {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}, "softmax_head": None},
     }
     return json.dumps(given)

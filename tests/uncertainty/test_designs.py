@@ -8,9 +8,9 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import CORNERS, DESIGNS, KNOB_RANGE, LATIN, SALTELLI, STEP, Pair, sample_knobs
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER
-from gpca.uncertainty.spread import UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 
-SETTINGS = UncertaintySettings(starts=13, points=60)
+SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()
 
 
@@ -239,7 +239,7 @@ def test_a_source_and_target_of_the_same_points_are_survived(registrations, desi
         T_target_source_init=eye,
         T_target_source_true=eye,
     )
-    made = outcomes(design, same, 0, UncertaintySettings(starts=13, points=1000))
+    made = outcomes(design, same, 0, UncertaintySettings(starts=13, icp_points=1000))
     assert finite(made)
     observed = {"causal": 2, "oracle": 0}.get(design, 0)
     if design != "oracle":

@@ -9,9 +9,10 @@ from gpca.uncertainty import evaluation
 from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.evaluation import design_rows, evaluate_design
 from gpca.uncertainty.outcomes import Outcomes
-from gpca.uncertainty.spread import UncertaintySettings, divergence
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import divergence
 
-SETTINGS = UncertaintySettings(starts=13, points=60)
+SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 COLUMNS = tuple(field.name for field in fields(Outcomes))
 
 
@@ -126,9 +127,9 @@ def test_source_seed_and_split_name_the_random_numbers(registrations):
 def test_the_settings_decide(registrations):
     row = registrations.rows("test")[:1]
     made, _, _ = evaluate("causal", registrations, row)
-    more, _, _ = evaluate("causal", registrations, row, settings=UncertaintySettings(starts=20, points=60))
+    more, _, _ = evaluate("causal", registrations, row, settings=UncertaintySettings(starts=20, icp_points=60))
     assert (made.icp_calls == 13).all() and (more.icp_calls == 20).all()
-    higher, _, _ = evaluate("causal", registrations, row, settings=UncertaintySettings(13, points=60, floor=1e-2))
+    higher, _, _ = evaluate("causal", registrations, row, settings=UncertaintySettings(13, icp_points=60, floor=1e-2))
     assert np.array_equal(higher.covariance, made.covariance)
     assert (higher.uncertainty[:, 1:] < made.uncertainty[:, 1:]).all()
 

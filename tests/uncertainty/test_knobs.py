@@ -7,7 +7,8 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.uncertainty import knobs
 from gpca.uncertainty.knobs import MIDDLE, MOST, UNTOUCHED, UPPER, KnobRuns, Knobs
-from gpca.uncertainty.spread import UncertaintySettings, run_from_starts
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import run_from_starts
 
 SETTINGS = UncertaintySettings(starts=13)
 XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()

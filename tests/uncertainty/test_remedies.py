@@ -8,9 +8,10 @@ from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.uncertainty import remedies
 from gpca.uncertainty.designs import CORNERS
 from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbours, denoise, trim
-from gpca.uncertainty.spread import Runs, UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Runs
 
-SETTINGS = UncertaintySettings(starts=13, points=100)
+SETTINGS = UncertaintySettings(starts=13, icp_points=100)
 
 
 def sphere(n, seed=0, radius=0.5):

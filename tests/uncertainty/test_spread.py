@@ -8,8 +8,8 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
 from gpca.errors import InputError
+from gpca.uncertainty.settings import FEWEST_STARTS
 from gpca.uncertainty.spread import (
-    FEWEST_STARTS,
     SMALLEST_RESIDUAL,
     Runs,
     UncertaintySettings,

@@ -68,10 +68,10 @@ rule instances:
                 for word in (f"--{option.replace('_', '-')}", config[option])
             ]
         ),
-        points=config["objects"]["points"],
+        surface_points=config["objects"]["surface_points"],
     shell:
         "python -m gpca instances --threads {threads} --source {params.source} --settings {params.settings:q} "
-        "{params.frames:q} --points {params.points} --out {output.instances} --objects {output.objects} 2> {log}"
+        "{params.frames:q} --surface-points {params.surface_points} --out {output.instances} --objects {output.objects} 2> {log}"
 
 
 rule register_frames:

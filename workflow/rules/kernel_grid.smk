@@ -23,7 +23,7 @@ rule fit_kernel_grid:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=settings("kernels"),
+        settings=settings("kernel_grid"),
         seeds=SEEDS,
     shell:
         "python -m gpca kernel_grid --threads {threads} --source {wildcards.source} --seeds {params.seeds} "

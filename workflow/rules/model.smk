@@ -8,7 +8,7 @@ MODEL_SETTINGS = {
     "encoder": config["encoders"][MODEL_ENCODER],
     "gpc": config["explainers"].get("gpca") or {},
     "registrations": {
-        name: config["registrations"][name] for name in ("points", "icp")
+        name: config["registrations"][name] for name in ("cloud_points", "icp")
     },
     "recovery": {
         "thresholds": config["recovery"]["thresholds"],

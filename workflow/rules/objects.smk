@@ -32,7 +32,7 @@ rule sample_objects:
         data=lambda wildcards: data_options(
             SOURCES[wildcards.source], config["data_dir"], config["downloads"]
         ),
-        points=config["objects"]["points"],
+        surface_points=config["objects"]["surface_points"],
     shell:
         "python -m gpca objects --threads {threads} --source {wildcards.source} --settings {params.settings:q} "
-        "{params.data:q} --points {params.points} --out {output} 2> {log}"
+        "{params.data:q} --surface-points {params.surface_points} --out {output} 2> {log}"

@@ -87,7 +87,7 @@ KERNEL_TABLES = {table.__name__: table for table in (table4_kernels, table4_grid
 
 
 def kernel_tables_of(kernels: Mapping) -> list[str]:
-    """Return the names of the tables that have a row, given the config's section ``kernels``."""
+    """Return the names of the tables that have a row, given the config's section ``kernel_grid``."""
     has_printed = any(
         kernel in kernels["kernels"] and rate in kernels["learning_rates"] and iterations in kernels["iterations"]
         for kernel, rate, iterations in PRINTED

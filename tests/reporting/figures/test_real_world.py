@@ -23,7 +23,7 @@ def results(tiny, tmp_path_factory):
     """Files of one seed in which samples 0 and 3 of the test split are attributed wrongly, 3 more confidently."""
     folder = tmp_path_factory.mktemp("results")
     instances, objects = tiny
-    settings = FrameSettings(occluders=1.0, registration=RegistrationSettings(train=9, test=12, points=128))
+    settings = FrameSettings(occluders=1.0, registration=RegistrationSettings(train=9, test=12, cloud_points=128))
     registrations, _, poses = make_frame_registrations(instances, objects, "real_rgbd", 0, settings)
     scores_N_C = np.array([np.where(np.array(CONCEPTS) == c, 0.8, 0.1) for c in registrations.concept])
     test = registrations.rows("test")

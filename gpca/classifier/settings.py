@@ -1,0 +1,36 @@
+"""Settings of the Gaussian process classifier, apart from its code: nothing here needs torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
+
+from gpca.errors import InputError
+from gpca.settings import Bounds, Count
+
+Kernel = Literal["rbf", "matern32", "polynomial"]
+KERNELS = get_args(Kernel)
+LearningRate = Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)]
+Draws = Annotated[int, Bounds(minimum=2)]
+
+
+@dataclass(frozen=True)
+class GPCSettings:
+    """How the classifier is built and fitted; the defaults are the paper's.
+
+    Attributes:
+        kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
+        learning_rate, iterations: of Adam on the ELBO of the whole training set.
+        inducing: number of shared inducing inputs N_Z.
+        draws: M, posterior draws per explanation.
+    """
+
+    kernel: Kernel = "rbf"
+    learning_rate: LearningRate = 0.01
+    iterations: Count = 100
+    inducing: Count = 64
+    draws: Draws = 1000
+
+    def __post_init__(self) -> None:
+        if self.kernel not in KERNELS:
+            raise InputError(f"kernel '{self.kernel}'", "unknown", f"known are {', '.join(KERNELS)}")

@@ -1,0 +1,57 @@
+"""Checks of what is learnt and compared: encoders, explainers, learners, strategies, tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+
+from baselines.registry import explainer_entry, require_settings
+from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.comparison.verdicts import Tolerance
+from gpca.config.checks.named import require_names, with_key
+from gpca.encoders.registry import require_backbone
+from gpca.errors import InputError
+from gpca.pairs.synthesis import RegistrationSettings
+from gpca.settings import check_settings
+
+
+def check_registrations(config: dict) -> None:
+    """Check that no range of severities runs downwards."""
+    with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
+    with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
+
+
+def check_encoders(config: dict, left_out: Set[str]) -> None:
+    """Check the backbones, and the encoder whose embeddings are explained."""
+    for name, encoder in config["encoders"].items():
+        with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
+    require_names("embedding.encoder", [config["embedding"]["encoder"]], config["encoders"], "encoder", left_out)
+
+
+def check_explainers(config: dict, left_out: Set[str]) -> None:
+    """Check that every explainer exists, takes its settings and finds the uncertainty that it reads."""
+    for name, settings in config["explainers"].items():
+        with_key(f"explainers.{name}", require_settings, name, settings or {})
+        if design := explainer_entry(name).design:
+            require_names(f"explainers.{name}", [design], config["uncertainty"], "uncertainty", left_out)
+
+
+def check_strategies(config: dict) -> None:
+    """Check the names of the strategies."""
+    names = config["active_learning"]["strategies"]
+    require_names("active_learning.strategies", names, {**STRATEGIES, **STREAMS}, "strategy")
+
+
+def check_learners(config: dict) -> None:
+    """Check that every learner reads embeddings and takes its settings, which add to those it has as an explainer."""
+    for name, settings in config["learners"].items():
+        own = (config["explainers"].get(name) or {}) | (settings or {})
+        with_key(f"learners.{name}", require_settings, name, own)
+        with_key(f"learners.{name}", check_settings, own, "explainers", name)
+        if explainer_entry(name).reads != "embeddings":
+            raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
+
+
+def check_tolerances(config: dict) -> None:
+    """Check that the tolerances of every unit are in order."""
+    for unit, tolerance in config["comparison"]["tolerances"].items():
+        with_key(f"comparison.tolerances.{unit}", lambda given: Tolerance(**given), tolerance)

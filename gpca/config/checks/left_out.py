@@ -1,0 +1,32 @@
+"""Checks of what a config leaves out: a name that nothing has would be left out in vain, and nobody would notice."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from baselines.registry import explainers
+from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.config.checks.named import require_names
+from gpca.config.leave_out import names_left_out
+from gpca.recovery.actions import ACTIONS
+from gpca.recovery.policies import ALWAYS, POLICIES
+from gpca.settings import load_schema
+
+
+def check_left_out(config: dict) -> None:
+    """Check the names that are false; sources, encoders and datasets may have any name."""
+    for key, (noun, known) in _known().items():
+        require_names(key, sorted(names_left_out(config, key)), known, noun)
+
+
+def _known() -> dict[str, tuple[str, Collection[str]]]:
+    sections = load_schema()["properties"]
+    return {
+        "reductions": ("reduction", sections["reductions"]["properties"]),
+        "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
+        "explainers": ("explainer", explainers()),
+        "learners": ("learner", explainers()),
+        "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
+        "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
+        "recovery.actions": ("action", ACTIONS),
+    }

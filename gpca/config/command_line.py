@@ -1,0 +1,42 @@
+"""Values of ``--config name=value``: Snakemake reads those inside lists and mappings as text, whatever they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+
+def with_types(config: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the config with what the command line gave it read as a config file is: numbers, booleans, null.
+
+    Args:
+        config: of the run, in which values from the command line are laid over the others.
+        given: of the command line alone, as Snakemake parsed it. Only what is the same in the config is read anew: a
+            workflow that uses this one as a module may have a config of its own.
+    """
+    return {
+        name: _typed(value, given[name]) if isinstance(given, Mapping) and name in given else value
+        for name, value in config.items()
+    }
+
+
+def _typed(value: Any, given: Any) -> Any:
+    if isinstance(value, Mapping) and isinstance(given, Mapping):
+        return with_types(value, given)
+    return _read(value) if value == given else value
+
+
+def _read(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _read(entry) for name, entry in value.items()}
+    if isinstance(value, list):
+        return [_read(entry) for entry in value]
+    if isinstance(value, str):
+        try:
+            scalar = yaml.safe_load(value)
+        except yaml.YAMLError:  # a name or a path
+            return value
+        return scalar if scalar is None or isinstance(scalar, bool | int | float) else value
+    return value

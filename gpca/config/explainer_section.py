@@ -1,0 +1,63 @@
+"""The section ``explainers`` of the config; an explainer without an entry here checks its settings itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from gpca.classifier.settings import GPCSettings
+from gpca.settings import Bounds, Count, Positive
+
+
+@dataclass(frozen=True)
+class Analytical(GPCSettings):
+    """How local shape is measured, and the settings of the GPC."""
+
+    shape_points: Count = 256
+    neighbours: Annotated[int, Bounds(minimum=4)] = 16
+
+
+@dataclass(frozen=True)
+class Removal:
+    """What a remedy is worth."""
+
+    worth: Literal["uncertainty", "residual"] = "uncertainty"
+
+
+@dataclass(frozen=True)
+class Probes:
+    """Logistic regressions."""
+
+    inverse_regularisation: Positive = 1.0
+
+
+@dataclass(frozen=True)
+class LogisticOfResiduals(Probes):
+    """A logistic regression of residuals, whose logarithm has a floor."""
+
+    floor: Positive = 1e-4
+
+
+@dataclass(frozen=True)
+class ForestOfResiduals:
+    """A random forest of residuals, whose logarithm has a floor."""
+
+    trees: Count = 200
+    floor: Positive = 1e-4
+
+
+EXPLAINERS = {
+    "gpca": GPCSettings | None,
+    "gpca_paper": GPCSettings | None,
+    "analytical_gpc": Analytical | None,
+    "analytical_gpc_no_counts": Analytical | None,
+    "concept_vectors": Probes | None,
+    "shap_removal": Removal | None,
+    "shap_removal_residual": Removal | None,
+    "shap_supervised": Probes | None,
+    "sa_local_removal": Removal | None,
+    "sa_local_removal_residual": Removal | None,
+    "sa_supervised": Probes | None,
+    "residuals_logistic": LogisticOfResiduals | None,
+    "residuals_forest": ForestOfResiduals | None,
+}

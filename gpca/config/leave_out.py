@@ -1,0 +1,89 @@
+"""What a config leaves out with ``false``, and the rows that go with it.
+
+A config that is laid over another can add to its mappings but take nothing away: an entry that is false does that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from baselines.registry import explainers
+from gpca.errors import InputError
+from gpca.recovery.policies import ALWAYS, POLICIES
+
+# Mappings of which any entry may be false.
+LEAVABLE = (
+    *("sources", "encoders", "reductions", "uncertainty", "explainers", "learners"),
+    *("real_world.datasets", "recovery.actions"),
+)
+# Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
+SWITCHES = ("active_learning.strategies", "recovery.policies")
+# Lists that lose the names of what is left out elsewhere: the list's key, and that of the mapping.
+LISTED = {
+    "kernel_grid.sources": "sources",
+    "real_world.backbones": "encoders",
+    "real_world.reductions": "reductions",
+}
+
+
+def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the config without what it leaves out, and without the rows that need it; `config` stays as it is.
+
+    A row is an entry of a list, an explainer or a policy. What names one thing that is left out, such as
+    `figures.source`, stays: :func:`gpca.config.check.check` says that it has to name another.
+
+    Raises:
+        InputError: a switch that is neither true nor false.
+    """
+    left_out = {key: set(_false_names(_at(config, key))) for key in LEAVABLE}
+    whole = dict(config)
+    for key, names in left_out.items():
+        _change(whole, key, lambda mapping, gone=names: {n: entry for n, entry in mapping.items() if n not in gone})
+    for key in SWITCHES:
+        _change(whole, key, lambda switches, key=key: list(_names_switched_on(key, switches)))
+    for key, of in LISTED.items():
+        _change(whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone], list)
+    without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
+    _change(whole, "explainers", lambda rows: {name: row for name, row in rows.items() if name not in without})
+    acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
+    reading = {name for name, entry in POLICIES.items() if entry.explainer in without}
+    _change(whole, "recovery.policies", lambda names: [n for n in names if n not in acting | reading], list)
+    return whole
+
+
+def names_left_out(config: Mapping[str, Any], key: str) -> set[str]:
+    """Return the names that are false in the mapping at a key, which is a path with dots."""
+    return set(_false_names(_at(config, key)))
+
+
+def _false_names(mapping: Any) -> Iterator[str]:
+    if isinstance(mapping, Mapping):  # whatever else it is, the schema says so
+        yield from (name for name, entry in mapping.items() if entry is False)
+
+
+def _names_switched_on(key: str, switches: Mapping[str, Any]) -> Iterator[str]:
+    for name, switch in switches.items():
+        if not isinstance(switch, bool):
+            raise InputError(f"config key {key}.{name}", f"{switch!r} is not a switch", "give true or false")
+        if switch:
+            yield name
+
+
+def _at(config: Mapping[str, Any], key: str) -> Any:
+    found: Any = config
+    for name in key.split("."):
+        found = found.get(name) if isinstance(found, Mapping) else None
+    return found
+
+
+def _change(config: dict[str, Any], key: str, change, kind: type = dict) -> None:
+    """Replace what is at the key by what `change` makes of it, in copies of the sections on the way."""
+    *path, last = key.split(".")
+    if not isinstance(_at(config, key), kind):
+        return
+    section = config
+    for name in path:
+        section[name] = dict(section[name])
+        section = section[name]
+    section[last] = change(section[last])

@@ -1,0 +1,86 @@
+"""Sections of the config about what a robot sees and does: frames of real scenes, and recovery."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from gpca.config.json_schema import Keys, Named
+from gpca.config.sections import SurfacePoints
+from gpca.config.source_section import NAME, Checksums, Unit, Urls
+from gpca.encoders.settings import EncoderSettings
+from gpca.frames.camera import Camera
+from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.rgbd_scene import SceneSettings
+from gpca.pairs.perturbation import CONCEPTS, Hidden
+from gpca.pairs.synthesis import TestSamples, TrainSamples
+from gpca.recovery.settings import LoopSettings
+from gpca.settings import Bounds, Count, NotNegative, OpenShare, Share
+
+
+@dataclass(frozen=True)
+class FrameDataset:
+    """A dataset of depth frames in BOP format, in a folder or at the addresses that it is downloaded from."""
+
+    location: str
+    urls: Urls = field(default_factory=list)
+    sha256: Checksums = None
+    unit: Unit = "mm"
+    split: Annotated[str, Bounds(minLength=1)] = "test"
+    results: str | None = None
+    most_frames: Count = 1
+
+
+@dataclass(frozen=True)
+class RealWorld:
+    """Registrations of depth frames, every backbone with every reduction."""
+
+    title: Annotated[str, Bounds(minLength=1)]
+    scenes: SceneSettings
+    datasets: Annotated[dict[str, FrameDataset], Bounds(propertyNames=NAME)] | None
+    initial_pose: InitialPoseSettings
+    gap: Annotated[int, Bounds(minimum=0)]
+    train: TrainSamples
+    test: TestSamples
+    test_share: OpenShare
+    occluders: Share
+    backbones: tuple[str, ...]
+    reductions: tuple[Literal["none", "pca", "umap", "autoencoder"], ...]
+
+
+@dataclass(frozen=True)
+class DeclaredThresholds:
+    """When a policy takes which branch; without `uncertain` the calibration samples set it, by `queued_share`."""
+
+    uncertain: NotNegative | None
+    queued_share: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
+    dominant: Share
+    improvement: Share
+
+
+@dataclass(frozen=True)
+class Estimator(InitialPoseSettings):
+    """How the robot estimates a pose."""
+
+    form: Literal["global_registration"] = "global_registration"
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What is done about a failed registration, in a closed loop on tables of the virtual camera."""
+
+    policies: tuple[str, ...]
+    treatments: Annotated[dict[str, str], Named(dict.fromkeys(CONCEPTS, str), closed=True)]
+    actions: Annotated[dict[str, dict | None], Bounds(minProperties=1)]  # an action checks its settings itself
+    thresholds: DeclaredThresholds
+    loop: Annotated[LoopSettings, Keys(required=("failures", "tries", "budget"), without=("cloud_points", "icp"))]
+    train: TrainSamples
+    calibration: TestSamples
+    remedied: TestSamples
+    tables: Count
+    camera: Camera
+    noise_scale: tuple[NotNegative, NotNegative]
+    hidden: tuple[Hidden, Hidden]
+    estimator: Annotated[Estimator, Keys(without=("rotation_deg", "translation"))]
+    model_points: SurfacePoints
+    encoder: EncoderSettings

@@ -1,0 +1,124 @@
+"""Sections of the config that have keys beyond those of one settings class, in the order of the config."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.classifier.kernel_grid import KernelGrid
+from gpca.config.json_schema import COMPLETE, Keys
+from gpca.encoders.reduction import PCA, UMAP, Autoencoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.pairs.perturbation import Concept, Severities
+from gpca.settings import Bounds, Count, NotNegative, OpenShare, PositiveShare
+from gpca.shift.settings import ShiftSettings
+from gpca.uncertainty.settings import UncertaintySettings
+
+SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]
+
+
+@dataclass(frozen=True)
+class Objects:
+    """How many points are sampled on each mesh."""
+
+    surface_points: SurfacePoints
+
+
+@dataclass(frozen=True)
+class NoReduction:
+    """The reduction ``none`` has no settings."""
+
+
+@dataclass(frozen=True)
+class Reductions:
+    """Of embeddings, by name."""
+
+    none: NoReduction = field(default_factory=NoReduction)
+    pca: PCA = field(default_factory=PCA)
+    umap: UMAP = field(default_factory=UMAP)
+    autoencoder: Autoencoder = field(default_factory=Autoencoder)
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """What the explainers on embeddings read."""
+
+    encoder: str
+    reduction: Literal["none"]
+
+
+@dataclass(frozen=True)
+class Design(UncertaintySettings):
+    """A design of Monte-Carlo ICP, on some test samples of each source and seed or on all."""
+
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActiveLearning(ActiveLearningSettings):
+    """The experiments with a concept that the classifier has never seen."""
+
+    held_out: tuple[Concept, ...]
+    target: PositiveShare
+    rare_share: OpenShare | None = None
+    rare_labels: Count = 1
+    without: EncoderSettings
+    stream: StreamSettings
+    strategies: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grid(KernelGrid):
+    """Table IV, and the sources that it is made of."""
+
+    sources: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shift(ShiftSettings):
+    """Samples unlike those of the training; an encoder of another width would not fit beside the others."""
+
+    encoder: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]
+    severities: Annotated[Severities, COMPLETE]
+
+
+@dataclass(frozen=True)
+class ExplainedModel:
+    """What the model of ``python -m gpca explain`` learns from."""
+
+    source: str
+    encoder: str
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """Of Table VII."""
+
+    repeats: Annotated[int, Bounds(minimum=2)] = 100
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The source that the figures of one registration show."""
+
+    source: str
+
+
+@dataclass(frozen=True)
+class ReferenceTolerances:
+    """What a mean over the seeds may differ by, by kind of quantity."""
+
+    share: NotNegative
+    percent: NotNegative
+    correlation: NotNegative
+    nats: NotNegative
+    count: NotNegative
+
+
+@dataclass(frozen=True)
+class Reference:
+    """How a run is compared with a reference run."""
+
+    half_widths: NotNegative
+    tolerances: ReferenceTolerances

@@ -1,0 +1,46 @@
+"""Settings of Monte-Carlo ICP, apart from what runs it: nothing here needs compiled loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from gpca.alignment.icp import ICPSettings
+from gpca.errors import InputError
+from gpca.settings import Bounds
+
+FEWEST_STARTS = 13  # the 2·6 + 1 of an unscented estimate; a 6×6 covariance of 6 samples or fewer is singular
+
+
+@dataclass(frozen=True)
+class UncertaintySettings:
+    """How the spread is measured.
+
+    Attributes:
+        starts: n, initial poses per condition.
+        start_rotation_deg, start_translation: root mean square angle and length of the starts' offsets.
+        icp_points: of source and of target in these runs (fewer where a cloud has fewer).
+        floor: ε, variance below which a spread is no uncertainty: (1e-3)² is 0.06° and a thousandth of the diameter.
+        icp: how ICP runs.
+    """
+
+    starts: Annotated[int, Bounds(minimum=FEWEST_STARTS)] = 50
+    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 10.0
+    start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.05
+    icp_points: Annotated[int, Bounds(minimum=16, maximum=65536)] = 512
+    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-6
+    icp: ICPSettings = field(default_factory=ICPSettings)
+
+    def __post_init__(self) -> None:
+        if self.starts < FEWEST_STARTS:
+            remedy = f"give at least {FEWEST_STARTS}: fewer do not determine a 6×6 covariance"
+            raise InputError("uncertainty setting 'starts'", f"{self.starts}", remedy)
+        if self.floor <= 0:
+            raise InputError("uncertainty setting 'floor'", f"{self.floor}", "give a positive variance")
+
+    def deviation_6(self) -> np.ndarray:
+        """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
+        per_axis = np.array([np.deg2rad(self.start_rotation_deg), self.start_translation]) / np.sqrt(3)
+        return np.repeat(per_axis, 3)

@@ -1,0 +1,94 @@
+import copy
+
+import pytest
+
+from gpca.config.check import check
+from gpca.config.leave_out import without_false
+from gpca.errors import InputError
+
+from .configs import MISSING, changed, load, merged
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        *("sources.linemod", "encoders.pointnet2", "reductions.umap", "uncertainty.oracle", "explainers.shap_oracle"),
+        *("learners.learner_forest", "recovery.policies.random", "active_learning.strategies.badge"),
+    ],
+)
+def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
+    config, never_there = changed(key, False), changed(key, MISSING)
+    # The rows that need it.
+    never_there["kernel_grid"]["sources"] = [n for n in ("ycb", "linemod") if n in never_there["sources"]]
+    never_there["real_world"]["backbones"] = list(never_there["encoders"])
+    never_there["real_world"]["reductions"] = ["none", *never_there["reductions"]]
+    if key == "uncertainty.oracle":
+        del never_there["explainers"]["shap_oracle"]
+    given = copy.deepcopy(config)
+    assert without_false(config) == without_false(never_there)
+    assert check(config) == check(never_there)
+    assert config == given  # for a Snakemake that is given this config once more
+
+
+def test_an_action_takes_its_own_policy_along():
+    config = merged(load(), {"recovery": {"actions": {"new_view": False}, "treatments": {"overlap": "denoise"}}})
+    recovery = without_false(config)["recovery"]
+    assert list(recovery["actions"]) == ["reinitialise", "denoise"]
+    assert "always_denoise" in recovery["policies"]
+    assert "always_new_view" not in recovery["policies"]
+
+
+def test_a_policy_goes_with_the_uncertainty_that_its_explainer_reads():
+    whole = without_false(changed("uncertainty.removal", False))
+    assert "shap_removal" not in whole["recovery"]["policies"]
+    assert not {"shap_removal", "shap_removal_residual", "sa_local_removal"} & set(whole["explainers"])
+    check(changed("uncertainty.removal", False))
+
+
+def test_switches_are_a_list_in_their_order_and_a_list_may_stand_in_their_place():
+    strategies = without_false(changed("active_learning.strategies.entropy", False))["active_learning"]["strategies"]
+    assert strategies[:4] == ["random", "random_stratified", "margin", "bald"]
+    given = changed("active_learning.strategies", ["bald", "random"])
+    assert without_false(given)["active_learning"]["strategies"] == ["bald", "random"]
+
+
+def test_a_dataset_that_is_false_leaves_the_scenes():
+    config = merged(load("real"), {"real_world": {"datasets": dict.fromkeys(("ycbv", "lm", "lmo"), False)}})
+    assert without_false(config)["real_world"]["datasets"] == {}
+    check(config)
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; known are pointnet, "),
+        ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; known are linemod, ycb"),
+        ("recovery.actions.denoise", "recovery.treatments.noise: action 'denoise' is left out; known are reinit"),
+        ("uncertainty.causal", "uncertainty: 'causal' is a required property"),
+        # Names of nothing.
+        ("explainers.shap_orcale", "explainers: no explainer 'shap_orcale'; known are "),
+        ("learners.learner_tree", "learners: no learner 'learner_tree'; known are "),
+        ("reductions.tsne", "reductions: no reduction 'tsne'; known are none, pca, umap, autoencoder"),
+        ("uncertainty.sobol", "uncertainty: no uncertainty 'sobol'; known are additive, "),
+        ("active_learning.strategies.bold", "active_learning.strategies: no strategy 'bold'; known are random, "),
+        ("recovery.policies.always_pray", "recovery.policies: no policy 'always_pray'; known are gpca, "),
+        ("recovery.actions.pray", "recovery.actions: no action 'pray'; known are reinitialise, "),
+    ],
+)
+def test_what_cannot_be_left_out_is_one_line_that_names_the_key(key, message):
+    with pytest.raises(InputError) as caught:
+        check(changed(key, False))
+    assert str(caught.value).startswith(f"config key {message}")
+
+
+@pytest.mark.parametrize("value", [None, {}, "yes", 1])
+def test_a_switch_is_true_or_false(value):
+    with pytest.raises(InputError, match=r"^config key recovery\.policies\.gpca: .* is not a switch; give true or fal"):
+        check(changed("recovery.policies.gpca", value))
+
+
+def test_nothing_is_left():
+    config = load()
+    config["explainers"] = dict.fromkeys(config["explainers"], False)
+    with pytest.raises(InputError, match=r"^config key explainers: \{\} should be non-empty"):
+        check(config)

@@ -1,0 +1,17 @@
+"""Values of a config reach the rules: from the command line, and what is left out."""
+
+
+def test_values_of_the_command_line_and_what_they_leave_out(project):
+    values = (
+        "seeds=[0]",
+        "explainers={shap_oracle: false}",
+        "encoders={pointnet: false}",
+        "active_learning={strategies: {badge: false}}",
+    )
+    planned = project.dry_run("all", "--config", *values)
+    assert planned.jobs["registrations"] == 3  # one seed of each source
+    assert planned.jobs["explain"] == 3 * 18 + 2
+    assert planned.jobs["explain_with_backbone"] == 3 * 4
+    assert not any("/seed1" in path or "shap_oracle" in path or "badge" in path for path in planned.outputs)
+    refused = project.snakemake("-n", "all", "--config", "seeds=0", check=False)
+    assert "gpca: config key seeds: 0 is not of type 'array'; give a list: [0]" in refused.stderr
