@@ -198,23 +198,6 @@ def test_settings_given_by_hand_are_checked_like_their_section(section, settings
         check_settings(settings, *section)
 
 
-def test_jobs_inherit_the_hash_of_the_config_and_this_python(monkeypatch):
-    import os
-    import shutil
-    import sys
-
-    monkeypatch.setenv("GPCA_CONFIG_SHA256", "")
-    monkeypatch.setenv("PATH", "/bin")
-    hashes = []
-    same = (load(), dict(reversed(load().items())), changed("data_dir", "/data"), changed("comparison.tolerances", {}))
-    for config in (*same, changed("seeds", [7])):
-        run_config.export(config)
-        hashes.append(os.environ["GPCA_CONFIG_SHA256"])
-    assert len(set(hashes[:4])) == 1
-    assert hashes[4] != hashes[0]
-    assert os.path.dirname(shutil.which("python")) == os.path.dirname(sys.executable)
-
-
 def test_an_explainer_whose_design_is_not_configured_stops_at_load():
     with pytest.raises(
         InputError, match=r"config key explainers\.shap_oracle: no uncertainty 'oracle'; known are addit"
