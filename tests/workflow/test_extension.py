@@ -81,6 +81,18 @@ def test_a_strategy_and_an_encoder_of_the_docs_are_planned(project):
     assert not [path for path in planned.outputs if "dgcnn" in path or "badge" in path]
 
 
+def test_a_table_of_the_docs_is_a_function_and_an_entry(finished):
+    (finished.folder / "gpca/reporting/tables/abstentions.py").write_text(block("gpca/reporting/tables/abstentions.py"))
+    assert not finished.dry_run("all", *SMOKE).jobs
+    entry = block("gpca/reporting/results.yaml")
+    finished.append("gpca/reporting/results.yaml", entry)
+    assert finished.dry_run("all", *SMOKE).jobs == {"abstentions": 1, "page": 1}
+
+    finished.snakemake("-j1", "abstentions", *SMOKE)
+    table = (finished.folder / "results/smoke/tables/abstentions.md").read_text()
+    assert "| GP-CA (trained longer) | 0.0 ± 0.0 |" in table
+
+
 EXPLAINER = """
 import numpy as np
 
