@@ -21,6 +21,7 @@ results: environment ## every table and figure of config/config.yaml, into resul
 	$(RUN) snakemake -j$(CORES) all $(SNAKEMAKE_ARGS)
 
 report: environment ## Snakemake's report of the same run in one HTML file, REPORT
+	mkdir -p $(dir $(REPORT))
 	$(RUN) snakemake -j$(CORES) all --report $(REPORT) --report-after-run $(SNAKEMAKE_ARGS)
 
 # Two halves side by side, as a test waits for one core most of the time; each prints its report when it is done.

@@ -63,3 +63,23 @@ def model(registrations):
     gpc.fit(h_S_d, train.concept)
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
     return Model(network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", stand_in=True)
+
+
+@pytest.fixture(scope="session")
+def scenes(tmp_path_factory):
+    """A tiny dataset of the virtual camera, five objects on three tables, two views each; shared, so it is only read."""
+    from gpca.frames.rgbd_scene import write_scenes
+
+    from .frames.tiny import scene_settings, surfaces
+
+    folder = tmp_path_factory.mktemp("scenes") / "tiny"
+    write_scenes(surfaces(), "tiny", scene_settings(), folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def tiny(scenes, tmp_path_factory):
+    """Instances and objects of the tiny dataset."""
+    from .frames.tiny import read
+
+    return read(scenes, tmp_path_factory.mktemp("objects") / "tiny.npz")

@@ -5,15 +5,16 @@ from copy import deepcopy
 import pytest
 
 from gpca.config.check import check
+from gpca.config.leave_out import without_false
 from gpca.reporting.registry import results_of
 from gpca.reporting.run import explainer_of, files_behind, names_of, settings_of
 
-from ..config.test_check import load
+from ..config.configs import load
 
 
 @pytest.fixture(scope="module")
 def config():
-    return load()
+    return without_false(load())
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +37,15 @@ def test_tables_of_what_a_run_leaves_out_are_not_made(config, sources):
     made = {result.name for result in results_of(names_of(smaller, sources))}
     assert not made & {"table1_single_baselines", "table2_per_concept", "fig2_overview", "fig4_pipeline"}
     assert "table1_extended" in made
+
+
+@pytest.mark.parametrize("change", [{"iterations": [10]}, {"learning_rates": [0.1]}, {"kernels": []}])
+def test_a_grid_without_any_printed_row_has_no_table4_kernels(config, sources, change):
+    other = deepcopy(config)
+    other["kernel_grid"] |= change
+    made = {result.name for result in results_of(names_of(other, sources))}
+    assert "table4_kernels" not in made
+    assert "table4_grid" in made
 
 
 def test_the_rows_of_table_6_are_gp_ca_on_their_own_embeddings(config, sources):

@@ -171,13 +171,6 @@ def draw_uncertainty_vs_distance(
     _finish(figure, title, handles, labels, "distance", "1 - largest score", pdf_path, png_path)
 
 
-LEARNER_FIGURES = {
-    "coverage_risk": draw_coverage_risk,
-    "reliability": draw_reliability,
-    "uncertainty_vs_distance": draw_uncertainty_vs_distance,
-}
-
-
 def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[str], list[str]]:
     shown = [name for name in learners if any(learner == name for _, learner, _ in learned)]
     columns = [name for name in sources if any(source == name for source, _, _ in learned)]

@@ -163,9 +163,6 @@ def table3_stream(
     )
 
 
-LEARNING_TABLES = {table.__name__: table for table in (table3_active_learning, table3_extended, table3_stream)}
-
-
 def _concepts(metrics: pd.DataFrame) -> list[str]:
     return list(dict.fromkeys(metrics["concept"]))
 

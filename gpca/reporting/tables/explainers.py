@@ -130,9 +130,6 @@ def table2_per_concept(
     )
 
 
-TABLES = {table.__name__: table for table in (table1_single_baselines, table1_extended, table2_per_concept)}
-
-
 def _cell(
     metrics: pd.DataFrame, source: str, explainer: str, concept: str = ALL, metric: str = "accuracy"
 ) -> Cell | None:

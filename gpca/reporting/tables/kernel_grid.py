@@ -83,18 +83,6 @@ def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -
     )
 
 
-KERNEL_TABLES = {table.__name__: table for table in (table4_kernels, table4_grid)}
-
-
-def kernel_tables_of(kernels: Mapping) -> list[str]:
-    """Return the names of the tables that have a row, given the config's section ``kernel_grid``."""
-    has_printed = any(
-        kernel in kernels["kernels"] and rate in kernels["learning_rates"] and iterations in kernels["iterations"]
-        for kernel, rate, iterations in PRINTED
-    )
-    return [name for name in KERNEL_TABLES if has_printed or name != "table4_kernels"]
-
-
 def _labels(setting: tuple) -> tuple[tuple[str, str], ...]:
     kernel, rate, iterations = setting
     return (kernel, TITLES[kernel]), (f"{rate:g}", f"{rate:g}"), (str(iterations), str(iterations))

@@ -27,7 +27,6 @@ from gpca.reporting.tables.diagnostics import (
     samples_of_seed,
     values_by_seed,
 )
-from gpca.reporting.tables.learner_claims import table5_claims
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.shift.metrics import with_training_like
 
@@ -94,9 +93,6 @@ def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners
             "Unseen objects: encoder and learners are others, which never saw some of the objects.",
         ),
     )
-
-
-LEARNER_TABLES = {table.__name__: table for table in (table5_learners, table5_shift, table5_claims)}
 
 
 def _by_learner(

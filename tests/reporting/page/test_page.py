@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,14 +13,14 @@ from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.provenance import record_provenance
 from gpca.reporting.figures.style import save_figure, use_style
-from gpca.reporting.page.page import Run, read_provenance, rendered_caption, write_page
+from gpca.reporting.page.page import Run, Shown, read_provenance, write_page
 from gpca.reporting.tables.table import Cell, Column, Table
 
 from .test_comparison import HEAD, LINES
 
-CAPTIONS = Path(__file__).resolve().parents[3] / "workflow/report"
 TABLES = ["table2_per_concept", "table1_single_baselines", "table4_mine"]
 FIGURES = ["objects_bricks", "reliability"]
+SECTIONS = {"IV-A Datasets": FIGURES[:1], "IV-B Accuracy": TABLES, "IV-D Ablations": FIGURES[1:]}
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: install it to test the page in a browser")
 
@@ -73,13 +72,24 @@ def folder(registrations, predicted, tmp_path_factory):
         panel.plot(np.arange(5))
         save_figure(figure, folder / f"figures/{name}.pdf", folder / f"figures/{name}.png")
     (folder / "comparison.csv").write_text(HEAD + "".join(LINES))
-    captions = folder.parent / "captions"
-    captions.mkdir()
-    for name in (*TABLES, "objects", "reliability"):
-        (captions / f"{name}.rst").write_text(f"What ``{name}`` shows.\n")
     predicted(registrations, folder)
-    write_page(folder, captions, run_of(folder))
+    write_page(folder, run_of(folder))
     return folder
+
+
+def results(captions=()):
+    """All tables and figures by section, with a caption of its own where one is given."""
+    return [
+        Shown(
+            name=name,
+            kind="tables" if name in TABLES else "figures",
+            section=section,
+            title=f"Title of {name}",
+            caption=dict(captions).get(name, f"What ``{name}`` shows."),
+        )
+        for section, names in SECTIONS.items()
+        for name in names
+    ]
 
 
 def run_of(folder, **changes):
@@ -90,8 +100,7 @@ def run_of(folder, **changes):
             "bricks": {"title": "Bricks <b>", "stand_in": True},
             "cones": {"title": "Cones", "stand_in": False},
         },
-        "tables": TABLES,
-        "figures": FIGURES,
+        "results": results(),
         "samples": {
             "bricks": (folder / "registrations/bricks/seed0.npz", folder / "predictions/bricks/gpca/seed0.csv")
         },
@@ -137,8 +146,9 @@ def test_ids_are_there_once(page):
 
 def test_every_table_and_figure_is_shown_with_its_caption_in_the_papers_order(page):
     shown = [name for name in page.ids if name in (*TABLES, *FIGURES)]
-    assert shown == ["objects_bricks", "table1_single_baselines", "table2_per_concept", "reliability", "table4_mine"]
-    for name in ("objects", *TABLES):
+    assert shown == ["objects_bricks", *TABLES, "reliability"]
+    for name in shown:
+        assert f"Title of {name}" in page.text
         assert f'What <span class="docutils literal">{name}</span> shows.' in page.text
     assert page.text.count('<td class="number best">97.7 ± 0.4</td>') == len(TABLES)
     assert page.text.count('<td class="number">33.3 ± 2.0</td>') == len(TABLES)
@@ -160,7 +170,7 @@ def test_stand_ins_are_labelled_and_real_objects_are_not(page):
 def test_a_run_on_real_objects_has_no_notice(copied):
     folder, _ = copied
     sources = {name: {"title": name, "stand_in": False} for name in ("bricks", "cones")}
-    write_page(folder, folder.parent / "captions", run_of(folder, sources=sources))
+    write_page(folder, run_of(folder, sources=sources))
     assert "stand-in</span>" not in (folder / "index.html").read_text()
     assert "stand-ins</strong>" not in (folder / "index.html").read_text()
 
@@ -180,7 +190,7 @@ def test_the_samples_are_plain_json(page):
 
 def test_the_same_results_give_the_same_bytes_and_not_many(folder, copied):
     copy, run = copied
-    write_page(copy, copy.parent / "captions", run)
+    write_page(copy, run)
     assert (copy / "index.html").read_bytes() == (folder / "index.html").read_bytes()
     assert (folder / "index.html").stat().st_size < 1e6
     assert (folder / "page/plotly.min.js").stat().st_size < 6e6
@@ -189,7 +199,7 @@ def test_the_same_results_give_the_same_bytes_and_not_many(folder, copied):
 def test_without_comparison_and_samples_there_is_no_word_of_them(copied):
     folder, _ = copied
     (folder / "comparison.csv").unlink()
-    write_page(folder, folder.parent / "captions", run_of(folder, samples={}))
+    write_page(folder, run_of(folder, samples={}))
     page = Page((folder / "index.html").read_text())
     assert "comparison" not in page.ids
     assert "registrations" not in page.ids
@@ -218,7 +228,7 @@ def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
     for name in ("tables/table4_mine.md", "figures/reliability.pdf", "predictions/bricks/gpca/seed0.csv"):
         (folder / name).unlink()
     with pytest.raises(InputError) as caught:
-        write_page(folder, folder.parent / "captions", run)
+        write_page(folder, run)
     assert str(caught.value) == (
         f"{folder}: lacks tables/table4_mine.md, figures/reliability.pdf, "
         f"{folder / 'predictions/bricks/gpca/seed0.csv'}; make them with 'snakemake -j2 results/tiny/index.html'"
@@ -233,21 +243,22 @@ def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
         ("tiny/figures/reliability.png", "no image", "is no readable image"),
         ("tiny/comparison.csv", "", "is empty"),
         ("tiny/registrations/bricks/seed0.npz", "", "is not a readable npz archive"),
-        ("captions/reliability.rst", ".. nonsense::\n", "is no reStructuredText"),
-        ("captions/reliability.rst", ".. raw:: html\n\n   <b>\n", "is no reStructuredText"),
     ],
 )
 def test_a_damaged_file_is_named(copied, damaged, text, fault):
     folder, run = copied
     (folder.parent / damaged).write_text(text)
     with pytest.raises(InputError, match=f"{re.escape(damaged)}: {fault}"):
-        write_page(folder, folder.parent / "captions", run)
+        write_page(folder, run)
     assert not (folder / "index.html").exists()
 
 
-def test_a_result_without_caption_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"mine\.rst: no such caption; write it"):
-        rendered_caption(tmp_path / "mine.rst")
+@pytest.mark.parametrize("caption", [".. nonsense::", ".. raw:: html\n\n   <b>"])
+def test_a_fault_in_a_caption_is_named(copied, caption):
+    folder, _ = copied
+    with pytest.raises(InputError, match="caption of reliability: is no reStructuredText"):
+        write_page(folder, run_of(folder, results=results({"reliability": caption})))
+    assert not (folder / "index.html").exists()
 
 
 # --- in a browser ---
@@ -295,7 +306,7 @@ def test_a_browser_draws_both_clouds_and_has_nothing_to_complain_about(folder, t
 @in_a_browser
 def test_verdicts_tables_samples_and_poses_can_be_chosen(copied, tmp_path):
     folder, run = copied
-    write_page(folder, folder.parent / "captions", run)
+    write_page(folder, run)
     driven = folder / "driven.html"
     driven.write_text((folder / "index.html").read_text().replace("</body>", READER))
     shown = chromium(driven, tmp_path, "--dump-dom", "--window-size=400,800")
@@ -310,7 +321,7 @@ def test_verdicts_tables_samples_and_poses_can_be_chosen(copied, tmp_path):
 @in_a_browser
 def test_without_its_script_the_view_says_what_is_missing(copied, tmp_path):
     folder, run = copied
-    write_page(folder, folder.parent / "captions", run)
+    write_page(folder, run)
     alone = tmp_path / "index.html"
     alone.write_text(re.sub(r'<script src="[^"]*" defer></script>', "", (folder / "index.html").read_text()))
     assert "needs page/plotly.min.js beside this page" in chromium(alone, tmp_path, "--dump-dom")
