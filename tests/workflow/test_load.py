@@ -1,6 +1,9 @@
+import inspect
 import re
 
 import pytest
+
+from gpca.reporting.registry import load
 
 from .conftest import ROOT
 
@@ -61,6 +64,22 @@ def test_every_rule_says_what_it_needs_and_where_it_logs(path):
         for keyword in ("log", "benchmark", "threads", "resources", "conda"):
             assert re.search(rf"^ *{keyword}:", rule, re.MULTILINE), (rule.split(":")[0], keyword)
         assert not re.search("^ *run:", rule, re.MULTILINE)
+
+
+def collectors():
+    """Each rule that collects, with the names of its inputs and parameters."""
+    for path in RULES:
+        for rule in re.split(r"^rule ", path.read_text(), flags=re.MULTILINE)[1:]:
+            sections = dict(re.findall(r"^    (input|params):\n((?:        .*\n)+)", rule, re.MULTILINE))
+            if "collector=" in sections.get("params", ""):
+                names = re.findall(r"^        (\w+)=", sections["input"] + sections["params"], re.MULTILINE)
+                function = re.search(r'collector="(.+?)"', sections["params"])[1]
+                yield pytest.param(function, set(names) - {"code", "collector"}, id=rule.split(":")[0])
+
+
+@pytest.mark.parametrize(("function", "names"), collectors())
+def test_a_collector_takes_what_its_rule_gives(function, names):
+    inspect.signature(load(function)).bind(**dict.fromkeys(names))
 
 
 def test_the_slurm_profile_plans_everything_with_what_the_rules_declare(project):

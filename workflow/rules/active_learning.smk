@@ -64,7 +64,7 @@ rule learn_actively:
 
 rule active_learning:
     input:
-        curve_files=collect(
+        files=collect(
             "<results>/active_learning/{source}/{strategy}/seed{seed}.csv",
             source=SOURCES,
             strategy=NAMES["strategy"],
