@@ -67,7 +67,7 @@ def model(registrations):
 
 @pytest.fixture(scope="session")
 def scenes(tmp_path_factory):
-    """A tiny dataset of the virtual camera, five objects on three tables, two views each; shared, so it is only read."""
+    """A tiny dataset of the virtual camera, shared and so only read: five objects, three tables, two views of each."""
     from gpca.frames.rgbd_scene import write_scenes
 
     from .frames.tiny import scene_settings, surfaces
