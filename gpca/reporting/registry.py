@@ -103,8 +103,16 @@ class Result:
         return all(shown[name] for name in (*self.needs, *_braced(patterns)))
 
     def arguments(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the builder's arguments that come from the settings of a run, e.g. ``source_titles.ycb`` of them."""
-        return {argument: _found(settings, place) for argument, place in self.settings.items()}
+        """Return the builder's arguments that come from the settings of a run, e.g. ``source_titles.ycb`` of them.
+
+        Where the result shows members of a list alone, so do the settings of all of them: ``explainers`` of its
+        explainers. What others have then changes nothing of it.
+        """
+        shown = dict(settings)
+        for name, members in self.only.items():
+            if isinstance(of_all := settings.get(f"{name}s"), Mapping):
+                shown[f"{name}s"] = {key: value for key, value in of_all.items() if key in members}
+        return {argument: _found(shown, place) for argument, place in self.settings.items()}
 
     def of_source(self, source: str) -> Result:
         """Return the result of one source, where the name has ``{source}`` in it."""

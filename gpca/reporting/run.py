@@ -52,6 +52,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     """Return what tables and figures show besides numbers: titles by name, and conditions of the protocol."""
     frames, recovery, learning = config["real_world"], config["recovery"], config["active_learning"]
     shown = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
+    of_grid = {name: entry for name, entry in shown.items() if name in config["kernel_grid"]["sources"]}
     of_frames = {"title": frames["title"], "stand_in": not frames["datasets"]}
     entries = {name: explainer_entry(name) for name in config["explainers"]}
     first_reduction = next(iter(frames["reductions"]))
@@ -75,7 +76,8 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "target": learning["target"],
         "batch": learning["batch"],
         "test_samples": config["registrations"]["test"],
-        "kernel_sources": {name: shown[name] for name in shown if name in config["kernel_grid"]["sources"]},
+        "kernel_sources": of_grid,
+        "kernel_source_titles": {name: title_of(entry) for name, entry in of_grid.items()},
         "encoder_title": encoder_title(**config["embedding"]),
         "backbones": {name: config["encoders"][name] for name in frames["backbones"]},
         "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],

@@ -93,6 +93,12 @@ def test_one_entry_stands_for_a_figure_of_each_source(monkeypatch):
     assert mine.arguments({"source_titles": {"ycb": "YCB", "mine": "Mine"}}) == {"title": "Mine"}
 
 
+def test_a_result_of_some_explainers_is_shown_the_titles_of_these_alone():
+    entry = result(only={"explainer": ("gpca", "gone")}, settings={"names": "explainers", "seeds": "n"})
+    settings = {"explainers": {"gpca": "GP-CA", "forest": "Forest"}, "n": 3}
+    assert entry.arguments(settings) == {"names": {"gpca": "GP-CA"}, "seeds": 3}
+
+
 def test_a_builder_is_given_what_was_read_and_what_the_run_shows(tmp_path):
     path = tmp_path / "given.json"
     path.write_text("[1, 2]")

@@ -2,6 +2,8 @@
 from gpca.reporting.registry import targets, unknown_target
 
 SHORT = targets(RESULTS)
+SNAKEFILE = workflow.main_snakefile
+SMOKE_CONFIG = Path(workflow.current_basedir, "../../config/smoke.yaml").resolve()
 
 
 for short, result in SHORT.items():
@@ -24,11 +26,8 @@ rule smoke:
     threads: 2
     resources:
         mem_mb=4000,
-    params:
-        snakefile=workflow.main_snakefile,
-        config=workflow.source_path("../../config/smoke.yaml"),
     shell:
-        "python -m snakemake --snakefile {params.snakefile} -j{threads} all --configfile {params.config} "
+        "python -m snakemake --snakefile {SNAKEFILE} -j{threads} all --configfile {SMOKE_CONFIG} "
         "--nolock 2>&1 | tee {log} >&2"
 
 
