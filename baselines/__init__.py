@@ -1,1 +1,1 @@
-"""Rival explainers, one per file, found by :func:`gpca.explainers.interface.explainers`."""
+"""Rival explainers, one per file, found by :mod:`baselines.registry`."""
