@@ -1,9 +1,9 @@
 # What else can be asked for by name: numbers of the paper's (table2, fig5), the smoke run.
+import os
+
 from gpca.reporting.registry import targets, unknown_target
 
 SHORT = targets(RESULTS)
-SNAKEFILE = workflow.main_snakefile
-SMOKE_CONFIG = Path(workflow.current_basedir, "../../config/smoke.yaml").resolve()
 
 
 for short, result in SHORT.items():
@@ -26,8 +26,11 @@ rule smoke:
     threads: 2
     resources:
         mem_mb=4000,
+    params:
+        snakefile=os.path.relpath(f"{workflow.current_basedir}/../../Snakefile"),
+        config=os.path.relpath(f"{workflow.current_basedir}/../../config/smoke.yaml"),
     shell:
-        "python -m snakemake --snakefile {SNAKEFILE} -j{threads} all --configfile {SMOKE_CONFIG} "
+        "python -m snakemake --snakefile {params.snakefile:q} -j{threads} all --configfile {params.config:q} "
         "--nolock 2>&1 | tee {log} >&2"
 
 
