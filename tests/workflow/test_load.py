@@ -64,6 +64,8 @@ def test_every_rule_says_what_it_needs_and_where_it_logs(path):
         for keyword in ("log", "benchmark", "threads", "resources", "conda"):
             assert re.search(rf"^ *{keyword}:", rule, re.MULTILINE), (rule.split(":")[0], keyword)
         assert not re.search("^ *run:", rule, re.MULTILINE)
+        # The path of a script, read when its job runs, would be that of the last rule of a loop.
+        assert not re.search(r"^ *script:\n *[^ \"]", rule, re.MULTILINE)
 
 
 def collectors():

@@ -2,10 +2,6 @@
 from gpca.reporting.registry import results_of
 
 RESULTS = results_of(NAMES)
-SCRIPTS = {"tables": "../scripts/table.py", "figures": "../scripts/figure.py"}
-# The file of each kind that Snakemake's report shows, and those beside it.
-REPORTED = {"tables": "csv", "figures": "png"}
-BESIDE = {"tables": ("md", "tex"), "figures": ("pdf",)}
 
 
 def below_results(files):
@@ -20,44 +16,75 @@ def below_results(files):
     }
 
 
-def outputs(result):
-    """Return the files of a result; the report has one of them, by the paper's section, with title and caption."""
-    suffix = REPORTED[result.kind]
-    shown = report(
+def reported(result, suffix):
+    """Return the file as Snakemake's report shows it: by the paper's section, with title and caption."""
+    return report(
         f"<results>/{result.file(suffix)}",
         caption="../report/result.rst",
         category=result.section,
         labels={"result": result.title},
     )
-    beside = {name: f"<results>/{result.file(name)}" for name in BESIDE[result.kind]}
-    return {suffix: shown, **beside}
 
 
+# A rule for tables and one for figures: the path of a script is read when its job runs, after the loop.
 for result in RESULTS:
+    if result.kind == "tables":
 
-    rule:
-        name:
-            result.name
-        input:
-            **below_results(result.files(NAMES)),
-            code=code_files(*result.modules, "gpca.reporting.script"),
-        output:
-            **outputs(result),
-        log:
-            f"<logs>/{result.kind}/{result.name}.log",
-        benchmark:
-            f"<benchmarks>/{result.kind}/{result.name}.tsv"
-        localrule: True
-        conda:
-            "../envs/gpca.yaml"
-        threads: 1
-        resources:
-            mem_mb=2000,
-            runtime=10,
-        params:
-            builder=result.builder,
-            readers=result.readers,
-            arguments=result.arguments(SHOWN),
-            caption=result.caption,
-        script:
-            SCRIPTS[result.kind]
+        rule:
+            name:
+                result.name
+            input:
+                **below_results(result.files(NAMES)),
+                code=code_files(*result.modules, "gpca.reporting.script"),
+            output:
+                csv=reported(result, "csv"),
+                md=f"<results>/{result.file('md')}",
+                tex=f"<results>/{result.file('tex')}",
+            log:
+                f"<logs>/tables/{result.name}.log",
+            benchmark:
+                f"<benchmarks>/tables/{result.name}.tsv"
+            localrule: True
+            conda:
+                "../envs/gpca.yaml"
+            threads: 1
+            resources:
+                mem_mb=2000,
+                runtime=10,
+            params:
+                builder=result.builder,
+                readers=result.readers,
+                arguments=result.arguments(SHOWN),
+                caption=result.caption,
+            script:
+                "../scripts/table.py"
+
+    else:
+
+        rule:
+            name:
+                result.name
+            input:
+                **below_results(result.files(NAMES)),
+                code=code_files(*result.modules, "gpca.reporting.script"),
+            output:
+                pdf=f"<results>/{result.file('pdf')}",
+                png=reported(result, "png"),
+            log:
+                f"<logs>/figures/{result.name}.log",
+            benchmark:
+                f"<benchmarks>/figures/{result.name}.tsv"
+            localrule: True
+            conda:
+                "../envs/gpca.yaml"
+            threads: 1
+            resources:
+                mem_mb=2000,
+                runtime=10,
+            params:
+                builder=result.builder,
+                readers=result.readers,
+                arguments=result.arguments(SHOWN),
+                caption=result.caption,
+            script:
+                "../scripts/figure.py"
