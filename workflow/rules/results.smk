@@ -26,7 +26,7 @@ def reported(result, suffix):
     )
 
 
-# A rule for tables and one for figures: the path of a script is read when its job runs, after the loop.
+# Tables and figures have one each, since the path of a script is read when its job runs, after the loop.
 for result in RESULTS:
     if result.kind == "tables":
 
