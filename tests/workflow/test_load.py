@@ -79,7 +79,7 @@ def collectors():
                 yield pytest.param(function, set(names) - {"code", "collector"}, id=rule.split(":")[0])
 
 
-@pytest.mark.parametrize(("function", "names"), collectors())
+@pytest.mark.parametrize(("function", "names"), [*collectors()])
 def test_a_collector_takes_what_its_rule_gives(function, names):
     inspect.signature(load(function)).bind(**dict.fromkeys(names))
 
