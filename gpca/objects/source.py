@@ -110,9 +110,15 @@ def data_options(entry: dict, data_dir: str | None, downloads: str) -> list[str]
 
     No other folder is named, so that a change of another one does not make the objects anew.
     """
-    if entry["origin"] == "local" and data_dir:
-        return ["--data-dir", data_dir]
-    return ["--downloads", downloads] if entry["origin"] == "download" else []
+    if entry["origin"] == "local":
+        return folder_options(data_dir, None)
+    return folder_options(None, downloads) if entry["origin"] == "download" else []
+
+
+def folder_options(data_dir: str | None, downloads: str | None) -> list[str]:
+    """Return the options that tell a step where data lies, and where downloads go, as far as either is given."""
+    folders = {"--data-dir": data_dir, "--downloads": downloads}
+    return [word for option, folder in folders.items() if folder for word in (option, folder)]
 
 
 def source_modules(entry: dict) -> list[str]:

@@ -10,11 +10,12 @@ from functools import cache
 from importlib import import_module
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import yaml
 
 REGISTRY = Path(__file__).with_name("results.yaml")
+SUFFIXES = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}  # the files of each kind
 Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values
 
 
@@ -84,9 +85,14 @@ class Result:
         return f"{self.kind}/{self.name}.{suffix}"
 
     @property
+    def all_files(self) -> list[str]:
+        """The paths of all its files; a run asks for the first, and the others come along."""
+        return [self.file(suffix) for suffix in SUFFIXES[self.kind]]
+
+    @property
     def main_file(self) -> str:
-        """The file by which a run asks for it, with all others that come along."""
-        return self.file("md" if self.kind == "tables" else "png")
+        """The file by which a run asks for it."""
+        return self.all_files[0]
 
     def files(self, names: Names) -> dict[str, list[str] | str]:
         """Return the files of each input, a path where there can be but one; see :func:`input_name` for the keys."""
@@ -132,6 +138,17 @@ class Result:
         return {**names, **kept}
 
 
+class HasSection(Protocol):
+    """What stands in a section of the paper."""
+
+    @property
+    def section(self) -> str:
+        """Its name."""
+
+
+InSection = TypeVar("InSection", bound=HasSection)
+
+
 @cache
 def registered() -> tuple[Result, ...]:
     """Return every entry of the registry, in order."""
@@ -169,9 +186,9 @@ def unknown_target(target: str, known: Iterable[str]) -> str:
     return f"gpca: target '{target}': there is no such table, figure or stage; {remedy}"
 
 
-def by_section(results: Iterable[Result]) -> dict[str, list[Result]]:
+def by_section(results: Iterable[InSection]) -> dict[str, list[InSection]]:
     """Return section -> its results, both in the order given."""
-    sections: dict[str, list[Result]] = {}
+    sections: dict[str, list[InSection]] = {}
     for result in results:
         sections.setdefault(result.section, []).append(result)
     return sections

@@ -54,6 +54,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     shown = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
     of_grid = {name: entry for name, entry in shown.items() if name in config["kernel_grid"]["sources"]}
     of_frames = {"title": frames["title"], "stand_in": not frames["datasets"]}
+    of_model = {**shown, REAL_WORLD: of_frames}[config["model"]["source"]]
     entries = {name: explainer_entry(name) for name in config["explainers"]}
     first_reduction = next(iter(frames["reductions"]))
     return {
@@ -62,8 +63,8 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "shown_title": title_of(shown[config["figures"]["source"]]),
         "frames": of_frames,
         "frames_title": title_of(of_frames),
-        "model": {**shown, REAL_WORLD: of_frames}[config["model"]["source"]],
-        "model_title": title_of({**shown, REAL_WORLD: of_frames}[config["model"]["source"]]),
+        "model": of_model,
+        "model_title": title_of(of_model),
         "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
         "explainer_titles": {name: entry.title for name, entry in entries.items()},
         "learners": {

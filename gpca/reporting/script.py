@@ -20,7 +20,9 @@ def job(snakemake) -> Iterator[None]:
     Args:
         snakemake: the object that Snakemake gives to a script; its input `code` is no data.
     """
-    data = [path for name, paths in _named(snakemake.input) if name != "code" for path in paths]
+    data = [
+        path for paths in data_of(snakemake.input).values() for path in ([paths] if isinstance(paths, str) else paths)
+    ]
     parameters = {name: value for name, value in snakemake.params.items() if isinstance(name, str)}
     with ExitStack() as stack:
         if snakemake.log:
@@ -38,7 +40,3 @@ def job(snakemake) -> Iterator[None]:
 def data_of(files) -> dict[str, str | list[str]]:
     """Return a script's inputs by name, without `code`: a path, or a list of them."""
     return {name: paths if isinstance(paths, str) else list(paths) for name, paths in files.items() if name != "code"}
-
-
-def _named(files) -> list[tuple[str, list[str]]]:
-    return [(name, [paths] if isinstance(paths, str) else list(paths)) for name, paths in files.items()]

@@ -47,13 +47,7 @@ rule comparison:
 rule page:
     input:
         comparison="<results>/comparison.csv",
-        results=[
-            f"<results>/{result.file(suffix)}"
-            for result in RESULTS
-            for suffix in (
-                ("md", "csv", "tex") if result.kind == "tables" else ("png", "pdf")
-            )
-        ],
+        results=[f"<results>/{file}" for result in RESULTS for file in result.all_files],
         registrations=collect(
             f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SAMPLED
         ),

@@ -1,5 +1,6 @@
 # Depth frames, of datasets or rendered in their place -> partial clouds -> registrations.
 from gpca.frames.source import frame_files
+from gpca.objects.source import folder_options
 
 REAL_WORLD = config["real_world"]
 if REAL_WORLD["datasets"]:
@@ -61,12 +62,7 @@ rule instances:
         frames=lambda wildcards, input: (
             ["--scenes", input.scenes]
             if input.get("scenes")
-            else [
-                word
-                for option in ("data_dir", "downloads")
-                if config[option]
-                for word in (f"--{option.replace('_', '-')}", config[option])
-            ]
+            else folder_options(config["data_dir"], config["downloads"])
         ),
         surface_points=config["objects"]["surface_points"],
     shell:

@@ -14,6 +14,7 @@ from gpca.files import whole_file
 from gpca.reporting.page.comparison import page_comparison
 from gpca.reporting.page.markdown_table import read_markdown_table
 from gpca.reporting.page.samples import POINTS, RULE, page_samples
+from gpca.reporting.registry import SUFFIXES, by_section
 
 TEMPLATES = Path(__file__).parent / "templates"
 _CSS_PIXELS = 130 / 300  # A figure's pixel, of 300 in an inch, takes so many: a little larger than in print.
@@ -69,9 +70,10 @@ def write_page(folder: str | Path, run: Run) -> None:
 
     folder = Path(folder)
     require_complete(folder, run)
-    sections: dict[str, list[dict]] = {}
-    for result in run.results:
-        sections.setdefault(result.section, []).append(_content(folder, result))
+    sections = {
+        section: [_content(folder, result) for result in results]
+        for section, results in by_section(run.results).items()
+    }
     text = render(
         run=run,
         sections=sections,
@@ -107,8 +109,7 @@ def render(**content) -> str:
 
 def require_complete(folder: Path, run: Run) -> None:
     """Raise an InputError that names every result of the run that is not there, and the command that makes it."""
-    suffixes = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}
-    needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in suffixes[each.kind]]
+    needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
     missing = [name for name in needed if not (folder / name).is_file()]
     missing += [str(path) for files in run.samples.values() for path in files if not Path(path).is_file()]
     if missing:
