@@ -9,6 +9,7 @@ import os
 import sys
 from importlib import import_module
 from pathlib import Path
+from typing import NoReturn
 
 from gpca import __version__
 from gpca.errors import InputError
@@ -38,6 +39,14 @@ STEPS = {
 }
 
 
+class OneLineParser(argparse.ArgumentParser):
+    """A parser whose errors are one line, as every other refusal of the suite."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2 and one line that names the command, the fault and the help."""
+        self.exit(2, f"{self.prog}: {' '.join(message.split())}; '{self.prog} --help' lists what it takes\n")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run one step; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130.
 
@@ -63,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(arguments: list[str], chosen: str | None) -> int:
     command = "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
-    parser = argparse.ArgumentParser(prog=command, description="The steps of the workflow, each usable by hand.")
+    parser = OneLineParser(prog=command, description="The steps of the workflow, each usable by hand.")
     parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
     for name, summary in STEPS.items():

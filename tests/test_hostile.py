@@ -1,0 +1,28 @@
+"""The harness itself, so that no test of hostile input can pass by accident."""
+
+import pytest
+
+from .hostile import refusal
+
+NOT_JSON = ["objects", "--source", "procedural", "--out", "objects.npz", "--settings", "not JSON"]
+
+
+def test_a_refusal_is_one_line_with_status_2(tmp_path):
+    line = refusal(NOT_JSON, tmp_path, "--settings", "not JSON")
+    assert line.startswith("gpca objects:")
+
+
+@pytest.mark.parametrize("arguments", [[], ["nonsense"], ["objects"], ["objects", "--threads", "two"]])
+def test_a_command_line_that_cannot_be_parsed_is_refused_in_one_line(tmp_path, arguments):
+    refusal(arguments, tmp_path, "--help")
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["objects", "--help"]])
+def test_a_command_that_succeeds_is_no_refusal(tmp_path, arguments):
+    with pytest.raises(AssertionError, match="status 0"):
+        refusal(arguments, tmp_path)
+
+
+def test_a_line_that_does_not_name_the_fault_is_found(tmp_path):
+    with pytest.raises(AssertionError, match="does not say"):
+        refusal(NOT_JSON, tmp_path, "a word that it does not say")
