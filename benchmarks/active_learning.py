@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from copy import copy
 from pathlib import Path
@@ -22,13 +21,15 @@ from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from gpca.processor import prepare  # noqa: E402
+
 BATCH = 4
 
 
 def main(arguments: list[str] | None = None) -> None:
     options = parse(arguments)
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = "1"
+    prepare()
     import torch
 
     torch.set_num_threads(1)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -24,6 +23,9 @@ from unittest.mock import patch
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from gpca.processor import prepare  # noqa: E402
+
 WARM_UP = 1
 PEAK = """
 import sys
@@ -44,8 +46,7 @@ print(int(status["VmHWM"].split()[0]) / 1024)
 def main(arguments: list[str] | None = None) -> None:
     options = parse(arguments)
     # Before torch and numba are imported: both read their threads once.
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = str(options.threads)
+    prepare(options.threads)
     import torch
 
     from gpca.encoders.registry import parameter_count

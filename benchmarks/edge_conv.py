@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from pathlib import Path
 from statistics import median
 from time import perf_counter
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from gpca.processor import prepare
+
 PASSES = ("train", "infer")
 NETWORKS = ("per edge", "per point")
 
@@ -26,8 +28,7 @@ NETWORKS = ("per edge", "per point")
 def main(arguments: list[str] | None = None) -> None:
     options = parse(arguments)
     # Before torch and numba are imported: both read their threads once.
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = str(options.threads)
+    prepare(options.threads)
     import torch
 
     torch.set_num_threads(options.threads)

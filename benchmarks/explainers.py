@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import tempfile
 from pathlib import Path
@@ -24,14 +23,16 @@ from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from gpca.processor import prepare  # noqa: E402
+
 SEED, SOURCE = 0, "coffee_cup"
 GPC_SETTINGS = {"iterations": 20}  # of the fit, which is not measured
 
 
 def main(arguments: list[str] | None = None) -> None:
     options = parse(arguments)
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = "1"
+    prepare()
     registrations, icp_seconds_S = make_registrations(options.samples)
     from gpca.uncertainty.settings import UncertaintySettings
 

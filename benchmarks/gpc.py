@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from pathlib import Path
 from statistics import median
@@ -22,13 +21,15 @@ from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from gpca.processor import prepare  # noqa: E402
+
 LEARNING_RATE = 0.01  # the paper's
 
 
 def main(arguments: list[str] | None = None) -> None:
     options = parse(arguments)
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = "1"
+    prepare()
     import numpy as np
     import torch
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from pathlib import Path
 from statistics import median
@@ -25,14 +24,16 @@ from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from gpca.processor import prepare  # noqa: E402
+
 WARM_UP = 3
 TRAINING = 45  # registrations that the classifier is fitted to
 
 
 def main(arguments: list[str] | None = None) -> None:
     options = parse(arguments)
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = str(options.threads)
+    prepare(options.threads)
     import numpy as np
     import torch
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import ctypes
 import json
-import os
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import NoReturn
 
 from gpca import __version__
 from gpca.errors import InputError
+from gpca.processor import prepare
 
 STEPS = {
     "objects": "meshes or clouds of a source -> canonical clouds",
@@ -91,12 +91,10 @@ def _run(arguments: list[str], chosen: str | None) -> int:
 
 
 def _set_threads(arguments: list[str]) -> None:
-    """Pin every library's threads before any of them is loaded: Open3D and torch otherwise fight over the cores."""
+    """Pin every library's threads and instructions before any of them is loaded."""
     early = argparse.ArgumentParser(add_help=False)
     early.add_argument("--threads", type=int, default=1)
-    threads = str(max(1, early.parse_known_args(arguments)[0].threads))
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[variable] = threads
+    prepare(max(1, early.parse_known_args(arguments)[0].threads))
 
 
 def _keep_freed_memory() -> None:

@@ -18,6 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from gpca.files import sha256_of_file, whole_file
+from gpca.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
 CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # set by the Snakefile for its jobs
@@ -50,7 +51,7 @@ def record_provenance(
         "inputs_sha256": {str(path): sha256_of_file(path) for path in inputs},
         "code": _code_version(),
         "environment_lock_sha256": sha256_of_file(lock) if (lock := _ROOT / "environment.lock").is_file() else None,
-        "device": _device(),
+        "device": describe() | {"gpu": _gpu()},
         "python": platform.python_version(),
         "libraries": _library_versions(),
     }
@@ -88,19 +89,10 @@ def _git(*arguments: str) -> str | None:
     return None if done.returncode else done.stdout.strip()
 
 
-def cpu_name() -> str:
-    """Return the processor and its number of cores."""
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines() if Path("/proc/cpuinfo").exists() else []
-    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return f"{models[0] if models else platform.processor()}, {os.cpu_count()} cores"
-
-
-def _device() -> str:
-    """The processor, and the GPU where torch was loaded and uses one."""
+def _gpu() -> str | None:
+    """The GPU, where torch was loaded and uses one."""
     torch = sys.modules.get("torch")
-    if torch is None or not torch.cuda.is_available():
-        return cpu_name()
-    return f"{cpu_name()}, {torch.cuda.get_device_name()}"
+    return torch.cuda.get_device_name() if torch is not None and torch.cuda.is_available() else None
 
 
 def _library_versions() -> dict[str, str]:

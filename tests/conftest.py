@@ -1,13 +1,12 @@
 """Small real things that several tests need: three objects, and registrations made of them."""
 
-import os
-
 import pytest
+
+from gpca.processor import prepare
 
 # One thread, as in a job of the workflow, and before numba is imported: on a busy machine its threads, with so little
 # work each, spend most of their time waiting for one another.
-for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+prepare()
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ from gpca.__main__ import STEPS, main
 from gpca.code_files import ROOT
 from gpca.files import save_arrays
 from gpca.model.file import Model
+from gpca.processor import THREAD_VARIABLES
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
@@ -130,7 +131,7 @@ def arguments(step, changes=()):
 @pytest.fixture(autouse=True)
 def threads_restored(monkeypatch):
     """The command line sets these for its own process, which here is that of all tests."""
-    for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    for variable in THREAD_VARIABLES:
         monkeypatch.setenv(variable, os.environ.get(variable, "1"))
 
 

@@ -8,6 +8,7 @@ import time
 import pytest
 
 from gpca import __version__, provenance
+from gpca.processor import describe
 from gpca.provenance import record_provenance, sha256_of_settings
 
 
@@ -36,7 +37,8 @@ def test_the_sidecar_says_where_a_result_comes_from(record, tmp_path):
     assert {"numpy", "torch", "open3d-cpu", "gpytorch"} <= set(record["libraries"])
     assert 0.02 <= record["seconds"] < 5
     assert 10 < record["peak_memory_mb"] < 1e6
-    assert "cores" in record["device"]
+    assert "cores" in record["device"]["name"]
+    assert set(record["device"]) == {*describe(), "gpu"}
     assert set(record["code"]) == {"version", "commit", "dirty"}
     assert record["code"]["version"] == __version__
 

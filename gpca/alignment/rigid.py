@@ -8,8 +8,17 @@ from gpca.errors import InputError
 
 
 def transform(T_b_a: np.ndarray, points_a: np.ndarray) -> np.ndarray:
-    """Map points (N, 3) from frame a to frame b."""
-    return points_a @ T_b_a[:3, :3].T + T_b_a[:3, 3]
+    """Map points (..., 3) from frame a to frame b."""
+    return rotate(T_b_a, points_a) + T_b_a[:3, 3]
+
+
+def rotate(T_b_a: np.ndarray, vectors_a: np.ndarray) -> np.ndarray:
+    """Turn vectors (..., 3) from frame a to frame b, by the rotation of a transform or by a 3×3 matrix.
+
+    Summed from x to z: the order of a BLAS product differs between processors.
+    """
+    x, y, z = np.moveaxis(vectors_a, -1, 0)
+    return np.stack([x * to_x + y * to_y + z * to_z for to_x, to_y, to_z in T_b_a[:3, :3]], axis=-1)
 
 
 def inverse(T_b_a: np.ndarray) -> np.ndarray:

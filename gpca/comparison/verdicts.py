@@ -160,7 +160,9 @@ def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
 def measured_on(paths: Iterable[str | Path]) -> str:
     """Return the processor that made ``timings.csv``, by its provenance; empty where that is not beside it."""
     sidecars = [Path(f"{path}.provenance.json") for path in paths if Path(path).name == "timings.csv"]
-    return next((json.loads(path.read_text(encoding="utf-8"))["device"] for path in sidecars if path.is_file()), "")
+    return next(
+        (json.loads(path.read_text(encoding="utf-8"))["device"]["name"] for path in sidecars if path.is_file()), ""
+    )
 
 
 def counts(comparison: pd.DataFrame) -> dict[str, int]:

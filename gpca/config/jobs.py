@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.code_files import ROOT
+from gpca.processor import pin_instructions
 from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
 
 # Where data lies, and how results are judged: two runs that differ in nothing else are runs of one config.
@@ -21,7 +22,8 @@ def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
     PATH begins with this Python's folder: jobs call ``python``, which need not be the one that plans the run where its
     environment is not activated. PYTHONPATH begins with `source_folder`, unless Python looks there anyway; and with
     PYTHONSAFEPATH a ``gpca`` in the working directory, such as that of another checkout, is not taken for it. The hash
-    of the config, without what no result depends on, is for the provenance.
+    of the config, without what no result depends on, is for the provenance. Libraries may use no instructions but those
+    of the common level (:mod:`gpca.processor`).
 
     Args:
         config: the whole configuration of the run.
@@ -33,6 +35,7 @@ def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
     if source_folder not in {Path(sysconfig.get_path(name)).resolve() for name in ("purelib", "platlib")}:
         _put_first("PYTHONPATH", source_folder)
     os.environ["PYTHONSAFEPATH"] = "1"
+    pin_instructions()
 
 
 def _put_first(variable: str, folder: Path) -> None:

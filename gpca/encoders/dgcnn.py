@@ -6,6 +6,7 @@ import torch
 from torch import nn
 
 from gpca.encoders.edge_conv import NEGATIVE_SLOPE, EdgeConv
+from gpca.encoders.linear import PointLinear
 
 
 class DGCNN(nn.Module):
@@ -29,7 +30,7 @@ class DGCNN(nn.Module):
         self.edge_convs = nn.ModuleList(
             EdgeConv(inputs, outputs, k) for inputs, outputs in zip((3, *widths[:-1]), widths, strict=True)
         )
-        self.point_layer = nn.Linear(sum(widths), point_features, bias=False)
+        self.point_layer = PointLinear(sum(widths), point_features, bias=False)
         self.point_norm = nn.BatchNorm1d(point_features)
         self.embedding_size = 2 * point_features
 

@@ -20,6 +20,7 @@ from torch import nn
 
 from gpca.encoders import edge_kernels
 from gpca.encoders.batch_norm import BatchNorm
+from gpca.encoders.linear import linear, product
 from gpca.errors import InputError
 
 NEGATIVE_SLOPE = 0.2
@@ -37,12 +38,14 @@ def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
     n_points = x_B_N_F.shape[1]
     if n_points < k:
         raise InputError(f"cloud of {n_points} points", f"has no {k} neighbours", "raise draw_points or lower k")
-    squares_B_1_N = (x_B_N_F * x_B_N_F).sum(-1)[:, None, :]
-    # |x_i|² is the same for a whole row and does not change which points are nearest.
-    distances_B_N_N = torch.baddbmm(squares_B_1_N, x_B_N_F, x_B_N_F.transpose(1, 2), alpha=-2)
+    # |x_j|² - 2 x_i·x_j, as one product of [x_i ; 1] and [-2 x_j ; |x_j|²]: |x_i|² is the same for a whole row and does
+    # not change which points are nearest.
+    ones_B_N_1 = x_B_N_F.new_ones((*x_B_N_F.shape[:2], 1))
+    rows_B_N_G = torch.cat([x_B_N_F, ones_B_N_1], dim=-1)
+    columns_B_N_G = torch.cat([-2 * x_B_N_F, (x_B_N_F * x_B_N_F).sum(-1, keepdim=True)], dim=-1)
     if x_B_N_F.device.type == "cpu":
-        return torch.from_numpy(edge_kernels.smallest_k(distances_B_N_N.numpy(), k))
-    return distances_B_N_N.topk(k, dim=-1, largest=False, sorted=False).indices
+        return torch.from_numpy(edge_kernels.smallest_k(product(rows_B_N_G, columns_B_N_G.mT).numpy(), k))
+    return (rows_B_N_G @ columns_B_N_G.mT).topk(k, dim=-1, largest=False, sorted=False).indices
 
 
 class EdgeConv(nn.Module):
@@ -62,7 +65,7 @@ class EdgeConv(nn.Module):
         """Map features (B, N, F_in) to (B, N, F_out); the graph is rebuilt from the input features."""
         neighbours_B_N_k = knn_indices(x_B_N_F, self.k)
         w1, w2 = self.weight.chunk(2, dim=1)
-        ac_B_N_2F = x_B_N_F @ torch.cat([w1, w2 - w1]).T
+        ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
         if ac_B_N_2F.device.type != "cpu":
             return _edge_max_plain(ac_B_N_2F, neighbours_B_N_k, self.norm)
         if not self.training:

@@ -23,6 +23,7 @@ from torch import nn
 from gpca.encoders import group_mlp_kernels as kernels
 from gpca.encoders.batch_norm import BatchNorm
 from gpca.encoders.grouping import Groups, take
+from gpca.encoders.linear import linear
 
 
 class GroupMLP(nn.Module):
@@ -49,8 +50,8 @@ class GroupMLP(nn.Module):
         edges = _Edges(groups, points_B_N_3)
         (first, norm), *others = self._layers()
         y_E_F = self._first_layer(first.weight, points_B_N_3, x_B_N_F, groups, edges)
-        for linear, next_norm in others:
-            y_E_F = self._normalise(norm, y_E_F, edges) @ linear.weight.T
+        for layer, next_norm in others:
+            y_E_F = linear(self._normalise(norm, y_E_F, edges), layer.weight)
             norm = next_norm
         z_G_F = self._normalise(norm, y_E_F, edges, pool=True)
         return (z_G_F.relu() if self.last_relu else z_G_F).view(batch, n_groups, -1)
@@ -62,9 +63,9 @@ class GroupMLP(nn.Module):
         if x_B_N_F is not None:
             slots_B_M_k_F = torch.cat([slots_B_M_k_F, take(x_B_N_F, neighbours_B_M_k)], dim=-1)
         z_S_F = slots_B_M_k_F.flatten(0, 2)
-        for layer, (linear, norm) in enumerate(self._layers(), start=1):
-            z_S_F = norm(linear(z_S_F))
-            if layer < len(self.norms) or self.last_relu:
+        for depth, (layer, norm) in enumerate(self._layers(), start=1):
+            z_S_F = norm(layer(z_S_F))
+            if depth < len(self.norms) or self.last_relu:
                 z_S_F = z_S_F.relu()
         return z_S_F.view(*neighbours_B_M_k.shape, -1).amax(dim=2)
 
@@ -76,10 +77,10 @@ class GroupMLP(nn.Module):
     def _first_layer(self, weight: torch.Tensor, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:
         inputs = points_B_N_3 / groups.radius
         inputs = inputs if x_B_N_F is None else torch.cat([inputs, x_B_N_F], dim=-1)
-        a_P_F = inputs.flatten(0, 1) @ weight.T
+        a_P_F = linear(inputs.flatten(0, 1), weight)
         if groups.is_whole:  # around the origin: C is zero
             return a_P_F
-        c_G_F = groups.centres_B_M_3.flatten(0, 1) @ (weight[:, :3].T / -groups.radius)
+        c_G_F = linear(groups.centres_B_M_3.flatten(0, 1), weight[:, :3] / -groups.radius)
         return _Gather.apply(a_P_F, c_G_F, edges)
 
     def _normalise(self, norm: BatchNorm, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:

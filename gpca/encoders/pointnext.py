@@ -7,6 +7,7 @@ from torch import nn
 
 from gpca.encoders.group_mlp import GroupMLP
 from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
+from gpca.encoders.linear import PointLinear
 
 STAGES = 4
 
@@ -23,7 +24,7 @@ class SetAbstraction(nn.Module):
         self.radius = radius
         self.neighbours = neighbours
         self.layers = GroupMLP(in_features, (out_features // 2, out_features), last_relu=False)
-        self.skip = nn.Linear(in_features, out_features)
+        self.skip = PointLinear(in_features, out_features)
 
     def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Return the centroids (B, M, 3) and their features (B, M, F_out)."""
@@ -53,7 +54,7 @@ class PointNeXt(nn.Module):
     def __init__(self, width: int = 32, radius: float = 0.075, neighbours: int = 32) -> None:
         super().__init__()
         self.embedding_size = d = width * 2**STAGES
-        self.stem = nn.Linear(3, width)
+        self.stem = PointLinear(3, width)
         self.stages = nn.ModuleList(
             SetAbstraction(width * 2**stage, width * 2 ** (stage + 1), radius * 1.5**stage, neighbours)
             for stage in range(STAGES)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
+from gpca.alignment.rigid import rotate
 from gpca.environment import require_open3d
 from gpca.settings import Bounds, Positive
 
@@ -38,7 +39,7 @@ class Camera:
     def rays(self) -> np.ndarray:
         """Return for every pixel (H, W, 3) the direction whose z is 1, so that a ray's length is its depth."""
         v, u = np.mgrid[: self.height, : self.width]
-        return np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(self.matrix_3_3).T
+        return rotate(np.linalg.inv(self.matrix_3_3), np.stack([u, v, np.ones_like(u)], axis=-1))
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,9 @@ class MeshScene:
         self._float = o3d.core.float32
         self._uint = o3d.core.uint32
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+        corners_F_3_3 = np.concatenate([np.asarray(vertices_m, float)[faces] for vertices_m, faces in meshes])
+        self._first_face = np.cumsum([0, *(len(faces) for _, faces in meshes)])
+        self._normal_F_3, self._offset_F_m = planes(corners_F_3_3)
         for vertices_m, faces in meshes:
             self._scene.add_triangles(
                 self._tensor(np.ascontiguousarray(vertices_m, np.float32)),
@@ -85,20 +89,41 @@ class MeshScene:
         """Return what the camera sees from a pose."""
         rays_H_W_3 = camera.rays()
         hits = self._cast(rays_H_W_3, T_world_camera)
-        depth_m = hits["t_hit"].numpy()
-        mesh = hits["geometry_ids"].numpy().astype(np.int64)
-        mesh[~np.isfinite(depth_m)] = NOTHING
-        normals = hits["primitive_normals"].numpy().astype(np.float64) @ T_world_camera[:3, :3]
+        hit = np.isfinite(hits["t_hit"].numpy())
+        mesh = np.where(hit, hits["geometry_ids"].numpy().astype(np.int64), NOTHING)
+        face = np.where(hit, self._first_face[mesh] + hits["primitive_ids"].numpy(), 0)
+        normals = self._normal_F_3[face] * hit[..., None]
+        # Where the ray meets the face's plane: Embree divides by the processor's own approximate reciprocal.
+        height_m = self._offset_F_m[face] - _dot(normals, T_world_camera[:3, 3])
+        depth_m = np.full(hit.shape, np.inf)
+        np.divide(height_m, _dot(normals, rotate(T_world_camera, rays_H_W_3)), out=depth_m, where=hit)
+        normals = rotate(T_world_camera[:3, :3].T, normals)
         to_camera = -rays_H_W_3 / np.linalg.norm(rays_H_W_3, axis=-1, keepdims=True)
-        cosine = np.sum(normals * to_camera, axis=-1)
+        cosine = _dot(normals, to_camera)
         normals *= np.where(cosine < 0, -1, 1)[..., None]
         return View(depth_m, mesh, np.abs(cosine), normals)
 
     def _cast(self, rays_H_W_3: np.ndarray, T_world_camera: np.ndarray):
-        directions = rays_H_W_3 @ T_world_camera[:3, :3].T
+        directions = rotate(T_world_camera, rays_H_W_3)
         origins = np.broadcast_to(T_world_camera[:3, 3], directions.shape)
         rays = np.concatenate([origins, directions], axis=-1).astype(np.float32)
         return self._scene.cast_rays(self._tensor(rays), nthreads=1)
+
+
+def planes(corners_F_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return of triangles (F, corner, 3) the unit normals (F, 3) and the planes' offsets (F,), normal · corner.
+
+    A triangle without an area gets the normal 0; no ray meets it.
+    """
+    a, b, c = np.moveaxis(corners_F_3_3, 1, 0)
+    across = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    normal_F_3 = np.divide(across, lengths, out=np.zeros_like(across), where=lengths > 0)
+    return normal_F_3, _dot(normal_F_3, a)
+
+
+def _dot(a_3: np.ndarray, b_3: np.ndarray) -> np.ndarray:
+    return a_3[..., 0] * b_3[..., 0] + a_3[..., 1] * b_3[..., 1] + a_3[..., 2] * b_3[..., 2]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, random_direction, require_rotation, transform
+from gpca.alignment.rigid import inverse, random_direction, require_rotation, rotate, transform
 from gpca.errors import InputError
 from gpca.files import read_csv
 from gpca.pairs.perturbation import HalfTurn, Shift
@@ -118,7 +118,7 @@ class GlobalRegistration:
             )
             T_camera_object = inverse(np.array(fine.transformation))
             seen_m = transform(T_camera_object, model_m)
-            facing = np.sum(seen_m * (normals @ T_camera_object[:3, :3].T), axis=1) < 0
+            facing = np.sum(seen_m * rotate(T_camera_object, normals), axis=1) < 0
             share = fine.fitness + np.sum(tree.query(seen_m[facing])[0] < self._voxel_m) / max(1, facing.sum())
             if share > best_share:
                 best, best_share = T_camera_object, share

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.rigid import inverse, rotate, transform
 from gpca.environment import require_open3d
 from gpca.frames.bop import back_project
 from gpca.frames.camera import Camera
@@ -51,7 +51,7 @@ class Shot:
         Points outside the image get the pixel (-1, -1).
         """
         seen = transform(inverse(self.T_world_camera), points_m)
-        pixels = seen @ self.camera.matrix_3_3.T
+        pixels = rotate(self.camera.matrix_3_3, seen)
         u, v = np.rint(pixels[:, :2] / np.maximum(pixels[:, 2:], 1e-6)).astype(int).T
         inside = (seen[:, 2] > 0) & (u >= 0) & (u < self.camera.width) & (v >= 0) & (v < self.camera.height)
         return np.where(inside, v, -1), np.where(inside, u, -1), seen[:, 2]
@@ -100,7 +100,7 @@ def agreement(
         points_m: measured points (P, 3) in the world. model_m, normals: (Q, 3) in the object's frame.
     """
     placed_m = transform(T_world_object, model_m)
-    facing_out = normals @ T_world_object[:3, :3].T
+    facing_out = rotate(T_world_object, normals)
     reach_m = NEAR * diameter_m
     on_model = np.mean(cKDTree(placed_m).query(points_m, distance_upper_bound=reach_m)[0] < reach_m)
     explained = visible = 0

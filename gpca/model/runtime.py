@@ -18,8 +18,8 @@ from gpca.model.runtime_file import COMPONENTS, RUNTIME_COLUMNS
 from gpca.model.stage_times import CloudPair, time_explanations, time_stages
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.dataset import Registrations
+from gpca.processor import cpu_name
 from gpca.progress import progress
-from gpca.provenance import cpu_name
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

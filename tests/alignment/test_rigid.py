@@ -6,6 +6,7 @@ from gpca.alignment.rigid import (
     inverse,
     random_direction,
     require_rigid,
+    rotate,
     rotation_angle_rad,
     scale_translation,
     transform,
@@ -67,3 +68,15 @@ def test_what_is_no_rigid_transform_is_refused(T_b_a, message):
     require_rigid(pose(), "my pose")
     with pytest.raises(InputError, match=message):
         require_rigid(T_b_a, "my pose")
+
+
+def test_vectors_are_turned_by_sums_from_x_to_z_whatever_their_layout():
+    random = np.random.default_rng(100)
+    R = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    vectors = random.normal(size=(101, 3))
+    columns = [vectors[:, 0] * row[0] + vectors[:, 1] * row[1] + vectors[:, 2] * row[2] for row in R]
+    for given in (vectors, np.asfortranarray(vectors), np.repeat(vectors, 2, axis=0)[::2]):
+        assert np.array_equal(rotate(R, given), np.stack(columns, axis=1))
+        assert np.array_equal(rotate(np.asfortranarray(R), given), np.stack(columns, axis=1))
+    assert np.allclose(rotate(R, vectors), vectors @ R.T)
+    assert np.array_equal(rotate(R, vectors.reshape(1, 101, 1, 3))[0, :, 0], rotate(R, vectors))

@@ -197,7 +197,7 @@ def test_times_of_components_add_up():
 def test_times_per_sample_name_the_processor_of_their_record(tmp_path):
     path = tmp_path / "timings.csv"
     assert measured_on([path]) == ""
-    (tmp_path / "timings.csv.provenance.json").write_text(json.dumps({"device": "Some cores"}))
+    (tmp_path / "timings.csv.provenance.json").write_text(json.dumps({"device": {"name": "Some cores"}}))
     assert measured_on([tmp_path / "metrics.csv", path]) == "Some cores"
     counterpart = replace(ACCURACY, file="timings.csv", metrics=("seconds_per_sample",))
     rows = {"timings.csv": tidy([2.0, 3.0], metric="seconds_per_sample")}

@@ -130,7 +130,7 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
                 "Code": f"{commit} with uncommitted changes" if code["dirty"] else commit,
                 "Config (SHA-256)": record["config_sha256"] or "none",
                 "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],
-                "Device": record["device"],
+                "Device": _device(record["device"]),
                 "Python": record["python"],
             } | {name: libraries[name] for name in sorted(libraries)}
         except FileNotFoundError:
@@ -140,6 +140,12 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
         for fact, value in values.items():
             facts.setdefault(fact, Counter())[value] += 1
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
+
+
+def _device(device: dict) -> str:
+    """The processor in words, with the level of instructions that its libraries were held to, and the GPU."""
+    kind = f"{device['vendor']}, family {device['family']}, model {device['model']}, {device['instructions']}"
+    return ", ".join(filter(None, [f"{device['name']} ({kind})", device["gpu"]]))
 
 
 def _provenance_files(folder: Path, run: Run) -> list[Path]:

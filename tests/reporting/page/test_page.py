@@ -11,6 +11,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.files import whole_file
+from gpca.processor import describe
 from gpca.provenance import record_provenance
 from gpca.reporting.figures.style import save_figure, use_style
 from gpca.reporting.page.page import Run, Shown, read_provenance, write_page
@@ -208,13 +209,16 @@ def test_without_comparison_and_samples_there_is_no_word_of_them(copied):
 
 def test_records_of_provenance_are_counted(tmp_path):
     record = {"code": {"commit": "abc", "dirty": True}, "config_sha256": None, "environment_lock_sha256": "1"}
-    record |= {"device": "a processor", "python": "3.11", "libraries": {"numpy": "2"}}
+    record |= {"device": describe() | {"gpu": "a GPU"}, "python": "3.11", "libraries": {"numpy": "2"}}
     for name in ("a.csv", "b.csv"):
         with whole_file(tmp_path / f"{name}.provenance.json") as partial:
             partial.write_text(json.dumps(record))
     facts = read_provenance([tmp_path / name for name in ("a.csv", "b.csv", "c.csv")])
     assert facts["Code"] == {"abc with uncommitted changes": 2, "not recorded": 1}
     assert facts["numpy"] == {"2": 2}
+    [device] = set(facts["Device"]) - {"not recorded"}
+    assert describe()["name"] in device
+    assert device.endswith(", a GPU")
     (tmp_path / "a.csv.provenance.json").write_text("[]")
     with pytest.raises(InputError, match=r"a\.csv\.provenance\.json: is not a record of provenance"):
         read_provenance([tmp_path / "a.csv"])

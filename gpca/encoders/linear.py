@@ -1,0 +1,53 @@
+"""Linear maps of many points, by NumPy's product on the processor.
+
+It is OpenBLAS's: with its instructions pinned (:mod:`gpca.processor`) it gives the same bytes on every machine, at the
+speed of torch's own product, MKL's. MKL gives the same bytes on Intel's and AMD's processors only by code that takes
+twice the time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+
+def product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    """Return the matrix product ``a @ b`` of tensors of the processor, stacked or not, without a gradient."""
+    with np.errstate(over="ignore", invalid="ignore"):  # as torch; a training that diverges is stopped by its loss
+        return torch.from_numpy(np.matmul(a.detach().numpy(), b.detach().numpy()))
+
+
+def linear(x_I: torch.Tensor, weight_O_I: torch.Tensor) -> torch.Tensor:
+    """Return ``x_I @ weight_O_I.T`` (…, O) of inputs (…, I), differentiable in both."""
+    if x_I.device.type != "cpu":
+        return x_I @ weight_O_I.T
+    return _Linear.apply(x_I.flatten(0, -2), weight_O_I).view(*x_I.shape[:-1], -1)
+
+
+class PointLinear(nn.Linear):
+    """A linear layer whose product is :func:`linear`."""
+
+    def forward(self, x_I: torch.Tensor) -> torch.Tensor:
+        """Map inputs (…, I) to (…, O)."""
+        y_O = linear(x_I, self.weight)
+        return y_O if self.bias is None else y_O + self.bias
+
+
+class _Linear(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, x_N_I: torch.Tensor, weight_O_I: torch.Tensor) -> torch.Tensor:
+        ctx.save_for_backward(x_N_I, weight_O_I)
+        return product(x_N_I, weight_O_I.T)
+
+    @staticmethod
+    def backward(ctx: Any, *grads: torch.Tensor) -> tuple[torch.Tensor | None, torch.Tensor | None]:
+        (grad_N_O,) = grads
+        x_N_I, weight_O_I = ctx.saved_tensors
+        wanted_x, wanted_weight = ctx.needs_input_grad
+        return (
+            product(grad_N_O, weight_O_I) if wanted_x else None,
+            product(grad_N_O.T, x_N_I) if wanted_weight else None,
+        )
