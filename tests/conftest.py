@@ -6,8 +6,16 @@ import pytest
 
 # One thread, as in a job of the workflow, and before numba is imported: on a busy machine its threads, with so little
 # work each, spend most of their time waiting for one another.
-for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+for variable in THREADS:
     os.environ.setdefault(variable, "1")
+
+
+@pytest.fixture(autouse=True)
+def threads_restored(monkeypatch):
+    """The command line sets these for its own process, which here is that of all tests."""
+    for variable in THREADS:
+        monkeypatch.setenv(variable, os.environ.get(variable, "1"))
 
 
 @pytest.fixture(scope="session")
