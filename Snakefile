@@ -5,6 +5,7 @@ import sys
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
 from gpca.config.jobs import export_to_jobs
+from gpca.config.restart import clear_leftovers
 from gpca.errors import InputError
 
 
@@ -17,6 +18,8 @@ try:
 except InputError as fault:
     sys.exit(f"gpca: {fault}")
 export_to_jobs(config)
+temporary = workflow.snakemake_tmp_dir, workflow.sourcecache.runtime_cache_path
+clear_leftovers(temporary, workflow.is_main_process)
 
 
 pathvars:

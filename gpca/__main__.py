@@ -12,6 +12,7 @@ from typing import NoReturn
 
 from gpca import __version__
 from gpca.errors import InputError
+from gpca.interrupts import certain_interrupts
 from gpca.processor import prepare
 
 STEPS = {
@@ -55,17 +56,12 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
     try:
-        return _run(arguments, chosen)
+        with certain_interrupts():
+            return _run(arguments, chosen)
     except (InputError, OSError) as fault:
         print(f"gpca {chosen}: {fault}", file=sys.stderr)
         return 2
-    except (KeyboardInterrupt, SystemError) as fault:
-        # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead, or several in a row.
-        root: BaseException = fault
-        while root.__cause__ is not None:
-            root = root.__cause__
-        if not isinstance(root, KeyboardInterrupt):
-            raise
+    except KeyboardInterrupt:
         print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
         return 130
 

@@ -39,6 +39,9 @@ def code_files(*modules: str) -> list[str]:
     return sorted(str(seen / file.relative_to(ROOT)) for file in files)
 
 
+_HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # an import is a statement: no need to go into others
+
+
 @cache
 def _imports(module: str) -> tuple[str, ...]:
     names: set[str] = set()
@@ -48,7 +51,7 @@ def _imports(module: str) -> tuple[str, ...]:
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
             nodes += node.orelse
         else:
-            nodes += ast.iter_child_nodes(node)
+            nodes += (child for child in ast.iter_child_nodes(node) if isinstance(child, _HOLD_STATEMENTS))
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:

@@ -1,12 +1,21 @@
 """Small real things that several tests need: three objects, and registrations made of them."""
 
+import os
+
 import pytest
 
-from gpca.processor import prepare
+from gpca.processor import THREAD_VARIABLES, prepare
 
 # One thread, as in a job of the workflow, and before numba is imported: on a busy machine its threads, with so little
 # work each, spend most of their time waiting for one another.
 prepare()
+
+
+@pytest.fixture(autouse=True)
+def threads_restored(monkeypatch):
+    """The command line sets these for its own process, which here is that of all tests."""
+    for variable in THREAD_VARIABLES:
+        monkeypatch.setenv(variable, os.environ.get(variable, "1"))
 
 
 @pytest.fixture(scope="session")

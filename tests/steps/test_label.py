@@ -10,6 +10,8 @@ from gpca.__main__ import main
 from gpca.files import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
 
+from .command_lines import refused, removed, untouched, written
+
 
 @pytest.fixture
 def label(registrations, tmp_path, monkeypatch, capsys):
@@ -62,3 +64,20 @@ def test_a_mistyped_name_is_asked_for_again_on_a_terminal_and_stops_a_file(label
     status, concepts, said = label("Not a name", "noise")
     assert (status, concepts) == (2, ["overlap"])
     assert "'Not a name' is no name of a concept" in said.err
+
+
+FAULTS = [
+    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+    (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file with an answer on each line"),
+    (untouched, {"--known": ["noise"]}, r"starts with fewer than two labelled concepts; name two with --known"),
+    (untouched, {"--strategy": "best"}, r"strategy 'best': unknown; known are random"),
+    (written("labels.csv", "sample,split\n1,train\n"), {}, r"labels.csv: column 'concept' is missing"),
+    (written("labels.csv", "sample,split,concept\n99,train,pose\n"), {}, r"labels.csv, line 2: no sample '99' of"),
+    (written("labels.csv", "sample,split,concept\n9,train,\n9,train,pose\n"), {}, r"line 3: 'pose' contradicts ''"),
+    (written("labels.csv", "sample,split,concept\n9,train,Not pose\n"), {}, r"'Not pose' is no name of a concept"),
+]
+
+
+@pytest.mark.parametrize("fault", range(len(FAULTS)))
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
+    refused(folder, capsys, "label", *FAULTS[fault])

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.kills import results, temporary_folders
+
 ROOT = Path(__file__).resolve().parents[2]
 NEEDED = ("Snakefile", "config", "gpca", "baselines", "workflow", "profiles", "environment.lock")
 
@@ -101,14 +103,8 @@ class Project:
 
     def results(self, *suffixes):
         """The paths and bytes of all results with one of the suffixes; seconds and memory differ from run to run."""
-        files = sorted(path for path in self.folder.glob("results/smoke/**/*") if path.suffix in suffixes)
-        relative = {path.relative_to(self.folder / "results/smoke"): path for path in files}
-        measured, drawn_from = (
-            ("timings", "timings.csv", "benchmarks", "logs"),
-            ("runtime", "table7_runtime", "comparison"),
-        )
-        kept = [name for name in relative if name.parts[0] not in measured and name.stem not in drawn_from]
-        return {str(name): relative[name].read_bytes() for name in kept}
+        whole = results(self.folder / "results/smoke")
+        return {name: content for name, content in whole.items() if name.endswith(suffixes)}
 
     def _python(self, *arguments, check):
         done = subprocess.run(
@@ -185,9 +181,25 @@ def finished(smoke, tmp_path):
     return smoke.copy(tmp_path / "finished")
 
 
+@dataclass(frozen=True)
+class Continued:
+    """One source of the smoke run once more, one job at a time, killed in the first training and then continued.
+
+    Attributes:
+        locks: how many of Snakemake's locks the killed run left.
+        temporary: the folders elsewhere that it left.
+        second: what the same command said while the first was living.
+    """
+
+    project: Project
+    locks: int
+    temporary: set[str]
+    second: subprocess.CompletedProcess
+
+
 @pytest.fixture(scope="session")
 def killed_and_continued(smoke_and_again):
-    """One source of the smoke run once more, one job at a time, killed in the first training and then continued."""
+    """That run, which went on beside the other tests."""
     return smoke_and_again[1].result()
 
 
@@ -198,8 +210,12 @@ def _killed_and_continued(smoke, folder):
     process = project.start(*run)
     while process.poll() is None and not list(project.folder.glob("results/smoke/encoders/*/*/*.checkpoint")):
         time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGTERM)
+    os.killpg(process.pid, signal.SIGSTOP)  # it lives and gets no further, however long the second takes to start
+    second = project.snakemake(*run, check=False)
+    os.killpg(process.pid, signal.SIGKILL)
     assert process.wait() != 0
     assert not list(project.folder.glob("results/smoke/predictions/**/*.csv"))
+    temporary = {path for path in temporary_folders(project.folder) if Path(path).exists()}
+    locks = len(list(project.folder.glob(".snakemake/locks/*")))
     project.snakemake(*run)
-    return project
+    return Continued(project, locks, temporary, second)

@@ -2,8 +2,11 @@
 
 import hashlib
 import json
+from pathlib import Path
 
 import pytest
+
+from benchmarks.kills import unfinished
 
 KEYS = {
     "seconds", "peak_memory_mb", "seed", "settings", "settings_sha256", "config_sha256", "inputs_sha256", "code",
@@ -14,18 +17,26 @@ KEYS = {
 @pytest.mark.parametrize(("suffix", "files"), {".npz": 21, ".pt": 2, ".csv": 102, ".png": 1, ".pdf": 1}.items())
 def test_cores_and_interruptions_change_no_byte(smoke, killed_and_continued, suffix, files):
     # Besides its own results the source needs registrations of another one.
-    runs = (smoke.results(suffix), killed_and_continued.results(suffix))
+    runs = (smoke.results(suffix), killed_and_continued.project.results(suffix))
     expected, actual = ({name: content for name, content in run.items() if "ycb" in name} for run in runs)
     assert expected.keys() == actual.keys()
     assert len(expected) == files
     assert [name for name in expected if expected[name] != actual[name]] == []
 
 
-def test_a_killed_run_leaves_nothing_behind(killed_and_continued):
-    left = [path.name for path in killed_and_continued.folder.glob("results/**/*") if path.is_file()]
-    assert not [name for name in left if name.endswith(".checkpoint") or ".partial" in name]
-    planned = killed_and_continued.dry_run("all", "--configfile", "config/smoke.yaml")
+def test_the_same_command_continues_a_killed_run_and_leaves_nothing_behind(killed_and_continued):
+    project = killed_and_continued.project
+    assert unfinished(project.folder) == set()
+    assert killed_and_continued.locks == 2
+    assert len(killed_and_continued.temporary) == 2
+    assert not [path for path in killed_and_continued.temporary if Path(path).exists()]
+    planned = project.dry_run("all", "--configfile", "config/smoke.yaml")
     assert not [path for path in planned.outputs if "ycb" in path]
+
+
+def test_two_workflows_in_one_folder_exclude_each_other(killed_and_continued):
+    assert killed_and_continued.second.returncode != 0
+    assert "Directory cannot be locked" in killed_and_continued.second.stderr
 
 
 def test_every_result_says_where_it_comes_from(smoke):

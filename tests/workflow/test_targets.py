@@ -43,16 +43,15 @@ def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project)
         "EXPLAINERS = {'lazy': ExplainerEntry('Lazy', GPCA)}\n"
     )
     project.append("config/smoke.yaml", "  lazy: {}\n")
-    smoke = ("--configfile", "config/smoke.yaml")
-    planned = project.dry_run("results/smoke/tables/table2_per_concept.md", *smoke)
-    assert planned.jobs == {
+    table1, table2 = (f"results/smoke/tables/table{name}.md" for name in ("1_single_baselines", "2_per_concept"))
+    planned = project.dry_run(table1, table2, "--configfile", "config/smoke.yaml")
+    assert planned.before(table2) == {
         "sample_objects": 2, "register": 4, "train_encoder": 4, "embed": 4, "attribute": 4, "table2_per_concept": 1
     }  # fmt: skip
-    assert not [path for path in planned.outputs if "lazy" in path or "figures" in path]
-    table1 = project.dry_run("results/smoke/tables/table1_single_baselines.md", *smoke)
-    assert table1.jobs["attribute"] == 8
-    assert table1.jobs["run_icp"] == 2
-    assert not [path for path in table1.outputs if "lazy" in path or "removal" in path or "figures" in path]
+    assert planned.before(table1)["attribute"] == 8
+    assert planned.before(table1)["run_icp"] == 2
+    for unneeded in ("lazy", "figures", "removal"):
+        assert not [path for path in planned.outputs if unneeded in path]
 
 
 def test_table3_needs_no_uncertainty_and_no_explainer(planned):
@@ -87,11 +86,6 @@ def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table8_recovery.md") == {
         "recover": 2, "recovery": 1, "table8_recovery": 1,
     }  # fmt: skip
-
-
-def test_a_finished_run_has_nothing_to_do(finished):
-    assert not finished.dry_run(*SMOKE).jobs
-    assert not finished.dry_run("smoke").jobs
 
 
 EDITS = {
@@ -163,9 +157,10 @@ def test_an_explainer_says_the_same_as_a_learner(smoke, name):
     assert learned == rows(f"predictions/ycb/{name}/seed1.csv", columns)
 
 
-def test_a_touched_but_unchanged_module_reruns_nothing(finished):
+def test_a_finished_run_has_nothing_to_do_nor_has_one_with_a_touched_but_unchanged_module(finished):
     (finished.folder / "gpca/classifier/gpc.py").touch()
     assert not finished.dry_run(*SMOKE).jobs
+    assert not finished.dry_run("smoke").jobs
 
 
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
@@ -184,13 +179,13 @@ def test_a_figure_of_another_source_is_drawn_alone(finished):
 
 
 def test_every_table_figure_and_stage_is_a_target_by_name(project):
-    def planned(target):
-        return project.dry_run(target, "--configfile", "config/smoke.yaml").outputs
-
-    assert "results/smoke/tables/table5_learners.md" in planned("table5")
-    assert "results/smoke/figures/reliability.pdf" in planned("reliability")
-    assert planned("objects") == {f"results/smoke/objects/{name}.npz" for name in ("coffee_cup", "ycb")}
-    paper = planned("paper")
+    names = ("table5", "reliability", "objects", "paper")
+    planned = project.dry_run(*names, "--configfile", "config/smoke.yaml")
+    inputs = {rule: files for rule, files, _ in planned.plan if rule in names}
+    assert inputs["table5"] == {"results/smoke/tables/table5_learners.md"}
+    assert "results/smoke/figures/reliability.pdf" in planned.outputs
+    assert inputs["objects"] == {f"results/smoke/objects/{name}.npz" for name in ("coffee_cup", "ycb")}
+    paper = inputs["paper"]
     figures = {Path(path).stem for path in paper if "/figures/" in path}
     assert sorted(name.split("_")[0] for name in figures) == [f"fig{n}" for n in range(1, 7)]
     assert not [path for path in paper if "extended" in path or "table8" in path or "index.html" in path]

@@ -1,0 +1,110 @@
+"""The same command goes on after a run that was killed: what it left is cleared away once nothing of it lives.
+
+Snakemake locks its working directory by files that outlive it: after ``kill -9`` or a power cut every start ends with a
+LockException until ``--unlock``. So each Snakemake also holds a lock that the kernel takes back, whatever ends it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import IO
+
+from gpca.provenance import CONFIG_VARIABLE
+
+LEFT = ("locks", "scripts/*", "shadow/*", "shell_tmp.*")  # by a killed Snakemake in its own folder
+_held: list[IO[str]] = []  # until this process ends
+
+
+def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: str | Path = ".snakemake") -> None:
+    """Note that a Snakemake lives in the working directory; if it is the only one, clear what dead ones have left.
+
+    All that live share a lock of ``running`` in `folder`, so who gets it alone is alone. Only then are Snakemake's own
+    locks removed, those of another Snakemake never. Jobs may outlive a Snakemake that was killed alone: they are waited
+    for, or two would write the same files. On a file system without such locks nothing is known, and nothing is done.
+
+    Args:
+        temporary: the folders that this Snakemake has made elsewhere, which it removes unless it is killed.
+        main: whether it runs the workflow; one that another has started for a job, as on a cluster, clears nothing.
+        folder: where Snakemake keeps its state.
+    """
+    own, folder = [Path(path).absolute() for path in temporary], Path(folder)
+    try:
+        folder.mkdir(exist_ok=True)
+        file = (folder / "running").open("a+", encoding="utf-8")
+    except OSError:  # not writable: Snakemake says so itself
+        return
+    try:
+        if main and _is_alone(file):
+            _wait_for_jobs()
+            file.seek(0)
+            _clear(folder, file.read().splitlines(), own)
+            file.truncate(0)
+        if main:
+            file.writelines(f"{path}\n" for path in own)
+            file.flush()
+        fcntl.flock(file, fcntl.LOCK_SH)
+    except OSError:  # no locks on this file system
+        file.close()
+    else:
+        _held.append(file)
+
+
+def _is_alone(file: IO[str]) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _clear(folder: Path, recorded: list[str], own: list[Path]) -> None:
+    left = [path for pattern in LEFT for path in folder.glob(pattern)]
+    # Whatever stands in the file, nothing but a sibling of an own folder goes, named as tempfile names them.
+    kinds = {(path.parent, path.name[:-8], len(path.name)) for path in own}
+    named = [path for path in map(Path, recorded) if (path.parent, path.name[:-8], len(path.name)) in kinds]
+    for path in [*left, *named]:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _wait_for_jobs() -> None:
+    told = False
+    while jobs := " ".join(map(str, _living_jobs())):
+        if not told:
+            print(f"gpca: waits for jobs of a killed run to end; 'kill {jobs}' ends them at once", file=sys.stderr)
+            told = True
+        time.sleep(1)
+
+
+def _living_jobs() -> list[int]:
+    """Processes in the working directory with the variable that the Snakefile sets for its jobs.
+
+    This process is none, nor are those that started it: a job may itself run a workflow.
+    """
+    found = []
+    here, variable = os.stat("."), f"{CONFIG_VARIABLE}=".encode()
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            inherited = (process / "environ").read_bytes().split(b"\0")
+            if any(entry.startswith(variable) for entry in inherited) and os.path.samestat(
+                (process / "cwd").stat(), here
+            ):
+                found.append(int(process.name))
+        except OSError:  # it ended meanwhile, or is somebody else's
+            continue
+    return sorted(set(found) - set(_line_of(os.getpid())))
+
+
+def _line_of(process: int) -> Iterator[int]:
+    """Yield a process, its parent, and so on."""
+    while process > 0:
+        yield process
+        process = int(Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[1])

@@ -1,0 +1,202 @@
+"""What a killed Snakemake has left goes when none of the folder lives, and only then."""
+
+import errno
+import fcntl
+import os
+import subprocess
+import sys
+
+import pytest
+
+from gpca.code_files import ROOT
+from gpca.config import restart
+from gpca.config.restart import clear_leftovers
+
+LIVES = """
+import sys
+from gpca.config.restart import clear_leftovers
+clear_leftovers(sys.argv[1:])
+print("lives", flush=True)
+sys.stdin.read()
+"""
+LEFT = (
+    "locks/0.input.lock",
+    "locks/0.output.lock",
+    "scripts/tmp0abc_1.table.py",
+    "shadow/tmp123/x",
+    "shell_tmp.ab/script.sh",
+)
+KEPT = ("incomplete/cmVzdWx0", "metadata/cmVzdWx0", "log/one.log", "auxiliary/x")
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    """A working folder with Snakemake's state in it; what this process holds is given back at the end."""
+    monkeypatch.chdir(tmp_path)
+    for name in (*LEFT, *KEPT):
+        path = tmp_path / ".snakemake" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    yield tmp_path
+    while restart._held:
+        restart._held.pop().close()
+
+
+@pytest.fixture
+def start(here):
+    """Start a process that lives until its stdin is closed or it is killed; as a job it bears the job's mark."""
+    started = []
+
+    def start(*arguments, code=LIVES, job=False, folder=here):
+        environment = {name: value for name, value in os.environ.items() if name != "GPCA_CONFIG_SHA256"}
+        environment |= {"PYTHONPATH": str(ROOT)} | ({"GPCA_CONFIG_SHA256": "c0ffee"} if job else {})
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        process = subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=folder, env=environment, **pipes)
+        started.append(process)
+        assert process.stdout.readline() == b"lives\n"
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def files(folder):
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()} - {"running"}
+
+
+def test_what_killed_runs_left_goes_and_what_continues_them_stays(here):
+    clear_leftovers([])
+    assert files(here / ".snakemake") == set(KEPT)
+
+
+def test_a_fresh_folder_has_nothing_to_clear(tmp_path, monkeypatch):
+    (tmp_path / "fresh").mkdir()
+    monkeypatch.chdir(tmp_path / "fresh")
+    clear_leftovers([])
+    assert files(tmp_path / "fresh" / ".snakemake") == set()
+
+
+def test_nothing_of_one_that_lives_is_touched_until_it_was_killed(here, start):
+    clear_leftovers([])
+    restart._held.pop().close()
+    first, second = start(), start()
+    lock = here / ".snakemake/locks/0.output.lock"
+    lock.parent.mkdir()
+    lock.touch()
+    for living in (first, second):
+        clear_leftovers([])
+        restart._held.pop().close()
+        assert lock.exists()
+        living.kill()
+        living.wait()
+    clear_leftovers([])
+    assert not lock.exists()
+
+
+def test_who_came_second_counts_too(here, start):
+    clear_leftovers([])
+    start()
+    restart._held.pop().close()
+    lock = here / ".snakemake/locks/0.output.lock"
+    lock.parent.mkdir()
+    lock.touch()
+    clear_leftovers([])
+    assert lock.exists()
+
+
+def test_a_job_s_own_snakemake_clears_nothing_but_counts_as_one_that_lives(here, start):
+    clear_leftovers([], main=False)
+    assert files(here / ".snakemake") == {*LEFT, *KEPT}
+    start()
+    assert files(here / ".snakemake") == {*LEFT, *KEPT}
+
+
+def test_where_files_cannot_be_locked_everything_stays(here, monkeypatch):
+    def unknown(file, operation):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", unknown)
+    clear_leftovers([])
+    assert files(here / ".snakemake") == {*LEFT, *KEPT}
+
+
+def test_temporary_folders_of_killed_runs_go_with_what_is_in_them(here, start):
+    folders = [here / name for name in ("snakemakeabcd1234", "snakemake_9_8_7_6", "snakemakeown_own_")]
+    for folder in folders:
+        folder.mkdir()
+        (folder / "content").touch()
+    killed, living, own = folders
+    process = start(str(killed))
+    other = start(str(living))
+    process.kill()
+    process.wait()
+    clear_leftovers([own])
+    assert killed.exists()
+    restart._held.pop().close()
+    other.kill()
+    other.wait()
+    clear_leftovers([own])
+    assert [folder.exists() for folder in folders] == [False, False, False]
+    restart._held.pop().close()
+
+
+@pytest.mark.parametrize("name", ["home", "snakemake", "snakemakeabc", "other/snakemakeabcd1234", ".", "..", "/", ""])
+def test_a_doctored_record_removes_nothing(here, name):
+    path = here / name
+    path.mkdir(parents=True, exist_ok=True)
+    (here / "snakemakeown_own_").mkdir()
+    (here / ".snakemake/running").write_text(f"{path}\n{name}\n../{name}\n")
+    clear_leftovers([here / "snakemakeown_own_"])
+    assert path.is_dir()
+    assert (here / ".snakemake/running").read_text() == f"{here}/snakemakeown_own_\n"
+
+
+def test_a_link_in_place_of_a_temporary_folder_is_removed_and_what_it_names_is_not(here):
+    (here / "home").mkdir()
+    (here / "home/letter").touch()
+    (here / "snakemakeabcd1234").symlink_to(here / "home")
+    (here / ".snakemake/running").write_text(f"{here}/snakemakeabcd1234\n")
+    clear_leftovers([here / "snakemakeown_own_"])
+    assert (here / "home/letter").exists()
+
+
+WAITS = "import sys; print('lives', flush=True); sys.stdin.read()"
+
+
+def test_jobs_that_outlived_their_snakemake_are_waited_for(here, start, monkeypatch, capsys):
+    job = start(code=WAITS, job=True)
+
+    def end(seconds):
+        assert (here / ".snakemake" / LEFT[0]).exists()
+        job.kill()
+        job.wait()
+
+    monkeypatch.setattr(restart.time, "sleep", end)
+    clear_leftovers([])
+    assert capsys.readouterr().err == (
+        f"gpca: waits for jobs of a killed run to end; 'kill {job.pid}' ends them at once\n"
+    )
+    assert files(here / ".snakemake") == set(KEPT)
+
+
+STARTS = """
+import subprocess, sys
+command = [sys.executable, "-c", sys.argv[1]]
+print(subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True).stdout, end="", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_job_that_runs_a_workflow_itself_is_not_waited_for_by_it(here, start):
+    start(LIVES, code=STARTS, job=True)
+    assert files(here / ".snakemake") == set(KEPT)
+
+
+@pytest.mark.parametrize("other", ["no job", "elsewhere"])
+def test_no_other_process_is_waited_for(here, start, monkeypatch, other):
+    (here / "elsewhere").mkdir()
+    start(code=WAITS, job=other == "elsewhere", folder=here / "elsewhere" if other == "elsewhere" else here)
+    monkeypatch.setattr(restart.time, "sleep", lambda seconds: pytest.fail("waits"))
+    clear_leftovers([])

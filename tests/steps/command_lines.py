@@ -1,0 +1,167 @@
+"""The command line of every step by hand, one after the other on tiny data, and ways to spoil what it reads."""
+
+import json
+import os
+import re
+
+import numpy as np
+
+from gpca.__main__ import main
+from gpca.files import save_arrays
+
+ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
+POLICY = {
+    "thresholds": {"uncertain": None, "queued_share": 0.1, "dominant": 0.4, "improvement": 0.1},
+    "treatments": {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"},
+    "loop": {"budget": 3},
+}
+LEARNING = {
+    "held_out": ["noise", "overlap"], "initial": 6, "labels": 4, "batch": 2, "rare_share": 0.2, "rare_labels": 2,
+    "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
+    "stream": {"arrivals": 8, "quiet": 2, "budget": 0.5, "every": 2},
+}  # fmt: skip
+SHIFT = {
+    "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
+    "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "shape_points": 16,
+}  # fmt: skip
+COMMON = {"--source": "tiny"}
+STEP_OPTIONS = {
+    "objects": COMMON | {
+        "--settings": {"kind": "mesh_folder", "location": "meshes", "unit": "mm"}, "--data-dir": ".",
+        "--surface-points": 600, "--out": "objects.npz",
+    },
+    "registrations": COMMON | {
+        "--settings": {"train": 18, "test": 6, "cloud_points": 128}, "--seed": 0, "--objects": "objects.npz",
+        "--out": "registrations.npz", "--timings": "icp.csv",
+    },
+    "train": COMMON | {
+        "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--out": "weights.pt",
+        "--curve": "curve.csv",
+    },
+    "embed": COMMON | {
+        "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz",
+        "--registration-timings": "icp.csv", "--encoder": "weights.pt", "--out": "embeddings.npz",
+        "--timings": "dgcnn.csv",
+    },
+    "reduce": COMMON | {
+        "--settings": {"components": 4, "epochs": 5}, "--reduction": "autoencoder", "--seeds": 0,
+        "--embeddings": "embeddings.npz", "--out": "reduced.npz",
+    },
+    "uncertainty": COMMON | {
+        "--settings": {"starts": 13, "icp_points": 40, "icp": {"max_iterations": 20}},
+        "--design": "removal", "--seeds": 0, "--registrations": "registrations.npz",
+        "--out": "uncertainty.npz", "--tables": "uncertainty.csv", "--timings": "uncertainty_timings.csv",
+    },
+    "attribute": COMMON | {
+        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
+        "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--input-timings": "dgcnn.csv",
+        "--predictions": "predictions.csv", "--timings": "gpca.csv",
+    },
+    "without": COMMON | {
+        "--settings": ENCODER | {"epochs": 1}, "--seed": 0, "--registrations": "registrations.npz",
+        "--concepts": ["noise", "overlap"], "--out": "without.npz",
+    },
+    "active_learning": COMMON | {
+        "--settings": LEARNING, "--seed": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz",
+        "--embeddings-without": "without.npz", "--strategies": ["random", "bald_kmeans", "stream_bald"],
+        "--out": ["random.csv", "bald_kmeans.csv", "stream_bald.csv"],
+    },
+    "kernel_grid": COMMON | {
+        "--settings": {"kernels": ["rbf", "polynomial"], "iterations": [2, 4], "inducing": 6, "draws": 20},
+        "--seeds": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "grid.csv",
+    },
+    "shift": COMMON | {
+        "--settings": {"shift": SHIFT, "registrations": {"cloud_points": 128}, "encoder": ENCODER}, "--seeds": 0,
+        "--objects": "objects.npz", "--registrations": "registrations.npz",
+        "--other-registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--encoders": "weights.pt",
+        "--out": "shifted.npz",
+    },
+    "learners": COMMON | {
+        "--settings": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "learner_nearest": {}}, "--seeds": 0,
+        "--learners": ["gpca", "learner_nearest"], "--sets": "shifted.npz", "--out": ["learnt.csv", "nearest.csv"],
+    },
+    "label": {
+        "registrations.npz": [], "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--initial": 6,
+        "--embeddings": "embeddings.npz", "--labels": "labels.csv", "--answers": "answers.txt",
+        "--predictions": "labelled.csv",
+    },
+    "model": COMMON | {
+        "--settings": {"encoder": ENCODER, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
+                       "registrations": {"cloud_points": 128}, "recovery": POLICY},
+        "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
+        "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--out": "model.pt",
+    },
+    "runtime": COMMON | {
+        "--settings": {"runtime": {"repeats": 2}, "active_learning": LEARNING}, "--seed": 0, "--model": "model.pt",
+        "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "runtime.csv",
+    },
+    "explain": {"meshes/brick.stl": [], "meshes/cone.ply": [], "--unit": "mm", "--model": "model.pt", "--json": []},
+}  # fmt: skip
+
+
+def arguments(step, changes=()):
+    """The command line of a step, with some options changed and those that are None left out."""
+    words = [step]
+    for name, value in (STEP_OPTIONS[step] | dict(changes)).items():
+        if value is not None:
+            values = value if isinstance(value, list) else [json.dumps(value) if isinstance(value, dict) else value]
+            words += [name, *map(str, values)]
+    return words
+
+
+def content(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def settings(step, **changed):
+    return {"--settings": STEP_OPTIONS[step]["--settings"] | changed}
+
+
+def arrays_changed(name, **changed):
+    def spoil(folder):
+        with np.load(folder / name) as archive:
+            arrays = dict(archive)
+        save_arrays(folder / name, arrays | {key: change(arrays[key]) for key, change in changed.items()})
+
+    return spoil
+
+
+def pickled(name):
+    return lambda folder: np.savez(folder / name, points=np.array([{}], dtype=object), allow_pickle=True)
+
+
+def truncated(name):
+    return lambda folder: os.truncate(folder / name, (folder / name).stat().st_size // 2)
+
+
+def removed(name):
+    return lambda folder: (folder / name).unlink()
+
+
+def written(name, text):
+    return lambda folder: (folder / name).write_text(text)
+
+
+def untouched(folder):
+    pass
+
+
+def lines_kept(name, lines):
+    return lambda folder: (folder / name).write_text("".join((folder / name).open().readlines()[:lines]))
+
+
+SAYS_MORE = {"label"}  # steps that speak to a person on stdout
+
+
+def refused(folder, capsys, step, spoil, changes, message):
+    """Assert that a spoilt file or a changed option is refused in one line, and nothing written or lost."""
+    spoil(folder)
+    before = content(folder)
+    assert main(arguments(step, changes)) == 2
+    out, err = capsys.readouterr()
+    line = err.splitlines()[-1]
+    assert line.startswith(f"gpca {step}: ")
+    assert re.search(message, line), line
+    assert "Traceback" not in err
+    assert out == "" or step in SAYS_MORE
+    assert content(folder) == before

@@ -1,0 +1,34 @@
+"""A folder where every step has run by hand."""
+
+import shutil
+
+import pytest
+
+from gpca.__main__ import main
+
+from .command_lines import STEP_OPTIONS, arguments
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory):
+    """A folder where every step has run by hand, one after the other."""
+    import trimesh
+
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "meshes").mkdir()
+    trimesh.creation.box((40, 70, 100)).export(folder / "meshes/brick.stl")
+    trimesh.creation.cone(30, 90).export(folder / "meshes/cone.ply")
+    (folder / "answers.txt").write_text("overlap\nocclusion\n/skip\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for step in STEP_OPTIONS:
+            assert main(arguments(step)) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path, monkeypatch):
+    """A copy of that folder to spoil, and the working folder."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

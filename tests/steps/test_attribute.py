@@ -1,0 +1,37 @@
+"""The step ``attribute`` by hand, and what it says of faulty files and settings."""
+
+import numpy as np
+import pytest
+
+from .command_lines import arrays_changed, lines_kept, refused, removed, settings, untouched, written
+
+SHAP = {
+    "--explainer": "shap_removal", "--settings": {}, "--embeddings": None, "--uncertainty": "uncertainty.npz",
+    "--uncertainty-timings": "uncertainty_timings.csv", "--input-timings": "icp.csv",
+}  # fmt: skip
+FAULTS = [
+    (untouched, SHAP | {"--uncertainty": None}, r"'shap_removal': reads the uncertainty of design 'removal'"),
+    (removed("uncertainty.npz"), SHAP, r"uncertainty.npz: no such file; make it with 'python -m gpca"),
+    (arrays_changed("uncertainty.npz", sample=lambda s: s + 50), SHAP, r"holds other samples or conditions"),
+    (arrays_changed("uncertainty.npz", residual=lambda r: r * np.nan), SHAP, r"array 'residual' holds NaN"),
+    (removed("uncertainty_timings.csv"), SHAP, r"uncertainty_timings.csv: no such file"),
+    (lines_kept("uncertainty_timings.csv", 20), SHAP, r"holds 19 rows, not 24 samples × 8 conditions"),
+    (untouched, SHAP | {"--settings": {"worth": "rmse"}}, r"rmse"),
+    (untouched, {"--explainer": "shapley"}, r"explainer 'shapley': unknown; known are gpca_paper, gpca"),
+    (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
+    (untouched, {"--embeddings": ["embeddings.npz"] * 2}, r"--embeddings: 2 file\(s\) for 1 seed\(s\)"),
+    (untouched, {"--embeddings": None}, r"explainer 'gpca': reads embeddings; give them with --embeddings"),
+    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+    (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"holds other samples than the registr"),
+    (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
+    (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'head_logits' is 24×3, not 23"),
+    (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: column 'split' is missing"),
+    (untouched, settings("attribute", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
+    (untouched, settings("attribute", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
+    (untouched, {"--predictions": "meshes"}, r"meshes"),
+]
+
+
+@pytest.mark.parametrize("fault", range(len(FAULTS)))
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
+    refused(folder, capsys, "attribute", *FAULTS[fault])

@@ -1,0 +1,83 @@
+"""Every step by hand: all files with their provenance, the same bytes again, faults as the process's last word."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from gpca.__main__ import STEPS, main
+from gpca.code_files import ROOT
+
+from .command_lines import STEP_OPTIONS, arguments
+
+# tests/frames/test_steps.py, tests/steps/test_recover.py, tests/comparison/test_reference.py
+ELSEWHERE = {"scenes", "instances", "frame_registrations", "recover", "check-reference"}
+BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
+
+
+def test_every_step_is_tested_here_or_elsewhere():
+    assert set(STEPS) == set(STEP_OPTIONS) | ELSEWHERE
+
+
+def test_every_step_runs_by_hand(made):
+    values = [value for options in STEP_OPTIONS.values() for value in options.values()]
+    words = [word for value in values for word in (value if isinstance(value, list) else [value])]
+    outputs = {word for word in words if isinstance(word, str) and "." in word[1:]} - BY_HAND
+    for name in outputs:
+        assert (made / name).stat().st_size > 0
+        assert (made / f"{name}.provenance.json").is_file()
+    assert not [path for path in made.rglob("*") if "checkpoint" in path.name or "partial" in path.name]
+
+
+def test_a_step_made_anew_gives_the_same_bytes(folder, made):
+    for step in (
+        "registrations",
+        "train",
+        "embed",
+        "reduce",
+        "uncertainty",
+        "attribute",
+        "without",
+        "active_learning",
+        "kernel_grid",
+        "shift",
+        "learners",
+    ):
+        assert main(arguments(step)) == 0
+    for name in (
+        "registrations.npz",
+        "weights.pt",
+        "curve.csv",
+        "embeddings.npz",
+        "reduced.npz",
+        "uncertainty.npz",
+        "uncertainty.csv",
+        "predictions.csv",
+        "without.npz",
+        "random.csv",
+        "bald_kmeans.csv",
+        "stream_bald.csv",
+        "grid.csv",
+        "shifted.npz",
+        "learnt.csv",
+    ):
+        assert (folder / name).read_bytes() == (made / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(
+    ("step", "changes", "message"),
+    [
+        ("objects", {"--data-dir": "nowhere"}, "gpca objects: nowhere: no such folder; correct data_dir in the config"),
+        ("registrations", {"--objects": "lost.npz"}, "gpca registrations: lost.npz: no such file; make it with"),
+        ("attribute", {"--explainer": "shapley"}, "gpca attribute: explainer 'shapley': unknown; known are"),
+    ],
+)
+def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, changes, message):
+    done = subprocess.run(
+        [sys.executable, "-m", "gpca", *arguments(step, changes)],
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith(message)

@@ -1,0 +1,43 @@
+"""The step ``explain`` by hand, and what it says of faulty files and settings."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gpca.__main__ import main
+
+from .command_lines import arguments, refused, removed, truncated, untouched, written
+
+FAULTS = [
+    (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),
+    (truncated("model.pt"), {}, r"model.pt: is damaged or no model"),
+    (truncated("meshes/cone.ply"), {}, r"cone.ply: is truncated or not a readable .ply file"),
+    (removed("meshes/brick.stl"), {}, r"brick.stl: no such file; give one of .ply"),
+    (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit"),
+    (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: holds 3 numbers; give 4×4"),
+    (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
+    (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),
+]
+
+
+@pytest.mark.parametrize("fault", range(len(FAULTS)))
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
+    refused(folder, capsys, "explain", *FAULTS[fault])
+
+
+def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys):
+    np.savetxt(folder / "pose.txt", np.eye(4))
+    assert main(arguments("explain", {"--init": "pose.txt", "--uncertainty": []})) == 0
+    out, err = capsys.readouterr()
+    explanation = json.loads(out)
+    assert set(explanation["scores"]) == set(explanation["variances"]) == {"noise", "pose", "overlap"}
+    assert explanation["unit"] == "mm"
+    assert explanation["spread"]["starts"] == 50
+    assert explanation["trained_on"] == "Tiny (procedural stand-in)"
+    assert "source: 128 of 16384 points, drawn at random\n" in err
+    assert "model model.pt, trained on Tiny (procedural stand-in)\n" in err
+    assert main(arguments("explain", {"--json": None})) == 0
+    text = capsys.readouterr().out
+    for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
+        assert word in text

@@ -1,0 +1,69 @@
+"""The step ``train`` by hand, and what it says of faulty files and settings."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from gpca.__main__ import main
+from gpca.code_files import ROOT
+
+from .command_lines import arguments, arrays_changed, refused, removed, settings, truncated, untouched
+
+FAULTS = [
+    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
+    (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
+    (arrays_changed("registrations.npz", concept=lambda c: np.full_like(c, "x")), {}, r"unknown concept 'x'"),
+    (untouched, settings("train", epochs="two"), r"setting epochs: 'two' is not of type 'integer'"),
+    (untouched, settings("train", layers=3), r"setting layers: unknown; known are backbone, draw_points"),
+    (untouched, settings("train", backbone="dgcn"), r"backbone 'dgcn': unknown; known are dgcnn"),
+    (untouched, settings("train", backbone="dgcnn", options={"kk": 8}), r"options.kk: unknown; did you mean k\?"),
+]
+
+
+@pytest.mark.parametrize("fault", range(len(FAULTS)))
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
+    refused(folder, capsys, "train", *FAULTS[fault])
+
+
+# Where the tests run in the background of a shell, SIGINT is ignored, and children inherit that.
+STOPPED_IN_EPOCH_3 = """
+import os, signal, sys
+from gpca.__main__ import main
+from gpca.encoders import training
+
+class Deleted:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+
+def keep(checkpoint, identity, state, curve):
+    kept(checkpoint, identity, state, curve)
+    if len(curve) == 3:
+        {stop}
+
+kept, training._keep = training._keep, keep
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("stop", ["os.kill(os.getpid(), signal.SIGINT)", "Deleted()"], ids=["raised", "swallowed"])
+def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder, stop):
+    longer = settings("train", epochs=5)
+    assert main(arguments("train", longer | {"--out": "unbroken.pt", "--curve": "unbroken.csv"})) == 0
+    before = (folder / "weights.pt").read_bytes()
+    done = subprocess.run(
+        [sys.executable, "-c", STOPPED_IN_EPOCH_3.format(stop=stop), *arguments("train", longer)],
+        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.splitlines()[-1] == "gpca train: stopped; the same command continues"
+    assert ("Exception ignored in" in done.stderr) == (stop == "Deleted()")
+    assert (folder / "weights.pt").read_bytes() == before
+    assert (folder / "weights.checkpoint").exists()
+    assert main(arguments("train", longer)) == 0
+    assert not (folder / "weights.checkpoint").exists()
+    for made, unbroken in (("weights.pt", "unbroken.pt"), ("curve.csv", "unbroken.csv")):
+        assert (folder / made).read_bytes() == (folder / unbroken).read_bytes()

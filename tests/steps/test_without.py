@@ -1,0 +1,15 @@
+"""The step ``without`` by hand, and what it says of faulty files and settings."""
+
+import pytest
+
+from .command_lines import refused, removed, settings, untouched
+
+FAULTS = [
+    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
+    (untouched, settings("without", epochs=0), r"setting epochs: 0 is less than the minimum of 1"),
+]
+
+
+@pytest.mark.parametrize("fault", range(len(FAULTS)))
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
+    refused(folder, capsys, "without", *FAULTS[fault])
