@@ -16,6 +16,7 @@ from types import MappingProxyType
 # Set this to "native" to give every library the instructions that it likes best: results then differ between machines.
 INSTRUCTIONS_VARIABLE = "GPCA_INSTRUCTIONS"
 COMMON_LEVEL = "x86-64-v3"
+CPUINFO = Path("/proc/cpuinfo")
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 _REQUIRED_FLAGS = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "abm"}
 _PINS: Mapping[str, str] = MappingProxyType(
@@ -88,8 +89,7 @@ def _flags() -> set[str]:
 
 def _cpuinfo() -> dict[str, str]:
     """The fields of the first processor that Linux tells, or none."""
-    path = Path("/proc/cpuinfo")
-    if not path.exists():
+    if not CPUINFO.exists():
         return {}
-    first = path.read_text(encoding="utf-8").split("\n\n", 1)[0]
+    first = CPUINFO.read_text(encoding="utf-8").split("\n\n", 1)[0]
     return {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in first.splitlines())}
