@@ -1,5 +1,6 @@
 """The benchmark that kills a run again and again, with a command in place of Snakemake that ends when it is told to."""
 
+import fcntl
 import json
 import random
 import sys
@@ -103,19 +104,23 @@ def test_a_start_that_fails_ends_it_with_what_was_said(tmp_path, capsys):
     assert "Directory cannot be locked" in capsys.readouterr().err
 
 
+CHILD = """
+import fcntl, sys, time
+file = open("{path}", "w")
+fcntl.flock(file, fcntl.LOCK_EX)
+print("locked", flush=True)
+time.sleep(60)
+file.write("survived")
+"""
+
+
 def test_a_kill_ends_the_whole_process_group(tmp_path):
-    waits = (
-        "import subprocess, sys, time\n"
-        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
-        "print(child.pid, flush=True); time.sleep(600)"
-    )
-    delay_s = 0.5
-    while not (tmp_path / "snakemake.log").is_file() or not (tmp_path / "snakemake.log").read_text():
-        assert not kills.start([sys.executable, "-c", waits], tmp_path, delay_s)
-        delay_s *= 2  # until the child has started before the kill
-    child = int((tmp_path / "snakemake.log").read_text())
-    try:
-        with open(f"/proc/{child}/stat") as stat:
-            assert stat.read().rpartition(")")[2].split()[0] in "ZX"  # dead, if not buried yet
-    except FileNotFoundError:
-        pass
+    child = [sys.executable, "-c", CHILD.format(path=tmp_path / "held")]
+    command = [sys.executable, "-c", f"import subprocess; subprocess.run({child!r})"]
+    delay_s, log = 0.5, tmp_path / "snakemake.log"
+    while not log.is_file() or log.read_text() != "locked\n":  # until the child had started before the kill
+        assert not kills.start(command, tmp_path, delay_s)
+        delay_s *= 2
+    with (tmp_path / "held").open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # the child's, until it is dead or has ended
+        assert file.read() == ""
