@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import warnings
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -71,13 +72,19 @@ def read_image(path: str | Path, remedy: str) -> np.ndarray:
 
     if not Path(path).is_file():
         raise InputError(path, "no such image", remedy)
+    too_many = f"has more than {MOST_PIXELS} pixels, too many for a frame"
     try:
-        with Image.open(path, formats=IMAGE_FORMATS) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            image = Image.open(path, formats=IMAGE_FORMATS)
+        with image:
             if image.width * image.height > MOST_PIXELS:
-                raise InputError(path, f"has {image.width}×{image.height} pixels, too many for a frame", remedy)
+                raise InputError(path, too_many, remedy)
             return np.asarray(image)
     except InputError:
         raise
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as fault:
+        raise InputError(path, too_many, remedy) from fault
     except Exception as fault:  # Pillow raises errors of many kinds for a damaged file
         raise InputError(path, "is truncated or no readable image", remedy) from fault
 

@@ -82,8 +82,8 @@ class Frame:
         mask = read_image(annotation.mask, REMEDY)
         mask = mask if mask.ndim == 2 else mask[..., 0]
         inside = mask > 0
-        # Half, because the rim of a mask that was resized or saved as JPEG has values in between.
-        if inside.any() and 2 * np.unique(mask[inside], return_counts=True)[1].max() < inside.sum():
+        # A tenth, because the rim of a small mask that was resized or saved as JPEG has values in between.
+        if inside.any() and 10 * np.unique(mask[inside], return_counts=True)[1].max() < inside.sum():
             raise InputError(annotation.mask, "is no mask: most of its pixels differ", "write 0 outside, 255 inside")
         return inside
 

@@ -85,6 +85,11 @@ class Observation:
         T_object_camera = inverse(T_camera_model @ self.T_model_object)
         return median_distance(self.tree, transform(T_object_camera, points_m)) / self.diameter_m
 
+    def size(self, undo: Undo) -> float:
+        """Return in diameters how far the points reach, once a fault is undone."""
+        points_m = undo(self.T_camera_model, _spread(self.points_m, JUDGED_POINTS))[1]
+        return float(np.linalg.norm(points_m.std(axis=0)) / self.diameter_m) + 1e-9
+
 
 def median_distance(tree: cKDTree, points_m: np.ndarray) -> float:
     """Return the median distance in metres from points (P, 3) in the object's frame to its cloud."""
@@ -128,7 +133,8 @@ def require_plausible(observed: Observation) -> None:
     if distance <= FARTHEST:
         return
     undone = {reason: observed.distance(undo) for reason, undo in FAULTS.items()}
-    likeliest = min(undone, key=lambda reason: undone[reason])
+    # Relative to the cloud's size: a cloud that has shrunk to a point is near to anything.
+    likeliest = min(undone, key=lambda reason: undone[reason] / observed.size(FAULTS[reason]))
     raise InputError(
         observed.subject,
         f"half of its measured points lie {1e3 * distance * observed.diameter_m:.0f} mm or more from the model in the "
