@@ -95,8 +95,6 @@ class Instances:
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
             raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", remedy)
         pixels = arrays["pixels"]
-        if len(pixels) != len(arrays["points_m"]):
-            raise InputError(path, "'pixels' and 'points_m' are not of one length", remedy)
         if pixels.min() < 0 or np.prod(pixels.max(axis=0) + 1.0) > MOST_PIXELS:
             raise InputError(path, "'pixels' lie outside of any image", remedy)
         for i in range(len(arrays["scene"])):

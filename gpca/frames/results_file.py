@@ -22,6 +22,7 @@ REMEDY = "export it anew"
 ONE_OFF = 100.0
 # ... and half of a file's are not off by more than this, unless the unit is wrong: centimetres would be by 10.
 HALF_OFF = 3.0
+UNIT_OFF = 0.3  # of a tenfold: so near to a power of ten the unit is told by it
 
 Estimates = Mapping[tuple[int, int, int], list[np.ndarray]]
 
@@ -105,7 +106,9 @@ def _entries(subject: str, row: dict, column: str, count: int) -> np.ndarray:
 def _require_unit(subject: object, ratio: float, most: float) -> None:
     if 1 / most <= ratio <= most:
         return
-    unit = {-3: "in metres?", -1: "in centimetres?", 3: "in micrometres?"}.get(round(np.log10(ratio)), "another unit?")
+    tenfold = float(np.log10(max(ratio, 1e-9)))
+    nearest = round(tenfold) if abs(tenfold - round(tenfold)) < UNIT_OFF else 0
+    unit = {-3: "in metres?", -1: "in centimetres?", 3: "in micrometres?"}.get(nearest, "in another unit?")
     raise InputError(
         subject,
         f"t is {ratio:.2g} times as long as that of the objects annotated in the image",
