@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -184,7 +185,7 @@ class _Objects:
                 left_out.append(str(fault))
                 continue
             T_true = annotation.T_camera_model @ self._models[number].T_model_object
-            seen = {"object_index": self._index[number], "symmetric": self._symmetric[number]}
+            seen: dict[str, Any] = {"object_index": self._index[number], "symmetric": self._symmetric[number]}
             seen |= {"T_camera_object_true": T_true, "points_m": points_m.astype(np.float32)}
             rows.append((n, {**seen, "pixels": pixels.astype(np.int32)}))
         return rows
