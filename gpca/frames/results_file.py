@@ -1,6 +1,6 @@
 """Results files of the BOP benchmark: the poses that an estimator found, and which of them an object is to start from.
 
-Format: https://bop.felk.cvut.cz/challenges/bop-challenge-2019/, "Format of results".
+Format: https://github.com/thodan/bop_toolkit, "Evaluating your method": `scene_id,im_id,obj_id,score,R,t,time`.
 """
 
 from __future__ import annotations
