@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import warnings
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -16,6 +17,10 @@ from gpca.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+MOST_PIXELS = 2**26  # of an image; depth cameras have a tenth of that, and a few bytes may unpack to any number
+IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content, and runs programs for some
 
 
 @contextmanager
@@ -61,15 +66,25 @@ def read_image(path: str | Path, remedy: str) -> np.ndarray:
     """Return the pixels of an image, (H, W) or (H, W, channels), of the file's own depth.
 
     Raises:
-        InputError: missing, truncated or unreadable; it ends with the remedy.
+        InputError: missing, truncated, unreadable or too large; it ends with the remedy.
     """
     from PIL import Image
 
     if not Path(path).is_file():
         raise InputError(path, "no such image", remedy)
+    too_many = f"has more than {MOST_PIXELS} pixels, too many for a frame"
     try:
-        with Image.open(path) as image:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            image = Image.open(path, formats=IMAGE_FORMATS)
+        with image:
+            if image.width * image.height > MOST_PIXELS:
+                raise InputError(path, too_many, remedy)
             return np.asarray(image)
+    except InputError:
+        raise
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as fault:
+        raise InputError(path, too_many, remedy) from fault
     except Exception as fault:  # Pillow raises errors of many kinds for a damaged file
         raise InputError(path, "is truncated or no readable image", remedy) from fault
 
@@ -130,7 +145,8 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
     """Read a CSV file with at least these columns and one row, every entry as the text that stands there.
 
     Raises:
-        InputError: missing, empty or unreadable file, missing column, no rows, rows longer than the head.
+        InputError: missing, empty or unreadable file, column that is missing or there twice, no rows, rows longer than
+            the head.
     """
     import pandas as pd
 
@@ -147,6 +163,10 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
         raise InputError(path, f"column '{missing[0]}' is missing", "make it anew")
     if not isinstance(rows.index, pd.RangeIndex):  # pandas takes what is too much for an index, and shifts the rest
         raise InputError(path, "has rows with more entries than columns", "make it anew")
+    # pandas gives the second of two columns another name, so the head is read once more as it stands.
+    head = pd.read_csv(path, dtype=str, keep_default_na=False, header=None, nrows=1).iloc[0]
+    if (twice := head[head.duplicated()]).size:
+        raise InputError(path, f"column '{twice.iloc[0]}' is there twice", "make it anew")
     if rows.empty:
         raise InputError(path, "holds no rows", "make it anew")
     return rows

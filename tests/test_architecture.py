@@ -12,8 +12,8 @@ from .documents import ROOT
 PAGE = (ROOT / "docs/architecture.md").read_text()
 LONGEST = {"gpca/alignment/icp_kernels.py": 450}  # the compiled loop of ICP, which is one function for its speed
 TOP = {
-    "errors", "seeds", "files", "progress", "environment", "processor", "provenance", "settings", "code_files",
-    "interrupts",
+    "errors", "seeds", "files", "json_file", "progress", "environment", "processor", "provenance", "settings",
+    "code_files", "interrupts",
 }  # fmt: skip
 MODULES = sorted([*(ROOT / "gpca").rglob("*.py"), *(ROOT / "baselines").rglob("*.py")])
 

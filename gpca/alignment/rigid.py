@@ -50,8 +50,15 @@ def rotation_angle_rad(T_b_a: np.ndarray) -> float:
 def require_rotation(T_b_a: np.ndarray, subject: object, tolerance: float = 1e-3) -> None:
     """Raise an InputError that names `subject` unless the pose is finite and its upper left part is a rotation."""
     R = T_b_a[:3, :3]
-    if not np.isfinite(T_b_a).all() or abs(R @ R.T - np.eye(3)).max() > tolerance or np.linalg.det(R) < 0:
-        raise InputError(subject, "the pose is no rigid transform", "give a proper rotation, row by row")
+    if not np.isfinite(T_b_a).all():
+        fault = "it holds NaN or infinity"
+    elif abs(R).max() > 2 or abs(R @ R.T - np.eye(3)).max() > tolerance:
+        fault = "its axes are not at right angles, or not of length 1"
+    elif np.linalg.det(R) < 0:
+        fault = "it is mirrored, of determinant -1"
+    else:
+        return
+    raise InputError(subject, f"the pose is no rigid transform: {fault}", "give a proper rotation, row by row")
 
 
 def require_rigid(T_b_a: np.ndarray, subject: object) -> None:

@@ -6,28 +6,28 @@ files and metres here; cameras look along +z with x to the right and y down.
 
 from __future__ import annotations
 
-import json
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.rigid import require_rotation
 from gpca.errors import InputError
 from gpca.files import read_image
+from gpca.frames.scene_files import REMEDY, read_camera, read_images, read_pose
 
 FEWEST_POINTS = 64
-REMEDY = "the folder may be half unpacked: unpack the dataset anew"
 
 
 @dataclass(frozen=True)
 class Annotation:
-    """One object in a frame: its id, its true pose in metres, and the mask of its visible part."""
+    """One object in a frame: its id, its true pose in metres, the mask of its visible part, and where that stands."""
 
     object_id: int
     T_camera_model: np.ndarray
     mask: Path
+    subject: str
 
 
 @dataclass(frozen=True)
@@ -50,23 +50,42 @@ class Frame:
     colour: Path
     annotations: tuple[Annotation, ...]
 
+    @property
+    def place(self) -> tuple[int, int]:
+        """Scene and image."""
+        return self.scene, self.image
+
     def depth_m(self) -> np.ndarray:
         """Return depth (H, W) in metres, 0 where nothing was measured.
 
         Raises:
-            InputError: missing or unreadable image, colours instead of depth, no measurement at all.
+            InputError: missing or unreadable image, colours instead of depth, 8 bits, negative or infinite depth, no
+                measurement at all.
         """
         depth_H_W = read_image(self.depth, REMEDY)
         if depth_H_W.ndim != 2:
             raise InputError(self.depth, "is a colour image, not depth", REMEDY)
-        if not depth_H_W.any():
+        if depth_H_W.dtype.itemsize == 1:
+            raise InputError(self.depth, "is 8-bit depth: 16 bits expected", "export it anew, without conversion")
+        if (depth_H_W < 0).any() or np.isinf(depth_H_W).any():  # NaN is a usual mark of what was not measured
+            raise InputError(self.depth, "holds negative or infinite depth", "write 0 where nothing was measured")
+        if not (depth_H_W > 0).any():
             raise InputError(self.depth, "holds no depth: every pixel is 0", "leave the image out, or fetch it anew")
         return depth_H_W * np.float32(self.depth_scale / 1000)
 
     def mask(self, annotation: Annotation) -> np.ndarray:
-        """Return the visible part (H, W) of an object as booleans; InputError for a missing or unreadable mask."""
+        """Return the visible part (H, W) of an object as booleans.
+
+        Raises:
+            InputError: missing or unreadable image, or one of many values: a picture, or numbers of objects.
+        """
         mask = read_image(annotation.mask, REMEDY)
-        return (mask if mask.ndim == 2 else mask[..., 0]) > 0
+        mask = mask if mask.ndim == 2 else mask[..., 0]
+        inside = mask > 0
+        # A tenth, because the rim of a small mask that was resized or saved as JPEG has values in between.
+        if inside.any() and 10 * np.unique(mask[inside], return_counts=True)[1].max() < inside.sum():
+            raise InputError(annotation.mask, "is no mask: most of its pixels differ", "write 0 outside, 255 inside")
+        return inside
 
 
 def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
@@ -77,8 +96,8 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
         split: its subfolder begins with this.
 
     Raises:
-        InputError: no scenes, missing or damaged JSON file, an image without camera or depth file, a pose that is no
-            rotation, an object without a mask.
+        InputError: no scenes, missing or damaged JSON file, an image without camera or depth file, a camera or pose
+            that cannot be, an object without a mask, two folders of one scene.
     """
     folders = list(folders)
     found = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
@@ -87,6 +106,13 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
             ", ".join(map(str, folders)), f"holds no {split}*/<scene>/scene_gt.json", "check location, or split"
         )
     frames = [frame for path in found for frame in _frames_of_scene(path.parent)]
+    if not frames:
+        raise InputError(found[0], "names no image", REMEDY)
+    first: dict[tuple[int, int], Frame] = {}
+    for frame in frames:
+        if (same := first.setdefault((frame.scene, frame.image), frame)) is not frame:
+            both = f"{same.depth} and {frame.depth}"
+            raise InputError(both, "are one image of one scene", "set split to the folder that is meant")
     return sorted(frames, key=lambda frame: (frame.scene, frame.image))
 
 
@@ -103,29 +129,39 @@ def back_project(depth_m: np.ndarray, mask: np.ndarray, camera_3_3: np.ndarray) 
     return np.stack([x * z, y * z, z], axis=1), np.stack([u, v], axis=1)
 
 
-def visible_points(
-    frame: Frame, annotation: Annotation, depth_m: np.ndarray, diameter_m: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return an object's measured points (P, 3) and their pixels (P, 2).
-
-    What is farther than a diameter from the points' median cannot be the object: a mask's rim sees what is behind.
+def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what was measured within an object's mask, points (P, 3) and their pixels (P, 2).
 
     Raises:
-        InputError: mask and depth of different sizes, or fewer than `FEWEST_POINTS` points.
+        InputError: mask and depth of different sizes.
+        TooFewPoints: fewer than `FEWEST_POINTS`.
     """
     mask = frame.mask(annotation)
     if mask.shape != depth_m.shape:
         sizes = " but depth is ".join("×".join(map(str, shape[::-1])) for shape in (mask.shape, depth_m.shape))
         raise InputError(annotation.mask, f"is {sizes}", REMEDY)
     points, pixels = back_project(depth_m, mask, frame.camera_3_3)
-    if len(points):
-        near = np.linalg.norm(points - np.median(points, axis=0), axis=1) <= diameter_m
-        points, pixels = points[near], pixels[near]
+    _require_points(points, annotation)
+    return points, pixels
+
+
+def without_background(
+    points: np.ndarray, pixels: np.ndarray, annotation: Annotation, diameter_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return an object's points (P, 3) and their pixels (P, 2); TooFewPoints where fewer than `FEWEST_POINTS` remain.
+
+    What is farther than a diameter from the points' median cannot be the object: a mask's rim sees what is behind.
+    """
+    near = np.linalg.norm(points - np.median(points, axis=0), axis=1) <= diameter_m
+    _require_points(points[near], annotation)
+    return points[near], pixels[near]
+
+
+def _require_points(points: np.ndarray, annotation: Annotation) -> None:
     if len(points) < FEWEST_POINTS:
         raise TooFewPoints(
             annotation.mask, f"has depth at {len(points)} pixel(s)", f"{FEWEST_POINTS} are needed: leave it out"
         )
-    return points, pixels
 
 
 class TooFewPoints(InputError):
@@ -133,52 +169,35 @@ class TooFewPoints(InputError):
 
 
 def _frames_of_scene(folder: Path) -> list[Frame]:
-    cameras, truths = (_by_image(folder / f"scene_{name}.json") for name in ("camera", "gt"))
+    if not re.fullmatch("[0-9]{1,9}", folder.name):
+        raise InputError(folder, "the name of a scene's folder is no number", "name it as the format does, 000001")
+    cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
+    colours = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
     frames = []
     for image, truth in truths.items():
         if image not in cameras:
             raise InputError(folder / "scene_camera.json", f"has no image {image}", REMEDY)
-        try:
-            camera = np.array(cameras[image]["cam_K"], float).reshape(3, 3)
-            scale = float(cameras[image]["depth_scale"])
-        except (KeyError, TypeError, ValueError) as fault:
-            raise InputError(
-                folder / "scene_camera.json", f"image {image} has no proper cam_K and depth_scale", REMEDY
-            ) from fault
+        if not isinstance(truth, list):
+            raise InputError(folder / "scene_gt.json", f"image {image} has no list of objects", REMEDY)
+        camera_3_3, depth_scale = read_camera(cameras[image], f"{folder / 'scene_camera.json'}: image {image}")
         frames.append(
             Frame(
                 scene=int(folder.name),
                 image=image,
-                camera_3_3=camera,
-                depth_scale=scale,
+                camera_3_3=camera_3_3,
+                depth_scale=depth_scale,
                 depth=_image(folder / "depth", f"{image:06d}"),
-                colour=_image(folder / ("rgb" if (folder / "rgb").is_dir() else "gray"), f"{image:06d}"),
+                colour=_image(colours, f"{image:06d}"),
                 annotations=tuple(_annotation(folder, image, n, entry) for n, entry in enumerate(truth)),
             )
         )
     return frames
 
 
-def _annotation(folder: Path, image: int, n: int, entry: dict) -> Annotation:
+def _annotation(folder: Path, image: int, n: int, entry: object) -> Annotation:
     subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
-    try:
-        T_camera_model = np.eye(4)
-        T_camera_model[:3, :3] = np.reshape(entry["cam_R_m2c"], (3, 3))
-        T_camera_model[:3, 3] = np.array(entry["cam_t_m2c"], float) / 1000
-        object_id = int(entry["obj_id"])
-    except (KeyError, TypeError, ValueError) as fault:
-        raise InputError(subject, "has no proper cam_R_m2c, cam_t_m2c and obj_id", REMEDY) from fault
-    require_rotation(T_camera_model, subject)
-    return Annotation(object_id, T_camera_model, _image(folder / "mask_visib", f"{image:06d}_{n:06d}"))
-
-
-def _by_image(path: Path) -> dict[int, dict]:
-    if not path.is_file():
-        raise InputError(path, "no such file", REMEDY)
-    try:
-        return {int(image): entry for image, entry in json.loads(path.read_text(encoding="utf-8")).items()}
-    except (ValueError, AttributeError) as fault:
-        raise InputError(path, "is not a scene's JSON file", REMEDY) from fault
+    object_id, T_camera_model = read_pose(entry, subject)
+    return Annotation(object_id, T_camera_model, _image(folder / "mask_visib", f"{image:06d}_{n:06d}"), subject)
 
 
 def _image(folder: Path, stem: str) -> Path:

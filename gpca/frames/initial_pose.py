@@ -6,20 +6,17 @@ All return ``T_camera_object``, in metres, with the object's frame at the centre
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, random_direction, require_rotation, rotate, transform
+from gpca.alignment.rigid import inverse, random_direction, rotate, transform
 from gpca.errors import InputError
-from gpca.files import read_csv
 from gpca.pairs.perturbation import HalfTurn, Shift
 from gpca.settings import Count, PositiveShare
 
-RESULTS_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
 Form = Literal["results", "true_pose", "global_registration"]
 FORMS = get_args(Form)
 
@@ -134,52 +131,3 @@ class GlobalRegistration:
         thinned = cloud.voxel_down_sample(self._voxel_m)
         search = self._o3d.geometry.KDTreeSearchParamHybrid(radius=5 * self._voxel_m, max_nn=100)
         return thinned, self._o3d.pipelines.registration.compute_fpfh_feature(thinned, search)
-
-
-def read_bop_results(path: str | Path, images: set[tuple[int, int]]) -> dict[tuple[int, int, int], list[np.ndarray]]:
-    """Read a results file of the BOP benchmark, as every method for it exports them.
-
-    Args:
-        images: (scene, image) of the dataset.
-
-    Returns:
-        (scene, image, object id) -> poses ``T_camera_model`` in metres, the highest score first.
-
-    Raises:
-        InputError: missing file or column, R without nine numbers or t without three, R that is no rotation, a number
-            that is none, an image that the dataset does not have.
-    """
-    rows = read_csv(path, RESULTS_COLUMNS)
-    found: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
-    for number, row in enumerate(rows.to_dict("records"), start=2):
-        subject = f"{path}: line {number}"
-        try:
-            key = int(row["scene_id"]), int(row["im_id"]), int(row["obj_id"])
-            score = float(row["score"])
-        except ValueError as fault:
-            raise InputError(subject, "scene_id, im_id, obj_id or score is no number", "export it anew") from fault
-        if key[:2] not in images:
-            raise InputError(subject, f"the dataset has no image {key[1]} of scene {key[0]}", "check results or split")
-        T_camera_model = np.eye(4)
-        T_camera_model[:3, :3] = _entries(subject, "R", row["R"], 9).reshape(3, 3)
-        T_camera_model[:3, 3] = _entries(subject, "t", row["t"], 3) / 1000
-        require_rotation(T_camera_model, subject)
-        found.setdefault(key, []).append((score, T_camera_model))
-    return {key: [T for _, T in sorted(poses, key=lambda pose: -pose[0])] for key, poses in found.items()}
-
-
-def _entries(subject: str, column: str, text: str, count: int) -> np.ndarray:
-    try:
-        numbers = np.array(text.replace(",", " ").split(), float)
-    except ValueError as fault:
-        raise InputError(subject, f"{column} holds something other than numbers", "export it anew") from fault
-    if len(numbers) != count:
-        raise InputError(subject, f"{column} has {len(numbers)} entries, not {count}", "separate them by spaces")
-    return numbers
-
-
-def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.ndarray) -> np.ndarray:
-    """Return the pose whose origin is seen nearest to the mask's centre: which of several equal objects is meant."""
-    centre_2 = pixels_P_2.mean(axis=0)
-    seen = [camera_3_3 @ pose[:3, 3] for pose in poses]
-    return poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - centre_2) for p in seen]))]

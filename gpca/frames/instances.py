@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays
+from gpca.files import MOST_PIXELS, load_arrays, save_arrays
+from gpca.frames.scene_files import require_camera
 from gpca.seeds import generator
 
 MADE_BY = "python -m gpca instances"
@@ -81,10 +83,24 @@ class Instances:
         shapes |= {name: ("I", 4, 4) for name in shapes if name.startswith("T_")}
         shapes |= {"camera_3_3": ("I", 3, 3), "points_m": ("P", 3), "pixels": ("P", 2), "offsets": ("O",)}
         arrays = load_arrays(path, shapes, MADE_BY)
+        remedy = f"make it anew with '{MADE_BY}'"
+        kinds = dict.fromkeys(shapes, "iu") | dict.fromkeys(("camera_3_3", "points_m"), "f")
+        kinds |= {name: "f" for name in shapes if name.startswith("T_")}
+        kinds |= {"dataset": "U", "colour": "U", "symmetric": "b"}
+        for name, kind in kinds.items():
+            if arrays[name].dtype.kind not in kind:
+                raise InputError(path, f"array '{name}' is of type {arrays[name].dtype}", remedy)
         offsets = arrays["offsets"]
         whole = len(offsets) == len(arrays["scene"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays["points_m"])
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
-            raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", f"make it anew with '{MADE_BY}'")
+            raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", remedy)
+        pixels = arrays["pixels"]
+        if pixels.min() < 0 or np.prod(pixels.max(axis=0) + 1.0) > MOST_PIXELS:
+            raise InputError(path, "'pixels' lie outside of any image", remedy)
+        for i in range(len(arrays["scene"])):
+            for name in ("T_camera_object_true", "T_camera_object_init"):
+                require_rigid(arrays[name][i], f"{path}: instance {i}, {name}")
+            require_camera(arrays["camera_3_3"][i], f"{path}: instance {i}, camera_3_3")
         return cls(**{name: arrays[name] for name in shapes})
 
 

@@ -6,14 +6,17 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
-from gpca.frames.bop import Frame, TooFewPoints, read_frames, visible_points
-from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace, nearest_to, read_bop_results
+from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, without_background
+from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
 from gpca.frames.instances import Instances, groups_of_frames
+from gpca.frames.plausibility import Observation, require_plausible, require_usual_form
+from gpca.frames.results_file import Estimates, nearest_to, read_bop_results
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_centre
 from gpca.objects.surface import Surface
@@ -76,6 +79,8 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CentredM
         InputError: an object id without a model, and what :func:`gpca.objects.bop.surfaces` refuses.
     """
     ids = sorted({annotation.object_id for frame in frames for annotation in frame.annotations})
+    if not ids:
+        raise InputError(dataset.name, "its scene_gt.json name no object in any frame", "check split, or fetch it anew")
     folder = dataset.models_folder()
     if unknown := [number for number in ids if not (folder / f"obj_{number:06d}.ply").is_file()]:
         raise InputError(
@@ -109,23 +114,42 @@ def read_instances(
         gap: images of a scene that follow each other within it are one group.
 
     Raises:
-        InputError: what the files hold is faulty, or nothing is left.
+        InputError: what the files hold is faulty, an object was measured elsewhere than its pose says, or nothing is
+            left.
     """
+    with_results = settings.form == "results"
+    if bare := [name for name, (dataset, _, _) in datasets.items() if with_results and dataset.results is None]:
+        raise InputError(f"dataset {bare[0]}", "has no results file", "set results, or another initial pose")
     rows: list[dict] = []
+    left_out: list[str] = []
     first_group = 0
     for dataset, frames, models in datasets.values():
-        places = np.array([(frame.scene, frame.image) for frame in frames])
-        scene_F, image_F = places.T
+        scene_F, image_F = np.array([frame.place for frame in frames]).T
         groups_F = first_group + groups_of_frames(scene_F, image_F, gap)
         first_group = groups_F.max() + 1
-        estimates = _estimates(dataset, places) if settings.form == "results" else {}
-        found = _Objects(dataset.name, objects, models, settings)
+        found = _Objects(dataset, objects, models, settings)
+        seen = []
         for frame, group in progress(list(zip(frames, groups_F, strict=True)), f"frames of {dataset.name}"):
             shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image, "group": group}
             shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.colour)}
-            rows += [shown | row for row in found.in_frame(frame, estimates)]
+            seen += [(frame, shown, n, row) for n, row in found.in_frame(frame, left_out)]
+        require_usual_form([found.observation(frame, n, row["points_m"]) for frame, _, n, row in seen])
+        # Results last: they are measured against poses that fit what was seen.
+        estimates = _estimates(dataset) if with_results else None
+        for frame, shown, n, row in progress(seen, f"initial poses of {dataset.name}"):
+            T_init = found.initial_pose(frame, n, row, estimates)
+            if T_init is None:
+                number = frame.annotations[n].object_id
+                left_out.append(f"{frame.colour}: the results hold no pose of object {number}")
+                continue
+            rows.append(shown | row | {"T_camera_object_init": T_init})
     if not rows:
-        raise InputError(", ".join(datasets), "no object of any frame is left", "check masks, depth and results")
+        reasons = f"; the first: {left_out[0]}" if left_out else ""
+        raise InputError(
+            ", ".join(datasets), f"no object of any frame is left{reasons}", "check masks, depth and results"
+        )
+    for fault in left_out:
+        print(f"left out: {fault}", file=sys.stderr)
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")}
     ragged = {name: np.concatenate([row[name] for row in rows]) for name in ("points_m", "pixels")}
     offsets = np.cumsum([0, *(len(row["points_m"]) for row in rows)], dtype=np.int64)
@@ -136,48 +160,62 @@ class _Objects:
     """The objects of one dataset, ready to be found in frames."""
 
     def __init__(
-        self, name: str, objects: ObjectClouds, models: dict[int, CentredModel], settings: InitialPoseSettings
+        self, dataset: Dataset, objects: ObjectClouds, models: dict[int, CentredModel], settings: InitialPoseSettings
     ):
-        self._name = name
+        self._name = dataset.name
         self._objects = objects
         self._models = models
         self._settings = settings
         self._index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
         self._symmetric = {number: self._is_symmetric(number) for number in models}
+        self._trees = {number: cKDTree(objects.points(index)) for number, index in self._index.items()}
         self._registration: dict[int, GlobalRegistration] = {}
 
-    def in_frame(self, frame: Frame, estimates: Mapping) -> list[dict]:
+    def in_frame(self, frame: Frame, left_out: list[str]) -> list[tuple[int, dict]]:
+        """Return the objects that were measured, by their place among the annotations."""
         depth_m = frame.depth_m()
         rows = []
         for n, annotation in enumerate(frame.annotations):
             number = annotation.object_id
-            diameter_m = float(self._objects.diameters_m[self._index[number]])
             try:
-                points_m, pixels = visible_points(frame, annotation, depth_m, diameter_m)
+                points_m, pixels = measured_points(frame, annotation, depth_m)
+                require_plausible(self.observation(frame, n, points_m))
+                points_m, pixels = without_background(points_m, pixels, annotation, self._diameter_m(number))
             except TooFewPoints as fault:
-                print(f"left out: {fault}", file=sys.stderr)
+                left_out.append(str(fault))
                 continue
             T_true = annotation.T_camera_model @ self._models[number].T_model_object
-            seen = {"T_camera_object_true": T_true, "points_m": points_m.astype(np.float32), "pixels": pixels}
-            seen |= {"object_index": self._index[number], "symmetric": self._symmetric[number]}
-            poses = [T @ self._models[number].T_model_object for T in estimates.get((*_place(frame), number), [])]
-            if self._settings.form == "results" and not poses:
-                print(f"left out: {frame.colour}: the results hold no pose of object {number}", file=sys.stderr)
-                continue
-            axes = (self._name, frame.scene, frame.image, n, "initial pose")
-            T_init = nearest_to(poses, pixels, frame.camera_3_3) if poses else self._found(number, seen, axes)
-            rows.append({**seen, "pixels": pixels.astype(np.int32), "T_camera_object_init": T_init})
+            seen: dict[str, Any] = {"object_index": self._index[number], "symmetric": self._symmetric[number]}
+            seen |= {"T_camera_object_true": T_true, "points_m": points_m.astype(np.float32)}
+            rows.append((n, {**seen, "pixels": pixels.astype(np.int32)}))
         return rows
 
-    def _found(self, number: int, seen: dict, axes: tuple) -> np.ndarray:
-        i = self._index[number]
-        diameter_m = float(self._objects.diameters_m[i])
+    def observation(self, frame: Frame, n: int, points_m: np.ndarray) -> Observation:
+        """Return what is judged of an annotated object."""
+        annotation = frame.annotations[n]
+        number = annotation.object_id
+        T_model_object, tree = self._models[number].T_model_object, self._trees[number]
+        return Observation(
+            annotation.subject, annotation.T_camera_model, T_model_object, tree, self._diameter_m(number), points_m
+        )
+
+    def initial_pose(self, frame: Frame, n: int, row: dict, estimates: Estimates | None) -> np.ndarray | None:
+        """Return ``T_camera_object`` that ICP starts from; None where an estimator found none."""
+        number = frame.annotations[n].object_id
+        if estimates is not None:
+            poses = [T @ self._models[number].T_model_object for T in estimates.get((*frame.place, number), [])]
+            return nearest_to(poses, row["pixels"], frame.camera_3_3) if poses else None
+        axes = (self._name, frame.scene, frame.image, n, "initial pose")
         if self._settings.form == "true_pose":
-            return displace(seen["T_camera_object_true"], diameter_m, self._settings, generator(*axes))
+            return displace(row["T_camera_object_true"], self._diameter_m(number), self._settings, generator(*axes))
         if number not in self._registration:
+            i = self._index[number]
             points_m, normals = self._objects.points(i), self._objects.normals(i)
-            self._registration[number] = GlobalRegistration(points_m, normals, diameter_m, self._settings)
-        return self._registration[number].register(seen["points_m"], seed_of(*axes))
+            self._registration[number] = GlobalRegistration(points_m, normals, self._diameter_m(number), self._settings)
+        return self._registration[number].register(row["points_m"], seed_of(*axes))
+
+    def _diameter_m(self, number: int) -> float:
+        return float(self._objects.diameters_m[self._index[number]])
 
     def _is_symmetric(self, number: int) -> bool:
         listed = self._models[number].listed_symmetries
@@ -187,25 +225,12 @@ class _Objects:
         )
 
 
-def _place(frame: Frame) -> tuple[int, int]:
-    return frame.scene, frame.image
-
-
-def _estimates(dataset: Dataset, places: np.ndarray) -> Mapping:
-    if dataset.results is None:
-        raise InputError(f"dataset {dataset.name}", "has no results file", "set results, or another initial pose")
+def _estimates(dataset: Dataset) -> Estimates:
+    assert dataset.results is not None
     # Against all images, not only the drawn ones: a results file covers the whole dataset.
-    images = {_place(frame) for frame in read_frames(dataset.folders, dataset.split)}
-    return read_bop_results(dataset.results, images | {tuple(place) for place in places.tolist()})
-
-
-def points_on_model(instances: Instances, objects: ObjectClouds) -> np.ndarray:
-    """Return the median distance (I,) in metres from each instance's points to its model under the true pose."""
-    from scipy.spatial import cKDTree
-
-    trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
-    medians = []
-    for i, index in enumerate(instances.object_index):
-        points_m = transform(inverse(instances.T_camera_object_true[i]), instances.cloud_m(i))
-        medians.append(np.median(trees[index].query(points_m)[0]))
-    return np.array(medians)
+    distances_m = {
+        frame.place: [float(np.linalg.norm(annotation.T_camera_model[:3, 3])) for annotation in frame.annotations]
+        for frame in read_frames(dataset.folders, dataset.split)
+    }
+    known = bop.read_models_info(dataset.models_folder() / "models_info.json").keys()
+    return read_bop_results(dataset.results, distances_m, known)

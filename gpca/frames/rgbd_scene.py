@@ -25,6 +25,7 @@ from gpca.settings import Bounds, Count
 DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
 Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in metres
 Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
+DESCRIPTION = "dataset_info.json"
 TABLE_M = 1.2  # edge length of the table
 TABLE_COLOUR = (0.72, 0.65, 0.55)
 
@@ -81,17 +82,28 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     """Write models and frames in the layout of BOP: models/, test/{scene}/ with depth, rgb, mask, mask_visib, poses.
 
     Everything random is named by source, scene and view. The folder appears when it is complete.
+
+    Raises:
+        InputError: the folder is there and holds something other than scenes, or the table is too small.
     """
+    _require_replaceable(Path(folder))
     surfaces = [centre(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
         drawn = {"scenes" if name == "count" else name: value for name, value in asdict(settings).items()}
-        _write_json(partial / "dataset_info.json", {"title": f"{source}, procedural stand-in", **drawn})
+        _write_json(partial / DESCRIPTION, {"title": f"{source}, procedural stand-in", **drawn})
         for scene in progress(range(settings.count), f"scenes of {source}"):
             standing = lay_table(surfaces, settings, source, scene)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
             views = camera_poses(settings, middle_m, source, scene)
             _write_scene(partial / f"test/{scene:06d}", surfaces, standing, views, settings, (source, scene))
+
+
+def _require_replaceable(folder: Path) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise InputError(folder, "is no folder", "give another name")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / DESCRIPTION).is_file():
+        raise InputError(folder, "holds something other than scenes, which would be lost", "give another folder")
 
 
 def lay_table(
@@ -121,7 +133,10 @@ def lay_table(
         ways = (
             distance_m * np.array([np.cos(azimuth), np.sin(azimuth)]) for distance_m in np.arange(0, TABLE_M, 0.005)
         )
-        at = next(way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
+        free = (way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
+        if (at := next(free, None)) is None:
+            fault = f"there is no room for {count} objects {settings.gap_m} m apart"
+            raise InputError("scenes gap_m and objects", fault, "ask for fewer, or nearer ones")
         T_world_object[:2, 3] += at - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2
         outlines.append(translate(outline, *at))
         standing.append(Placed(int(model), T_world_object))

@@ -149,27 +149,22 @@ def write_objects(surfaces: Iterable[Surface], source: str, path: str | Path, n_
     Raises:
         InputError: no object at all, two of one name, or a fault in one of them; nothing is written then.
     """
-    names, clouds = [], []
+    sample_objects(surfaces, source, n_points).save(path, source)
+
+
+def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:
+    """Return the canonical clouds of a source; InputError as :func:`write_objects` raises it."""
+    names, clouds, diameters_m = [], [], []
     for surface in surfaces:
         if surface.name in names:
             raise InputError(f"{source}: object '{surface.name}'", "occurs twice", "give each file its own name")
         points_m, normals, diameter_m = canonical_cloud(surface, source, n_points)
         names.append(surface.name)
-        clouds.append((points_m, normals, diameter_m))
-        print(f"{source}: {surface.name}: {len(points_m)} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)
+        clouds.append((points_m, normals))
+        diameters_m.append(diameter_m)
     if not names:
         raise InputError(source, "the source has no object", "check its location and files")
-    points_m, normals, diameters_m = zip(*clouds, strict=True)
-    save_arrays(
-        path,
-        {
-            "names": np.array(names),
-            "points_m": np.concatenate(points_m),
-            "normals": np.concatenate(normals),
-            "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
-            "diameters_m": np.array(diameters_m, dtype=np.float64),
-        },
-    )
+    return ObjectClouds(tuple(names), np.array(diameters_m, dtype=np.float64), tuple(clouds))
 
 
 @dataclass(frozen=True)
@@ -209,3 +204,19 @@ class ObjectClouds:
     def normals(self, i: int) -> np.ndarray:
         """(P, 3) float32 unit normals."""
         return self.clouds[i][1]
+
+    def save(self, path: str | Path, source: str) -> None:
+        """Write the objects npz, and say on stderr what is in it."""
+        points_m, normals = zip(*self.clouds, strict=True)
+        save_arrays(
+            path,
+            {
+                "names": np.array(self.names),
+                "points_m": np.concatenate(points_m),
+                "normals": np.concatenate(normals),
+                "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
+                "diameters_m": self.diameters_m,
+            },
+        )
+        for name, cloud_m, diameter_m in zip(self.names, points_m, self.diameters_m, strict=True):
+            print(f"{source}: {name}: {len(cloud_m)} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)

@@ -8,6 +8,7 @@ from pathlib import Path
 from gpca.attribution.predictions import write_timings
 from gpca.files import write_csv
 from gpca.frames.instances import Instances
+from gpca.frames.plausibility import require_of_objects
 from gpca.frames.synthesis import FrameSettings, make_frame_registrations
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.synthesis import RegistrationSettings
@@ -37,6 +38,7 @@ def run(options: Namespace) -> None:
     with record_provenance([options.out, options.poses, options.timings], inputs, options.settings, seed=options.seed):
         instances = Instances.load(options.instances)
         objects = ObjectClouds.load(options.objects)
+        require_of_objects(instances, objects, options.instances)
         made = make_frame_registrations(instances, objects, options.source, options.seed, settings)
         registrations, icp_seconds_S, poses = made
         registrations.save(options.out)

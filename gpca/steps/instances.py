@@ -8,9 +8,10 @@ from pathlib import Path
 
 from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
-from gpca.frames.reading import Dataset, points_on_model, read_instances, read_models
+from gpca.frames.plausibility import points_on_model
+from gpca.frames.reading import Dataset, read_instances, read_models
 from gpca.frames.source import frame_files, patterns, resolve_datasets
-from gpca.objects.canonical import ObjectClouds, write_objects
+from gpca.objects.canonical import sample_objects
 from gpca.objects.source import folders
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
@@ -50,9 +51,9 @@ def run(options: Namespace) -> None:
             frames = dataset.frames()
             read[name] = (dataset, frames, read_models(dataset, frames))
         surfaces = (model.surface for _, _, models in read.values() for model in models.values())
-        write_objects(surfaces, options.source, options.objects, options.surface_points)
-        objects = ObjectClouds.load(options.objects)
+        objects = sample_objects(surfaces, options.source, options.surface_points)
         instances = read_instances(read, objects, initial_pose, options.settings.get("gap", 10))
+        objects.save(options.objects, options.source)
         instances.save(options.out)
     for name in datasets:
         medians_m = points_on_model(instances, objects)[instances.dataset == name]

@@ -6,7 +6,15 @@ import pytest
 from PIL import Image
 
 from gpca.errors import InputError
-from gpca.frames.bop import Annotation, Frame, TooFewPoints, back_project, read_frames, visible_points
+from gpca.frames.bop import (
+    Annotation,
+    Frame,
+    TooFewPoints,
+    back_project,
+    measured_points,
+    read_frames,
+    without_background,
+)
 from gpca.frames.reading import Dataset, read_models
 
 from .tiny import read
@@ -38,7 +46,8 @@ def test_what_lies_a_diameter_behind_the_object_is_not_of_it(tmp_path):
     frame = Frame(0, 0, np.array([[100.0, 0, 10], [0, 100, 10], [0, 0, 1]]), 1.0, None, None, ())
     depth_m = np.full((20, 20), 1.0, np.float32)
     depth_m[:, :3] = 1.5  # seen past its edge
-    points, _ = visible_points(frame, Annotation(1, np.eye(4), tmp_path / "mask.png"), depth_m, diameter_m=0.3)
+    annotation = Annotation(1, np.eye(4), tmp_path / "mask.png", "scene_gt.json")
+    points, _ = without_background(*measured_points(frame, annotation, depth_m), annotation, diameter_m=0.3)
     assert len(points) == 20 * 17
     assert points[:, 2].max() == 1.0
 
@@ -70,7 +79,7 @@ def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, dama
     assert len(instances) == len(tiny[0]) - 1
     frame = next(frame for frame in read_frames([damaged]) if (frame.scene, frame.image) == (1, 0))
     with pytest.raises(TooFewPoints, match="000000_000001"):
-        visible_points(frame, frame.annotations[1], frame.depth_m(), 0.2)
+        measured_points(frame, frame.annotations[1], frame.depth_m())
 
 
 FAULTS = {
@@ -87,7 +96,7 @@ FAULTS = {
     ),
     "camera without K": (
         lambda f: edit(f / SCENE / "scene_camera.json", lambda c: c["1"].pop("cam_K")),
-        "image 1 has no proper cam_K",
+        "scene_camera.json: image 1: has no cam_K",
     ),
     "depth of another size": (
         lambda f: save(f / SCENE / "depth/000000.png", np.full((60, 80), 7000, np.uint16)),
@@ -115,7 +124,7 @@ FAULTS = {
     ),
     "eight numbers": (
         lambda f: edit(f / SCENE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0])),
-        "image 0, object 1: has no proper cam_R_m2c",
+        "image 0, object 1: cam_R_m2c has 8 numbers, not 9",
     ),
     "no models": (lambda f: [p.unlink() for p in (f / "models").glob("*.ply")], "holds no models/obj_"),
 }

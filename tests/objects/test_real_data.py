@@ -33,7 +33,8 @@ def test_every_instance_of_the_real_frames_lies_on_its_model(tmp_path):
     from pathlib import Path
 
     from gpca.frames.initial_pose import InitialPoseSettings
-    from gpca.frames.reading import Dataset, points_on_model, read_instances, read_models
+    from gpca.frames.plausibility import points_on_model
+    from gpca.frames.reading import Dataset, read_instances, read_models
 
     read = {}
     for name in ("ycbv", "lm", "lmo"):

@@ -1,0 +1,91 @@
+"""The JSON files of a scene in the layout of the BOP benchmark, held to what a camera and a pose can be.
+
+Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpca.alignment.rigid import require_rotation
+from gpca.errors import InputError
+from gpca.json_file import read_json
+
+REMEDY = "the folder may be half unpacked: unpack the dataset anew"
+# Wide of every depth camera there is; what lies between is for the measured points to say.
+FOCAL_PX = (1.0, 1e6)
+DEPTH_SCALES = (1e-6, 1e6)  # millimetres per unit: from nanometres to kilometres
+FARTHEST_MM = 1e6
+
+
+def read_images(path: Path) -> dict[int, Any]:
+    """Return what scene_camera.json or scene_gt.json holds, by the number of the image.
+
+    Raises:
+        InputError: what :func:`gpca.json_file.read_json` refuses, a key that is no number, two of the same number.
+    """
+    found: dict[int, Any] = {}
+    for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
+        if not re.fullmatch("[0-9]{1,9}", key):
+            raise InputError(path, f"its key {key[:40]!r} is no number of an image", REMEDY)
+        if int(key) in found:
+            raise InputError(path, f"image {int(key)} occurs twice", "keep one of the two")
+        found[int(key)] = entry
+    return found
+
+
+def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
+    """Return K (3, 3) in pixels and the millimetres per unit of depth; InputError where no camera has such."""
+    camera_3_3 = _numbers(entry, "cam_K", 9, subject).reshape(3, 3)
+    require_camera(camera_3_3, f"{subject}: cam_K")
+    (scale,) = _numbers(entry, "depth_scale", 1, subject)
+    if not DEPTH_SCALES[0] <= scale <= DEPTH_SCALES[1]:
+        raise InputError(subject, f"depth_scale is {scale:.6g}", "give the millimetres per unit of the depth images")
+    return camera_3_3, float(scale)
+
+
+def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
+    """Raise an InputError that names `subject` unless K is upper triangular, with focal lengths that can be."""
+    if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
+        raise InputError(subject, "is no matrix of a camera", "give fx s cx, 0 fy cy, 0 0 1, row by row")
+    focal_px = np.diag(camera_3_3)[:2]
+    if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
+        lengths = " and ".join(f"{length:.6g}" for length in focal_px)
+        raise InputError(subject, f"has the focal lengths {lengths} px", "they are positive; check fx and fy")
+    if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
+        raise InputError(subject, "has a skew or principal point beyond any image", "give them in pixels")
+
+
+def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
+    """Return an annotation's object id and ``T_camera_model`` in metres; InputError where it can be no pose."""
+    T_camera_model = np.eye(4)
+    T_camera_model[:3, :3] = _numbers(entry, "cam_R_m2c", 9, subject).reshape(3, 3)
+    translation_mm = _numbers(entry, "cam_t_m2c", 3, subject)
+    if abs(translation_mm).max() > FARTHEST_MM:
+        raise InputError(subject, f"cam_t_m2c is {abs(translation_mm).max():.3g} mm", "no camera sees so far")
+    T_camera_model[:3, 3] = translation_mm / 1000
+    require_rotation(T_camera_model, subject)
+    (object_id,) = _numbers(entry, "obj_id", 1, subject)
+    if object_id < 0 or object_id > 999_999 or object_id != int(object_id):  # files of models have six digits
+        raise InputError(subject, f"obj_id is {object_id:.6g}", "ids are whole numbers of six digits at most")
+    return int(object_id), T_camera_model
+
+
+def _numbers(entry: Any, key: str, count: int, subject: str) -> np.ndarray:
+    """Return the finite numbers of a list, or of a list of rows; one number may stand by itself."""
+    if not isinstance(entry, dict) or key not in entry:
+        raise InputError(subject, f"has no {key}", REMEDY)
+    given = entry[key] if isinstance(entry[key], list) and count > 1 else [entry[key]]
+    flat = [number for row in given for number in (row if isinstance(row, list) and count > 1 else [row])]
+    for number in flat:
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            raise InputError(subject, f"{key} holds {repr(number)[:40]}, which is no number", REMEDY)
+        if not abs(number) < 1e300:  # also NaN, and an integer that no float holds
+            raise InputError(subject, f"{key} holds a number that is not finite", REMEDY)
+    if len(flat) != count:
+        raise InputError(subject, f"{key} has {len(flat)} numbers, not {count}", REMEDY)
+    return np.array(flat, float)

@@ -1,0 +1,224 @@
+"""Depth images and masks that are none, and depth that does not lie where the pose says."""
+
+import shutil
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ..hostile import refusal
+from .damage import DEPTH, MASK, SCENE, TRUTH, edit, instances, save
+
+SHAPE = (120, 160)
+FLAT = np.full(SHAPE, 7000, np.uint16)
+COLOURS = np.random.default_rng(0).integers(1, 255, (*SHAPE, 3), np.uint8)
+
+
+def as_tiff(pixels):
+    """Write a TIFF, which holds what a PNG cannot, in place of the depth image."""
+
+    def write(path):
+        save(path.with_suffix(".tif"), pixels)
+        path.unlink()
+
+    return write
+
+
+def halves(path):
+    path.write_bytes(path.read_bytes()[:-200])
+
+
+def postscript(path):
+    path.write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 160 120\n%%EndComments\nshowpage\n%%EOF\n")
+
+
+def bomb(side):
+    return lambda path: Image.new("L" if side > 2**14 else "I;16", (side, side)).save(path)
+
+
+def flipped(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(bytes(content))
+
+
+IMAGES = {
+    "depth of 8 bits": (DEPTH, lambda p: save(p, (FLAT / 30).astype(np.uint8)), "is 8-bit depth: 16 bits expected"),
+    "depth of 1 bit": (DEPTH, lambda p: save(p, FLAT > 0), "is 8-bit depth: 16 bits expected"),
+    "depth of a palette": (
+        DEPTH, lambda p: Image.fromarray(COLOURS).quantize(16).save(p), "is 8-bit depth: 16 bits expected"
+    ),
+    "depth of colours": (DEPTH, lambda p: save(p, COLOURS), "is a colour image, not depth"),
+    "depth with opacity": (DEPTH, lambda p: Image.new("LA", SHAPE[::-1]).save(p), "is a colour image, not depth"),
+    "depth as JPEG": (DEPTH, lambda p: Image.fromarray(COLOURS[..., 0]).save(p, "JPEG"), "is 8-bit depth"),
+    "no depth anywhere": (DEPTH, lambda p: save(p, 0 * FLAT), "holds no depth: every pixel is 0"),
+    "NaN depth": (DEPTH, as_tiff(np.full(SHAPE, np.nan, np.float32)), "holds no depth: every pixel is 0"),
+    "negative depth": (DEPTH, as_tiff(np.full(SHAPE, -0.7, np.float32)), "holds negative or infinite depth"),
+    "infinite depth": (DEPTH, as_tiff(np.full(SHAPE, np.inf, np.float32)), "holds negative or infinite depth"),
+    "depth cut": (DEPTH, halves, "is truncated or no readable image"),
+    "depth empty": (DEPTH, lambda p: p.write_bytes(b""), "is truncated or no readable image"),
+    "depth a flipped byte": (DEPTH, flipped, "is truncated or no readable image"),
+    "depth a script": (DEPTH, postscript, "is truncated or no readable image"),
+    "depth a GIF": (DEPTH, lambda p: Image.fromarray(COLOURS).save(p, "GIF"), "is truncated or no readable image"),
+    "depth a bomb": (DEPTH, bomb(9000), "too many for a frame"),
+    "depth turned": (DEPTH, lambda p: save(p, FLAT.T), "is 160×120 but depth is 120×160"),
+    "mask small": (MASK, lambda p: save(p, np.full((60, 80), 255, np.uint8)), "is 80×60 but depth is 160×120"),
+    "depth a larger bomb": (DEPTH, bomb(11_000), "too many for a frame"),
+    "mask a bomb": (MASK, bomb(20_000), "too many for a frame"),
+    "mask cut": (MASK, halves, "is truncated or no readable image"),
+    "mask of text": (MASK, lambda p: p.write_text("255"), "is truncated or no readable image"),
+    "mask a picture": (MASK, lambda p: save(p, COLOURS), "is no mask: most of its pixels differ"),
+    "mask of depth": (MASK, lambda p: save(p, np.arange(19200, dtype=np.uint16).reshape(SHAPE)), "is no mask"),
+    "mask everywhere": (MASK, lambda p: save(p, np.full(SHAPE, 255, np.uint8)), "lie", "check its pose, its mask"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_an_image_that_is_none(damaged, name):
+    path, spoil, *words = IMAGES[name]
+    spoil(damaged.parent / path)
+    named = path.name if "turned" not in name and "everywhere" not in name else SCENE.name
+    refusal(instances(), damaged.parent, *([] if "depth" in name else [named]), *words, ";")
+
+
+def test_a_dataset_whose_masks_are_all_empty(damaged):
+    for path in damaged.rglob("mask_visib/*.png"):
+        save(path, np.zeros(SHAPE, np.uint8))
+    refusal(instances(), damaged.parent, "no object of any frame is left; the first:", "has depth at 0 pixel(s)")
+
+
+def of_one(change):
+    """Change the pose of one object in one image."""
+    return lambda folder: edit(folder / TRUTH, lambda truth: change(truth["0"][1]))
+
+
+def of_all(change):
+    """Change the pose of every object."""
+
+    def spoil(folder):
+        for path in folder.rglob("scene_gt.json"):
+            edit(path, lambda truth: [change(entry) for entries in truth.values() for entry in entries])
+
+    return spoil
+
+
+def with_camera(change):
+    """Change every camera."""
+
+    def spoil(folder):
+        for path in folder.rglob("scene_camera.json"):
+            edit(path, lambda cameras: [change(camera) for camera in cameras.values()])
+
+    return spoil
+
+
+def scaled(factor):
+    return lambda entry: entry.update(cam_t_m2c=[factor * value for value in entry["cam_t_m2c"]])
+
+
+def turned(entry):
+    entry["cam_R_m2c"] = np.reshape(entry["cam_R_m2c"], (3, 3)).T.ravel().tolist()
+
+
+def to_opengl(entry):
+    flip = np.diag([1.0, -1, -1])
+    entry["cam_R_m2c"] = (flip @ np.reshape(entry["cam_R_m2c"], (3, 3))).ravel().tolist()
+    entry["cam_t_m2c"] = (flip @ entry["cam_t_m2c"]).tolist()
+
+
+def inverted(entry):
+    R = np.reshape(entry["cam_R_m2c"], (3, 3)).T
+    entry["cam_R_m2c"], entry["cam_t_m2c"] = R.ravel().tolist(), (-R @ entry["cam_t_m2c"]).tolist()
+
+
+def moved(entry):
+    entry["cam_t_m2c"][0] += 200
+
+
+def depth_scale(factor):
+    return lambda camera: camera.update(depth_scale=factor * camera["depth_scale"])
+
+
+def corner(camera):
+    camera["cam_K"][2] = camera["cam_K"][5] = 0
+
+
+def outside(camera):
+    camera["cam_K"][2] = 1000.0
+
+
+def long(camera):
+    camera["cam_K"][0], camera["cam_K"][4] = 1500.0, 1500.0
+
+
+def flip(folder):
+    for path in [*folder.rglob("depth/*.png"), *folder.rglob("mask_visib/*.png")]:
+        save(path, np.asarray(Image.open(path))[:, ::-1])
+
+
+def other_image(folder):
+    shutil.copy(folder / SCENE / "depth/000001.png", folder / DEPTH)
+    for path in (folder / SCENE / "mask_visib").glob("000001_*.png"):
+        shutil.copy(path, path.with_name(path.name.replace("000001_", "000000_")))
+
+
+METRES, CENTIMETRES = "cam_t_m2c in metres? the format wants millimetres", "cam_t_m2c in centimetres?"
+PLACES = {
+    "t in metres": (of_all(scaled(1e-3)), METRES),
+    "one t in metres": (of_one(scaled(1e-3)), METRES),
+    "t in centimetres": (of_all(scaled(0.1)), CENTIMETRES),
+    "one t in micrometres": (of_one(scaled(1e3)), "cam_t_m2c in micrometres?"),
+    "one t of zeros": (of_one(scaled(0)), "check its pose, its mask, cam_K and depth_scale"),
+    "one t mirrored": (of_one(scaled(-1)), ""),
+    "one t beside": (of_one(moved), "check its pose"),
+    "R by columns": (of_all(turned), "cam_R_m2c column by column? the format wants rows"),
+    "OpenGL": (of_all(to_opengl), "OpenGL's camera axes?"),
+    "camera to model": (of_all(inverted), "a pose from camera to model?"),
+    "half the scale": (with_camera(depth_scale(0.5)), "depth_scale? the depth fits where it is 2 times as large"),
+    "twice the scale": (with_camera(depth_scale(2)), "depth_scale? the depth fits where it is 0.5 times as large"),
+    "tenfold scale": (with_camera(depth_scale(10)), "depth_scale? the depth fits where it is 0.1 times as large"),
+    "scale in metres": (with_camera(depth_scale(1e-3)), "depth_scale? the depth fits where it is 1000 times as large"),
+    "no centre": (with_camera(corner), "check its pose, its mask, cam_K"),
+    "centre outside": (with_camera(outside), "check its pose, its mask, cam_K"),
+    "too long a lens": (with_camera(long), "check its pose, its mask, cam_K"),
+    "images mirrored": (flip, "a mirrored image?"),
+    "another image": (other_image, ""),
+}
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_depth_that_lies_elsewhere_than_the_pose(damaged, name):
+    spoil, words = PLACES[name]
+    spoil(damaged.parent)
+    refusal(instances(), damaged.parent, "scene_gt.json: image ", ", object ", "diameters", words)
+
+
+def test_the_dataset_itself_is_none_of_this(scenes, tmp_path):
+    from gpca.__main__ import main
+
+    shutil.copytree(scenes, tmp_path / "tiny")
+    arguments = instances(scenes=str(tmp_path / "tiny"))
+    outputs = {"instances.npz": tmp_path / "instances.npz", "objects.npz": tmp_path / "objects.npz"}
+    assert main([str(outputs.get(argument, argument)) for argument in arguments]) == 0
+    assert all(path.is_file() for path in outputs.values())
+
+
+def test_float_depth_without_measurements_is_read(damaged, tmp_path):
+    from gpca.frames.bop import read_frames
+
+    path = damaged.parent / DEPTH
+    expected = np.asarray(Image.open(path))
+    save(path.with_suffix(".tif"), np.where(expected == 0, np.nan, expected).astype(np.float32))
+    path.unlink()
+    frame = next(frame for frame in read_frames([damaged]) if frame.depth.suffix == ".tif")
+    assert (np.nan_to_num(frame.depth_m()) == expected * np.float32(frame.depth_scale / 1000)).all()
+
+
+def test_a_mask_with_a_soft_rim_is_a_mask(damaged):
+    from gpca.frames.bop import read_frames
+
+    path = damaged.parent / MASK
+    mask = Image.open(path)
+    mask.resize((40, 30), Image.Resampling.BILINEAR).resize(mask.size, Image.Resampling.BILINEAR).save(path)
+    frame = next(frame for frame in read_frames([damaged]) if frame.depth == damaged.parent / DEPTH)
+    assert frame.mask(frame.annotations[1]).any()

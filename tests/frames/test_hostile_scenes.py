@@ -1,0 +1,227 @@
+"""Scenes whose JSON files no camera and no annotator wrote: each is refused by the command line."""
+
+import json
+import math
+import os
+
+import pytest
+
+from ..hostile import refusal
+from .damage import CAMERA, SCENE, TRUTH, edit, instances
+
+NOT_FINITE = "holds a number that is not finite"
+ROTATION = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+
+
+def camera_values(focal_px=150.0, u=79.5, v=59.5, y=150.0, below=0, last=(0, 0, 1)):
+    return [focal_px, 0, u, below, y, v, *last]
+
+
+CAMERAS = {
+    "no focal length": ("cam_K", camera_values(0), "focal lengths 0 and 150 px"),
+    "negative focal length": ("cam_K", camera_values(-150), "focal lengths -150 and 150 px"),
+    "both negative": ("cam_K", camera_values(-150, y=-150), "focal lengths -150 and -150 px"),
+    "tiny focal length": ("cam_K", camera_values(1e-200), "focal lengths 1e-200 and 150 px"),
+    "huge focal length": ("cam_K", camera_values(1e200), "focal lengths 1e+200 and 150 px"),
+    "NaN": ("cam_K", camera_values(math.nan), "NaN is no number"),
+    "infinity": ("cam_K", camera_values(u=-math.inf), "-Infinity is no number"),
+    "an integer without end": ("cam_K", camera_values(10**400), NOT_FINITE),
+    "columns": ("cam_K", [150, 0, 0, 0, 150, 0, 79.5, 59.5, 1], "is no matrix of a camera; give fx s cx"),
+    "homogeneous zero": ("cam_K", camera_values(last=(0, 0, 0)), "is no matrix of a camera"),
+    "rotated": ("cam_K", camera_values(below=3.0), "is no matrix of a camera"),
+    "principal point on the moon": ("cam_K", camera_values(u=1e9), "principal point beyond any image"),
+    "eight numbers": ("cam_K", camera_values()[:8], "cam_K has 8 numbers, not 9"),
+    "ten numbers": ("cam_K", [*camera_values(), 0], "cam_K has 10 numbers, not 9"),
+    "a number for a list": ("cam_K", 150.0, "cam_K has 1 numbers, not 9"),
+    "words": ("cam_K", "150 0 79.5 0 150 59.5 0 0 1", "which is no number"),
+    "numbers as words": ("cam_K", ["150", *camera_values()[1:]], "cam_K holds '150', which is no number"),
+    "booleans": ("cam_K", [*camera_values()[:8], True], "cam_K holds True, which is no number"),
+    "null": ("cam_K", None, "cam_K holds None, which is no number"),
+    "lists in lists": ("cam_K", [[[150]], *camera_values()[1:]], "which is no number"),
+    "a map": ("cam_K", {"fx": 150}, "which is no number"),
+    "scale zero": ("depth_scale", 0, "depth_scale is 0"),
+    "scale negative": ("depth_scale", -0.1, "depth_scale is -0.1"),
+    "scale NaN": ("depth_scale", math.nan, "NaN is no number"),
+    "scale infinite": ("depth_scale", math.inf, "Infinity is no number"),
+    "scale huge": ("depth_scale", 1e30, "depth_scale is 1e+30"),
+    "scale a word": ("depth_scale", "0.1", "depth_scale holds '0.1', which is no number"),
+    "scale true": ("depth_scale", True, "depth_scale holds True, which is no number"),
+    "scale a list": ("depth_scale", [0.1], "depth_scale holds [0.1], which is no number"),
+}
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_camera_that_cannot_be(damaged, name):
+    key, value, words = CAMERAS[name]
+    edit(damaged.parent / CAMERA, lambda cameras: cameras["0"].update({key: value}))
+    refusal(instances(), damaged.parent, f"{CAMERA}", words)
+
+
+POSES = {
+    "R of NaN": ("cam_R_m2c", [math.nan] * 9, "NaN is no number"),
+    "R of zeros": ("cam_R_m2c", [0] * 9, "not at right angles, or not of length 1"),
+    "R of huge numbers": ("cam_R_m2c", [1e200] * 9, "not at right angles, or not of length 1"),
+    "R scaled": ("cam_R_m2c", [1.01, 0, 0, 0, 1.01, 0, 0, 0, 1.01], "not at right angles, or not of length 1"),
+    "R sheared": ("cam_R_m2c", [1, 0.1, 0, 0, 1, 0, 0, 0, 1], "not at right angles"),
+    "R mirrored": ("cam_R_m2c", [-1, 0, 0, 0, 1, 0, 0, 0, 1], "it is mirrored, of determinant -1"),
+    "R a quaternion": ("cam_R_m2c", [0, 0, 0, 1], "cam_R_m2c has 4 numbers, not 9"),
+    "R of words": ("cam_R_m2c", ["x"] * 9, "cam_R_m2c holds 'x', which is no number"),
+    "R of booleans": ("cam_R_m2c", [True, *ROTATION[1:]], "cam_R_m2c holds True"),
+    "t of NaN": ("cam_t_m2c", [0, 0, math.nan], "NaN is no number"),
+    "t beyond floats": ("cam_t_m2c", [0, 0, 10**400], NOT_FINITE),
+    "t beyond sight": ("cam_t_m2c", [0, 0, 1e12], "cam_t_m2c is 1e+12 mm"),
+    "t of two": ("cam_t_m2c", [0, 700], "cam_t_m2c has 2 numbers, not 3"),
+    "t homogeneous": ("cam_t_m2c", [0, 0, 700, 1], "cam_t_m2c has 4 numbers, not 3"),
+    "t null": ("cam_t_m2c", None, "cam_t_m2c holds None"),
+    "id negative": ("obj_id", -1, "obj_id is -1"),
+    "id a fraction": ("obj_id", 1.5, "obj_id is 1.5"),
+    "id huge": ("obj_id", 10**30, "obj_id is 1e+30"),
+    "id true": ("obj_id", True, "obj_id holds True"),
+    "id a name": ("obj_id", "brick", "obj_id holds 'brick'"),
+    "id a way out": ("obj_id", "../../1", "obj_id holds '../../1'"),
+}
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_an_annotation_that_cannot_be(damaged, name):
+    key, value, words = POSES[name]
+    edit(damaged.parent / TRUTH, lambda truth: truth["0"][1].update({key: value}))
+    where = (str(TRUTH),) if "NaN" in words else (f"{TRUTH}: image 0, object 1:",)
+    refusal(instances(), damaged.parent, *where, words)
+
+
+def test_an_object_without_a_model(damaged):
+    edit(damaged.parent / TRUTH, lambda truth: truth["0"][1].update(obj_id=77))
+    refusal(instances(), damaged.parent, "object 77", "there is no model of it", "fetch the models anew")
+
+
+TRUTHS = {
+    "a list": ("[]", "holds no object at the top"),
+    "a number": ("1", "holds no object at the top"),
+    "nothing": ("", "is not a scene's JSON file"),
+    "half": ('{"0": [{"obj_id": 1', "is not a scene's JSON file"),
+    "no UTF-8": (b'{"\xff": []}', "is not a scene's JSON file ('utf-8' codec"),
+    "UTF-16": ('{"0": []}'.encode("utf-16"), "is not a scene's JSON file"),
+    "deep lists": ('{"0": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
+    "deep maps": ('{"0": ' * 100_000 + "1" + "}" * 100_000, "nested too deep"),
+    "many digits": ('{"0": ' + "9" * 5000 + "}", "is not a scene's JSON file"),
+    "an image twice": ('{"0": [], "0": []}', "key '0' occurs twice"),
+    "an image twice in other words": ('{"0": [], "00": []}', "image 0 occurs twice"),
+    "a negative image": ('{"-1": []}', "its key '-1' is no number of an image"),
+    "an image with an underline": ('{"1_0": []}', "its key '1_0' is no number"),
+    "an image in other digits": ('{"١": []}', "is no number of an image"),
+    "a path for an image": ('{"../0": []}', "its key '../0' is no number"),
+    "a map of objects": ('{"0": {"1": 2}}', "image 0 has no list of objects"),
+    "null": ('{"0": null}', "image 0 has no list of objects"),
+    "a word for an object": ('{"0": ["obj_id"]}', "image 0, object 0: has no cam_R_m2c"),
+    "an object of nothing": ('{"0": [{}]}', "image 0, object 0: has no cam_R_m2c"),
+    "an image that is not there": ('{"7": []}', "has no image 7"),
+    "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' occurs twice"),
+}
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+def test_a_file_of_poses_that_is_none(damaged, name):
+    content, words = TRUTHS[name]
+    (damaged.parent / TRUTH).write_bytes(content if isinstance(content, bytes) else content.encode())
+    refusal(instances(), damaged.parent, str(SCENE), words)
+
+
+def test_a_file_of_poses_too_large_to_be_one(damaged):
+    with (damaged.parent / TRUTH).open("r+b") as file:
+        file.truncate(2**33)
+    refusal(instances(), damaged.parent, str(TRUTH), "is 8192 MB, too large")
+
+
+def as_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+def as_pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+def as_loop(path):
+    path.unlink()
+    path.symlink_to(path.name)
+
+
+def as_dead_link(path):
+    path.unlink()
+    path.symlink_to("nowhere")
+
+
+@pytest.mark.parametrize("spoil", [as_folder, as_pipe, as_loop, as_dead_link])
+@pytest.mark.parametrize("name", ["scene_camera.json", "depth/000000.png", "mask_visib/000000_000000.png"])
+def test_something_else_in_place_of_a_file(damaged, name, spoil):
+    spoil(damaged.parent / SCENE / name)
+    refusal(instances(), damaged.parent, f"{SCENE / name}: no such")
+
+
+def empty(folder):
+    for path in folder.rglob("scene_gt.json"):
+        path.write_text("{}")
+
+
+def without_objects(folder):
+    for path in folder.rglob("scene_gt.json"):
+        edit(path, lambda truth: truth.update({image: [] for image in truth}))
+
+
+def named(folder):
+    (folder / "test/000001").rename(folder / "test/first")
+
+
+def twice(folder):
+    (folder / "test_other").mkdir()
+    (folder / "test/000001").rename(folder / "test_other/000000")
+
+
+FOLDERS = {
+    "scenes without images": (empty, "names no image"),
+    "images without objects": (without_objects, "name no object in any frame"),
+    "a scene with a name": (named, "test/first: the name of a scene's folder is no number"),
+    "a scene in two folders": (twice, "are one image of one scene; set split"),
+    "no scenes": (lambda folder: (folder / "test").rename(folder / "train"), "holds no test*/<scene>/scene_gt.json"),
+}
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_folder_that_is_no_dataset(damaged, name):
+    spoil, words = FOLDERS[name]
+    spoil(damaged)
+    refusal(instances(), damaged.parent, words, ";")
+
+
+@pytest.mark.parametrize("location", ["nowhere", "tiny/models/models_info.json", "tiny/models"])
+def test_a_location_without_scenes(damaged, location):
+    refusal(instances(scenes=location), damaged.parent, f"{location}: holds no test*/<scene>/scene_gt.json")
+
+
+def test_what_a_real_dataset_may_have_is_no_fault(scenes, tmp_path):
+    import shutil
+
+    from .tiny import read
+
+    shutil.copytree(scenes, tmp_path / "tiny")
+    expected, _ = read(scenes, tmp_path / "objects.npz")
+
+    def change_cameras(cameras):
+        for camera in cameras.values():
+            camera["cam_K"] = [camera["cam_K"][row : row + 3] for row in (0, 3, 6)]
+            camera["elev"] = "unknown keys"
+
+    def change_poses(truth):
+        for entries in truth.values():
+            for entry in entries:
+                entry["obj_id"] = float(entry["obj_id"])
+
+    edit(tmp_path / CAMERA, change_cameras)
+    edit(tmp_path / TRUTH, change_poses)
+    (tmp_path / CAMERA).rename(tmp_path / "camera.json")
+    (tmp_path / CAMERA).symlink_to(tmp_path / "camera.json")
+    (tmp_path / SCENE / "scene_gt_info.json").write_text(json.dumps(None))
+    found, _ = read(tmp_path / "tiny", tmp_path / "objects.npz")
+    assert (found.points_m == expected.points_m).all()
