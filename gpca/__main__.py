@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 import ctypes
 import json
 import os
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
 
 from gpca import __version__
+from gpca.arguments import THREADS, OneLineParser
 from gpca.errors import InputError
 
 STEPS = {
@@ -39,14 +38,6 @@ STEPS = {
 }
 
 
-class OneLineParser(argparse.ArgumentParser):
-    """A parser whose errors are one line, as every other refusal of the suite."""
-
-    def error(self, message: str) -> NoReturn:
-        """End with status 2 and one line that names the command, the fault and the help."""
-        self.exit(2, f"{self.prog}: {' '.join(message.split())}; '{self.prog} --help' lists what it takes\n")
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run one step; a user's mistake ends as one line on stderr and status 2, Ctrl-C as status 130.
 
@@ -71,13 +62,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(arguments: list[str], chosen: str | None) -> int:
-    command = "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
-    parser = OneLineParser(prog=command, description="The steps of the workflow, each usable by hand.")
+    parser = OneLineParser(prog=_command(), description="The steps of the workflow, each usable by hand.")
     parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
     for name, summary in STEPS.items():
         step = steps.add_parser(name, help=summary, description=summary)
-        step.add_argument("--threads", type=int, default=1, help="threads of torch, numba and OpenMP (default 1)")
+        step.add_argument("--threads", type=THREADS, default=1, help="threads of torch, numba and OpenMP (default 1)")
         step.add_argument("--settings", default="{}", help="JSON: the step's section of the config")
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
@@ -90,11 +80,16 @@ def _run(arguments: list[str], chosen: str | None) -> int:
     return options.run(options) or 0
 
 
+def _command() -> str:
+    """Return the command as the user called it."""
+    return "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
+
+
 def _set_threads(arguments: list[str]) -> None:
     """Pin every library's threads before any of them is loaded: Open3D and torch otherwise fight over the cores."""
-    early = argparse.ArgumentParser(add_help=False)
-    early.add_argument("--threads", type=int, default=1)
-    threads = str(max(1, early.parse_known_args(arguments)[0].threads))
+    early = OneLineParser(prog=_command(), add_help=False)
+    early.add_argument("--threads", type=THREADS, default=1)
+    threads = str(early.parse_known_args(arguments)[0].threads)
     for variable in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ[variable] = threads
 
