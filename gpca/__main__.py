@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import json
 import os
 import sys
 from importlib import import_module
@@ -34,6 +33,7 @@ STEPS = {
     "model": "encoder and embeddings -> one file with all that an explanation needs",
     "explain": "two files of points -> why their registration is uncertain, and what to do",
     "runtime": "model, registrations and embeddings -> seconds of every stage",
+    "check-config": "configs -> whether a run can use them",
     "check-reference": "folder of a run -> whether its numbers agree with the reference's",
 }
 
@@ -104,12 +104,12 @@ def _keep_freed_memory() -> None:
 
 
 def _mapping(text: str) -> dict:
-    try:
-        settings = json.loads(text)
-    except json.JSONDecodeError as fault:
-        raise InputError("--settings", f"not JSON: {fault}", "give a JSON object") from fault
+    from gpca.structured_text import parse_json, require_plain
+
+    settings = parse_json(text, "--settings")
     if not isinstance(settings, dict):
         raise InputError("--settings", "not a JSON object", 'give one, such as {"draw_points": 512}')
+    require_plain(settings, "--settings")
     return settings
 
 
