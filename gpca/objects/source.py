@@ -137,7 +137,7 @@ def _unpacked(file: Path) -> Path:
 
 def _found(entry: dict, data_dir: str | None) -> Path | None:
     location, patterns = entry.get("location"), entry.get("files")
-    folder = require_place(Path(data_dir or "", location or ""))
+    folder = require_place(Path(data_dir or "", require_place(location or "")))
     for pattern in patterns or ():
         _require_pattern(pattern)
     if (data_dir is None and not folder.is_absolute()) or not (location or patterns) or not folder.exists():
