@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 from gpca import __version__
 from gpca.arguments import THREADS, OneLineParser
 from gpca.errors import InputError
+from gpca.standard_streams import standard_streams
 
 STEPS = {
     "objects": "meshes or clouds of a source -> canonical clouds",
@@ -46,9 +48,13 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
     try:
-        return _run(arguments, chosen)
+        with standard_streams():
+            return _run(arguments, chosen)
     except (InputError, OSError) as fault:
-        print(f"gpca {chosen}: {fault}", file=sys.stderr)
+        _say(f"gpca {chosen}: {fault}")
+        return 2
+    except MemoryError:
+        _say(f"gpca {chosen}: this machine has no memory left for it; take smaller settings or another machine")
         return 2
     except (KeyboardInterrupt, SystemError) as fault:
         # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead, or several in a row.
@@ -59,6 +65,11 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
         return 130
+
+
+def _say(line: str) -> None:
+    with contextlib.suppress(OSError):  # where stderr's disk is full, the status has to do
+        print(line, file=sys.stderr)
 
 
 def _run(arguments: list[str], chosen: str | None) -> int:

@@ -21,6 +21,7 @@ from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.files import require_outputs
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
@@ -49,6 +50,8 @@ def run(options: Namespace) -> None:
     """Ask, write, retrain, until the questions, the answers or the samples are used up."""
     torch.set_num_threads(options.threads)
     check_settings(options.settings, "explainers", "gpca")
+    read = [options.registrations, options.embeddings, *([options.answers] if options.answers else [])]
+    require_outputs([path for path in (options.labels, options.picture, options.predictions) if path], read)
     registrations, h_S_d = _load(options)
     keys = list(zip(registrations.split.tolist(), registrations.sample.tolist(), strict=True))
     start = _start(registrations, keys, options)
