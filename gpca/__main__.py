@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import os
 import sys
@@ -12,7 +11,7 @@ from pathlib import Path
 from gpca import __version__
 from gpca.arguments import THREADS, OneLineParser
 from gpca.errors import InputError
-from gpca.standard_streams import standard_streams
+from gpca.standard_streams import say, standard_streams
 
 STEPS = {
     "objects": "meshes or clouds of a source -> canonical clouds",
@@ -51,10 +50,10 @@ def main(arguments: list[str] | None = None) -> int:
         with standard_streams():
             return _run(arguments, chosen)
     except (InputError, OSError) as fault:
-        _say(f"gpca {chosen}: {fault}")
+        say(f"gpca {chosen}: {fault}")
         return 2
     except MemoryError:
-        _say(f"gpca {chosen}: this machine has no memory left for it; take smaller settings or another machine")
+        say(f"gpca {chosen}: this machine has no memory left for it; take smaller settings or another machine")
         return 2
     except (KeyboardInterrupt, SystemError) as fault:
         # Where Ctrl-C falls into a compiled function, numba raises a SystemError instead, or several in a row.
@@ -65,11 +64,6 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
         return 130
-
-
-def _say(line: str) -> None:
-    with contextlib.suppress(OSError):  # where stderr's disk is full, the status has to do
-        print(line, file=sys.stderr)
 
 
 def _run(arguments: list[str], chosen: str | None) -> int:

@@ -38,6 +38,8 @@ def _writable(folder: Path) -> bool:
 
 _set_cache_folder()  # numba reads the variable when it is imported
 
-from numba import njit, prange  # noqa: E402
+from numba import config, njit, prange  # noqa: E402
+
+config.CACHE_DIR = os.environ.get(VARIABLE, "")  # where it was imported before
 
 __all__ = ["njit", "prange"]

@@ -49,9 +49,9 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
         InputError: two outputs, or an output and an input, are the same file; an output is a folder where it should be
             a file, lies below something that is no folder, or in a folder that may not be written to.
     """
-    taken = {Path(path).resolve() for path in inputs}
+    taken = {Path(os.path.realpath(path)) for path in inputs}
     for output in map(Path, outputs):
-        if (place := output.resolve()) in taken:
+        if (place := Path(os.path.realpath(output))) in taken:
             raise InputError(output, "is an input, or another output, too", "give each file a name of its own")
         taken.add(place)
         if place.exists() and not (place.is_dir() if folders else place.is_file()):  # a device would be replaced
@@ -59,7 +59,8 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
         existing = next(folder for folder in place.parents if folder.exists())
         if not existing.is_dir():
             raise InputError(output, f"cannot be written: {existing} is no folder", "give another name")
-        if not os.access(existing, os.W_OK | os.X_OK):
+        # Root may write to /proc, as far as permissions tell.
+        if not os.access(existing, os.W_OK | os.X_OK) or existing.is_relative_to("/proc"):
             raise InputError(output, f"cannot be written: {existing} may not be written to", "give another folder")
 
 

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TextIO
 
 from gpca.errors import InputError
 
@@ -32,6 +33,18 @@ def standard_streams() -> Iterator[None]:
         try:
             sys.stdout.flush()
         except OSError as fault:
-            # Python flushes once more when it ends, and would complain in words of its own.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            _discard(sys.stdout)
             raise InputError("stdout", f"cannot be written ({fault.strerror})", "redirect it to a file") from fault
+
+
+def say(line: str) -> None:
+    """Print a line to stderr; where that cannot be written, the status of the process has to do."""
+    try:
+        print(line, file=sys.stderr, flush=True)
+    except OSError:
+        _discard(sys.stderr)
+
+
+def _discard(stream: TextIO) -> None:
+    """Let go what a stream still holds: Python flushes once more when it ends, and would complain in its own words."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -22,7 +22,7 @@ def run(options: Namespace) -> None:
     """Lay the tables, look at them and write what was seen."""
     check_settings(options.settings, "real_world", "scenes")
     # It is replaced as a whole, so it has to be one that this step has written.
-    provenance = options.out.with_name(f"{options.out.resolve().name}.provenance.json")
+    provenance = Path(f"{options.out.absolute()}.provenance.json")
     if options.out.is_dir() and any(options.out.iterdir()) and not provenance.is_file():
         raise InputError(options.out, "is a folder that this step did not make", "name another, or empty it")
     settings = SceneSettings.from_dict(options.settings)
