@@ -56,7 +56,7 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
         taken.add(place)
         if place.exists() and not (place.is_dir() if folders else place.is_file()):  # a device would be replaced
             raise InputError(output, f"is there and no {'folder' if folders else 'file'}", "give another name")
-        existing = next(folder for folder in place.parents if folder.exists())
+        existing = next(folder for folder in place.parents if os.path.lexists(folder))
         if not existing.is_dir():
             raise InputError(output, f"cannot be written: {existing} is no folder", "give another name")
         # Root may write to /proc, as far as permissions tell.
