@@ -40,6 +40,6 @@ _set_cache_folder()  # numba reads the variable when it is imported
 
 from numba import config, njit, prange  # noqa: E402
 
-config.CACHE_DIR = os.environ.get(VARIABLE, "")  # where it was imported before
+setattr(config, "CACHE_DIR", os.environ.get(VARIABLE, ""))  # noqa: B010 - numba declares it at run time; where it was imported before
 
 __all__ = ["njit", "prange"]

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from functools import cache
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import yaml
 
@@ -83,9 +83,9 @@ def require_arguments(subject: str, function: Callable, given: int, settings: Ma
     except TypeError as fault:
         raise InputError(subject, str(fault), "correct its settings") from fault
     for name, value in settings.items():
-        parameter = bound.signature.parameters.get(name)
-        kind = {int: "integer", float: "number"}.get(type(parameter.default)) if parameter else None
-        if kind and parameter.default >= 0:
+        default: Any = getattr(bound.signature.parameters.get(name), "default", None)
+        kind = {int: "integer", float: "number"}.get(type(default))
+        if kind and default >= 0:
             schema = {"properties": {name: {"type": kind, "minimum": 0, "maximum": LARGEST[kind]}}}
             require_valid({name: value}, schema, f"{subject}: setting")
 

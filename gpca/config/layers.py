@@ -45,6 +45,6 @@ def _laid_over(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, 
     whole = dict(lower)
     for key, value in upper.items():
         below = whole.get(key)
-        both = isinstance(value, Mapping) and isinstance(below, Mapping)
-        whole[key] = _laid_over(below, value) if both else value
+        merged = isinstance(value, Mapping) and isinstance(below, Mapping)
+        whole[key] = _laid_over(below or {}, value) if merged else value
     return whole
