@@ -5,18 +5,21 @@ import sys
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
 from gpca.config.jobs import export_to_jobs
+from gpca.config.layers import DEFAULTS, require_sound
 from gpca.config.restart import clear_leftovers
-from gpca.errors import InputError
+from gpca.errors import one_line
+
+given, module = workflow.config_settings, workflow.modifier
+with one_line():
+    require_sound(given.configfiles if module.is_main_snakefile() else [])
 
 
-configfile: f"{workflow.current_basedir}/config/sources.yaml"
-configfile: f"{workflow.current_basedir}/config/config.yaml"
+configfile: DEFAULTS[0]
+configfile: DEFAULTS[1]
 
 
-try:
-    config, SOURCES = read(config, workflow.config_settings.config)
-except InputError as fault:
-    sys.exit(f"gpca: {fault}")
+with one_line():
+    config, SOURCES = read(config, given.config, module.skip_configfile)
 export_to_jobs(config)
 temporary = workflow.snakemake_tmp_dir, workflow.sourcecache.runtime_cache_path
 clear_leftovers(temporary, workflow.is_main_process)

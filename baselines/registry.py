@@ -5,11 +5,11 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Mapping
 from importlib import import_module
-from inspect import signature
 
 import baselines
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
+from gpca.settings import require_arguments
 
 
 def explainers() -> dict[str, ExplainerEntry]:
@@ -26,11 +26,8 @@ def explainer_entry(name: str) -> ExplainerEntry:
 
 
 def require_settings(name: str, settings: Mapping[str, object]) -> None:
-    """Raise an InputError unless the explainer is known and takes settings of these names."""
-    try:
-        signature(explainer_entry(name).make).bind("source", 0, **settings)
-    except TypeError as fault:
-        raise InputError(f"explainer '{name}'", str(fault), "correct its settings") from fault
+    """Raise an InputError unless the explainer is known and takes these settings."""
+    require_arguments(f"explainer '{name}'", explainer_entry(name).make, 2, settings)
 
 
 def explainer_module(name: str) -> str:

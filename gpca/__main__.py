@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 import ctypes
-import json
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
 
 from gpca import __version__
+from gpca.arguments import THREADS, OneLineParser
 from gpca.errors import InputError
 from gpca.interrupts import certain_interrupts
 from gpca.processor import prepare
+from gpca.standard_streams import say, standard_streams
 
 STEPS = {
     "objects": "meshes or clouds of a source -> canonical clouds",
@@ -36,16 +35,9 @@ STEPS = {
     "model": "encoder and embeddings -> one file with all that an explanation needs",
     "explain": "two files of points -> why their registration is uncertain, and what to do",
     "runtime": "model, registrations and embeddings -> seconds of every stage",
+    "check-config": "configs -> whether a run can use them",
     "check-reference": "folder of a run -> whether its numbers agree with the reference's",
 }
-
-
-class OneLineParser(argparse.ArgumentParser):
-    """A parser whose errors are one line, as every other refusal of the suite."""
-
-    def error(self, message: str) -> NoReturn:
-        """End with status 2 and one line that names the command, the fault and the help."""
-        self.exit(2, f"{self.prog}: {' '.join(message.split())}; '{self.prog} --help' lists what it takes\n")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -56,10 +48,13 @@ def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     chosen = next((argument for argument in arguments if not argument.startswith("-")), None)
     try:
-        with certain_interrupts():
+        with certain_interrupts(), standard_streams():
             return _run(arguments, chosen)
     except (InputError, OSError) as fault:
-        print(f"gpca {chosen}: {fault}", file=sys.stderr)
+        say(f"gpca {chosen}: {fault}")
+        return 2
+    except MemoryError:
+        say(f"gpca {chosen}: this machine has no memory left for it; take smaller settings or another machine")
         return 2
     except KeyboardInterrupt:
         print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
@@ -67,13 +62,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(arguments: list[str], chosen: str | None) -> int:
-    command = "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
-    parser = OneLineParser(prog=command, description="The steps of the workflow, each usable by hand.")
+    parser = OneLineParser(prog=_command(), description="The steps of the workflow, each usable by hand.")
     parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
     for name, summary in STEPS.items():
         step = steps.add_parser(name, help=summary, description=summary)
-        step.add_argument("--threads", type=int, default=1, help="threads of torch, numba and OpenMP (default 1)")
+        step.add_argument("--threads", type=THREADS, default=1, help="threads of torch, numba and OpenMP (default 1)")
         step.add_argument("--settings", default="{}", help="JSON: the step's section of the config")
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
@@ -86,11 +80,16 @@ def _run(arguments: list[str], chosen: str | None) -> int:
     return options.run(options) or 0
 
 
+def _command() -> str:
+    """Return the command as the user called it."""
+    return "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
+
+
 def _set_threads(arguments: list[str]) -> None:
     """Pin every library's threads and instructions before any of them is loaded."""
-    early = argparse.ArgumentParser(add_help=False)
-    early.add_argument("--threads", type=int, default=1)
-    prepare(max(1, early.parse_known_args(arguments)[0].threads))
+    early = OneLineParser(prog=_command(), add_help=False)
+    early.add_argument("--threads", type=THREADS, default=1)
+    prepare(early.parse_known_args(arguments)[0].threads)
 
 
 def _keep_freed_memory() -> None:
@@ -103,12 +102,16 @@ def _keep_freed_memory() -> None:
 
 
 def _mapping(text: str) -> dict:
+    from gpca.json_file import parse_json
+    from gpca.structured_text import require_plain
+
     try:
-        settings = json.loads(text)
-    except json.JSONDecodeError as fault:
+        settings = parse_json(text)
+    except ValueError as fault:
         raise InputError("--settings", f"not JSON: {fault}", "give a JSON object") from fault
     if not isinstance(settings, dict):
         raise InputError("--settings", "not a JSON object", 'give one, such as {"draw_points": 512}')
+    require_plain(settings, "--settings")
     return settings
 
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class InputError(ValueError):
     """A fault in something the user gave: a file, a folder, a setting, a name.
@@ -13,3 +17,12 @@ class InputError(ValueError):
     def __init__(self, subject: object, fault: str, remedy: str = "") -> None:
         line = f"{subject}: {fault}" + (f"; {remedy}" if remedy else "")
         super().__init__(" ".join(line.split()))
+
+
+@contextmanager
+def one_line() -> Iterator[None]:
+    """End the process with one line where the user gave something faulty, or where a file cannot be used."""
+    try:
+        yield
+    except (InputError, OSError) as fault:
+        sys.exit(f"gpca: {fault}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 import warnings
 import zipfile
@@ -39,6 +40,33 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] = (), folders: bool = False) -> None:
+    """Check, before the work, that files can be written when it is done, and that none of them is what it starts from.
+
+    Args:
+        outputs: of the work; a folder that is missing on the way to one of them is made by whoever writes it.
+        inputs: of the work.
+        folders: the outputs are folders.
+
+    Raises:
+        InputError: two outputs, or an output and an input, are the same file; an output is a folder where it should be
+            a file, lies below something that is no folder, or in a folder that may not be written to.
+    """
+    taken = {Path(os.path.realpath(path)) for path in inputs}
+    for output in map(Path, outputs):
+        if (place := Path(os.path.realpath(output))) in taken:
+            raise InputError(output, "is an input, or another output, too", "give each file a name of its own")
+        taken.add(place)
+        if place.exists() and not (place.is_dir() if folders else place.is_file()):  # a device would be replaced
+            raise InputError(output, f"is there and no {'folder' if folders else 'file'}", "give another name")
+        existing = next(folder for folder in place.parents if os.path.lexists(folder))
+        if not existing.is_dir():
+            raise InputError(output, f"cannot be written: {existing} is no folder", "give another name")
+        # Root may write to /proc, as far as permissions tell.
+        if not os.access(existing, os.W_OK | os.X_OK) or existing.is_relative_to("/proc"):
+            raise InputError(output, f"cannot be written: {existing} may not be written to", "give another folder")
 
 
 @contextmanager

@@ -17,7 +17,7 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from gpca.files import sha256_of_file, whole_file
+from gpca.files import require_outputs, sha256_of_file, whole_file
 from gpca.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
@@ -27,7 +27,11 @@ _ROOT = Path(__file__).resolve().parent.parent  # of the checkout, or the site-p
 
 @contextmanager
 def record_provenance(
-    outputs: Sequence[Path | str], inputs: Sequence[Path | str], settings: Mapping, seed: int | None = None
+    outputs: Sequence[Path | str],
+    inputs: Sequence[Path | str],
+    settings: Mapping,
+    seed: int | None = None,
+    folders: bool = False,
 ) -> Iterator[None]:
     """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.
 
@@ -38,7 +42,12 @@ def record_provenance(
         outputs, inputs: files; the inputs are hashed (SHA-256).
         settings: what the result depends on besides its inputs.
         seed: the repeat, if there is one.
+        folders: the outputs are folders.
+
+    Raises:
+        InputError: before the block, for an output that cannot be written: :func:`gpca.files.require_outputs`.
     """
+    require_outputs(outputs, inputs, folders)
     started = time.perf_counter()
     yield
     record = {

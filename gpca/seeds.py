@@ -11,10 +11,10 @@ def seed_of(*axes: object) -> int:
     """Return a 63-bit seed for the named axes, e.g. ``seed_of("ycb", 3, "registration", 17)``.
 
     The axes are joined in order with a separator that cannot occur in a name, and hashed (SHA-256);
-    the same axes give the same seed on every platform.
+    the same axes give the same seed on every platform, the name of a file in every locale.
     """
     text = "\x1f".join(str(axis) for axis in axes)
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 1
+    return int.from_bytes(hashlib.sha256(text.encode(errors="surrogateescape")).digest()[:8], "big") >> 1
 
 
 def generator(*axes: object) -> np.random.Generator:

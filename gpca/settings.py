@@ -6,25 +6,36 @@ Apart from :mod:`gpca.config.check`, because every step imports this: what it im
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cache
+from inspect import signature
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import yaml
 
 from gpca.errors import InputError
+
+if TYPE_CHECKING:
+    from jsonschema.exceptions import ValidationError
 
 
 class Bounds:
     """What the values of a settings class's field may be, in the words of JSON schema.
 
     A field says it with its type, ``train: Annotated[int, Bounds(minimum=9)]``; the config's schema is made from that.
+    A number without a `maximum` has the one of its type, `LARGEST`.
     """
 
     def __init__(self, **keywords: object) -> None:
         self.keywords = keywords
 
+
+# No count of a run comes near a million, and no setting near the other: what is above is a slip, which would otherwise
+# end hours later, or in no memory left.
+LARGEST = {"integer": 10**6, "number": 1e12}
 
 Count = Annotated[int, Bounds(minimum=1)]
 NotNegative = Annotated[float, Bounds(minimum=0)]
@@ -57,6 +68,28 @@ def check_settings(settings: dict, *section: str) -> None:
     require_valid(settings, part | {"$defs": whole["$defs"]}, "setting", complete=False)
 
 
+def require_arguments(subject: str, function: Callable, given: int, settings: Mapping[str, object]) -> None:
+    """Check settings that go to a function by their names, where no schema has them.
+
+    Args:
+        subject: what has the settings, for the message.
+        function: what takes them, after `given` other arguments.
+
+    Raises:
+        InputError: an unknown setting, or one that is no number from 0 to `LARGEST` where the default is such a one.
+    """
+    try:
+        bound = signature(function).bind(*[None] * given, **settings)
+    except TypeError as fault:
+        raise InputError(subject, str(fault), "correct its settings") from fault
+    for name, value in settings.items():
+        default: Any = getattr(bound.signature.parameters.get(name), "default", None)
+        kind = {int: "integer", float: "number"}.get(type(default))
+        if kind and default >= 0:
+            schema = {"properties": {name: {"type": kind, "minimum": 0, "maximum": LARGEST[kind]}}}
+            require_valid({name: value}, schema, f"{subject}: setting")
+
+
 def require_valid(instance: dict, schema: dict, subject: str, complete: bool = True) -> None:
     """Raise an InputError for the worst fault of `instance`; `subject` stands before the name of its key.
 
@@ -68,7 +101,7 @@ def require_valid(instance: dict, schema: dict, subject: str, complete: bool = T
 
     # JSON Schema takes 36.0 for an integer, and no limit stops NaN.
     types = Draft202012Validator.TYPE_CHECKER.redefine_many({"integer": _is_integer, "number": _is_finite_number})
-    validator = extend(Draft202012Validator, type_checker=types)(schema)
+    validator = extend(Draft202012Validator, {"pattern": _matches}, type_checker=types)(schema)
     faults = validator.iter_errors(instance)
     fault = best_match(fault for fault in faults if complete or fault.validator != "required")
     if fault is None:
@@ -84,7 +117,16 @@ def require_valid(instance: dict, schema: dict, subject: str, complete: bool = T
         )
     if fault.validator == "type" and fault.schema["type"] == "array" and isinstance(fault.instance, str | int | float):
         raise InputError(f"{subject} {key}", fault.message, f"give a list: [{fault.instance}]")
-    raise InputError(f"{subject} {key}", fault.message, "see gpca/config/config.schema.yaml")
+    see = "add it, as in config/config.yaml" if fault.validator == "required" else "see gpca/config/config.schema.yaml"
+    raise InputError(f"{subject} {key}", fault.message, see)
+
+
+def _matches(_validator, pattern: str, value: object, _schema) -> Iterator[ValidationError]:
+    """Find a pattern as JSON Schema means it: its ``$`` is the end, and not what is before a last line break."""
+    from jsonschema.exceptions import ValidationError
+
+    if isinstance(value, str) and not re.search(re.sub(r"\$$", r"\\Z", pattern), value):
+        yield ValidationError(f"{value!r} does not match {pattern!r}")
 
 
 def _is_integer(_checker, value: object) -> bool:

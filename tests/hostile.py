@@ -20,9 +20,20 @@ from pathlib import Path
 CPU_SECONDS = 10  # of the processor, so that a busy machine fails no test
 WALL_SECONDS = 120  # a hang, on the busiest machine
 GROWTH_BYTES = 2**30
-_LIBRARIES = ("torch", "numba", "open3d", "pandas", "scipy.spatial", "sklearn", "trimesh", "yaml", "jsonschema")
+_LIBRARIES = (
+    "torch",
+    "numba",
+    "open3d",
+    "pandas",
+    "scipy.spatial",
+    "sklearn",
+    "trimesh",
+    "yaml",
+    "jsonschema",
+    "gpca.config.check",
+)
 _SERVER = multiprocessing.get_context("forkserver")
-_SERVER.set_forkserver_preload(["tests.hostile", "gpca.__main__", *_LIBRARIES])
+_SERVER.set_forkserver_preload(["tests.hostile", "gpca.__main__", "gpca.config.check", *_LIBRARIES])
 
 
 def refusal(arguments: Sequence[str | Path], folder: Path, *words: str) -> str:

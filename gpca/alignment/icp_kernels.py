@@ -14,7 +14,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+
+from gpca.compilation import njit
 
 CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last iteration; Open3D's default
 LISTED = 16  # target points per voxel

@@ -14,18 +14,22 @@ from gpca.config.checks.explainers import (
 )
 from gpca.config.checks.frames import check_real_world
 from gpca.config.checks.left_out import check_left_out
+from gpca.config.checks.places import check_places
 from gpca.config.checks.recovery import check_recovery
 from gpca.config.checks.sources import check_named_sources, resolve_sources
 from gpca.config.command_line import with_types
+from gpca.config.layers import with_defaults
 from gpca.config.leave_out import names_left_out, without_false
 from gpca.settings import load_schema, require_valid
+from gpca.structured_text import require_plain
 
 
-def read(config: dict, command_line: Mapping) -> tuple[dict, dict[str, dict]]:
+def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:
     """Read the config of a run as Snakemake merged it.
 
     Args:
         command_line: what was given with ``--config``, whose numbers are text yet.
+        of_module: it is what another workflow gives this one as a module, so that the defaults are not below it yet.
 
     Returns:
         the config of this run, without what it leaves out; the sources that :func:`check` returns.
@@ -33,7 +37,7 @@ def read(config: dict, command_line: Mapping) -> tuple[dict, dict[str, dict]]:
     Raises:
         InputError: what :func:`check` raises.
     """
-    given = with_types(config, command_line)
+    given = with_types(with_defaults(config) if of_module else config, command_line)
     sources = check(given)
     return without_false(given), sources
 
@@ -51,12 +55,14 @@ def check(config: dict) -> dict[str, dict]:
         InputError: unknown key, wrong type, value out of range; unknown source, family, kind, explainer or backbone,
             or one that is left out; data that is neither in its folder nor downloadable. The line names the key.
     """
+    require_plain(config, "config key")
     whole = without_false(config)
     require_valid(whole, load_schema(), "config key")
     encoders, designs, sources, actions = (
         names_left_out(config, key) for key in ("encoders", "uncertainty", "sources", "recovery.actions")
     )
     check_left_out(config)
+    check_places(whole)
     check_registrations(whole)
     check_encoders(whole, encoders)
     check_explainers(whole, designs)

@@ -7,7 +7,7 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from gpca.settings import Bounds
+from gpca.settings import LARGEST, Bounds
 
 TYPES = {int: "integer", float: "number", bool: "boolean", str: "string", dict: "object"}
 
@@ -75,7 +75,8 @@ def schema_of(kind: Any, keys: Keys | None = None) -> dict[str, Any]:
     if origin is dict:
         return {"type": "object", "additionalProperties": schema_of(parts[1], keys)}
     if kind in TYPES:
-        return {"type": TYPES[kind]}
+        largest = LARGEST.get(TYPES[kind])
+        return {"type": TYPES[kind]} | ({"maximum": largest} if largest else {})
     raise TypeError(f"no JSON schema of {kind}")
 
 
@@ -84,6 +85,8 @@ def _annotated(kind: Any, notes: tuple, keys: Keys | None) -> dict[str, Any]:
     schema = schema_of(kind, own)
     for note in notes:
         if isinstance(note, Bounds):
+            if "exclusiveMaximum" in note.keywords:
+                schema.pop("maximum", None)
             schema = {**schema, **note.keywords}
         if isinstance(note, Named):
             schema = {**schema, **note.keywords()}

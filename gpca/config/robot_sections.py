@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from gpca.config.json_schema import Keys, Named
 from gpca.config.sections import SurfacePoints
-from gpca.config.source_section import NAME, Checksums, Unit, Urls
+from gpca.config.source_section import NAME, Checksums, Place, Unit, Urls
 from gpca.encoders.settings import EncoderSettings
 from gpca.frames.camera import Camera
 from gpca.frames.initial_pose import InitialPoseSettings
@@ -22,12 +22,12 @@ from gpca.settings import Bounds, Count, NotNegative, OpenShare, Share
 class FrameDataset:
     """A dataset of depth frames in BOP format, in a folder or at the addresses that it is downloaded from."""
 
-    location: str
+    location: Place
     urls: Urls = field(default_factory=list)
     sha256: Checksums = None
     unit: Unit = "mm"
     split: Annotated[str, Bounds(minLength=1)] = "test"
-    results: str | None = None
+    results: Place | None = None
     most_frames: Count = 1
 
 

@@ -19,7 +19,7 @@ from gpca.config import sections
 from gpca.config.explainer_section import EXPLAINERS
 from gpca.config.json_schema import COMPLETE, Keys, Named, schema_of
 from gpca.config.robot_sections import RealWorld, Recovery
-from gpca.config.source_section import NAME, Source
+from gpca.config.source_section import NAME, Place, Source
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
@@ -77,10 +77,10 @@ class Comparison:
 class Config:
     """Configuration of GP-CA Bench: all its sections."""
 
-    run: Annotated[str, Bounds(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$")]
-    data_dir: str | None
-    downloads: Annotated[str, Bounds(minLength=1)]
-    seeds: tuple[Annotated[int, Bounds(minimum=0)], ...]
+    run: Annotated[str, Bounds(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", maxLength=100)]
+    data_dir: Place | None
+    downloads: Place
+    seeds: tuple[Annotated[int, Bounds(minimum=0, maximum=2**32 - 1)], ...]
     objects: sections.Objects
     registrations: Annotated[RegistrationSettings, COMPLETE]
     encoders: Annotated[dict[str, Encoder], BY_NAME]

@@ -7,9 +7,11 @@ from typing import Annotated, Literal
 
 from gpca.settings import Bounds, Count
 
-NAME = {"pattern": "^[a-z][a-z0-9_]*$"}  # of what gets files of its own
+NAME = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 100}  # of what gets files of its own
+Place = Annotated[str, Bounds(minLength=1)]
+Pattern = Annotated[str, Bounds(minLength=1)]
 Unit = Literal["m", "cm", "mm"]
-Url = Annotated[str, Bounds(pattern="^https?://")]
+Url = Annotated[str, Bounds(pattern=r"^https?://\S+$")]
 Urls = list[Url]
 Sha256 = Annotated[str, Bounds(pattern="^[0-9a-f]{64}$")]
 ManySha256 = Annotated[list[Sha256 | None], Bounds(minItems=0)]
@@ -38,8 +40,8 @@ class Source:
     title: Annotated[str, Bounds(minLength=1)] = ""
     kind: str = ""
     family: str = ""
-    location: str | None = None
-    files: list[str] = field(default_factory=list)
+    location: Place | None = None
+    files: list[Pattern] = field(default_factory=list)
     objects: list[Annotated[int, Bounds(minimum=0)]] = field(default_factory=list)
     unit: Unit = "m"
     url: Url = ""

@@ -12,7 +12,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+
+from gpca.compilation import njit, prange
 
 _options: dict[str, Any] = {
     "cache": True,

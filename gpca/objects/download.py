@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
+from time import monotonic
 from urllib.parse import urlsplit
 
 from gpca.errors import InputError
 from gpca.files import sha256_of_file, whole_file
 
 TIMEOUT_S = 30
+# A server that sends a byte now and then would keep a run waiting for ever. After a minute a download has to have come
+# at 10 kB/s on average, a fifth of what a modem did; the largest that the suite knows of has 15 GB.
+GRACE_S, SLOWEST_BYTES_PER_S = 60, 10_000
+LARGEST_BYTES = 10**11
 
 
 def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None = None) -> Path:
@@ -63,7 +70,7 @@ def _download(url: str, path: Path, remedy: str) -> None:
 
     download = pooch.HTTPDownloader(progressbar=True, chunk_size=1 << 16, timeout=TIMEOUT_S)
     try:
-        download(url, str(path), None)
+        _within_limits(lambda: download(url, str(path), None), url, path, remedy)
     except requests.exceptions.HTTPError as fault:
         answer = str(fault) if fault.response is None else f"{fault.response.status_code} {fault.response.reason}"
         raise InputError(url, f"cannot be fetched: the server answers {answer}", remedy) from fault
@@ -71,6 +78,34 @@ def _download(url: str, path: Path, remedy: str) -> None:
         raise InputError(url, "cannot be reached", remedy) from fault
     except requests.exceptions.RequestException as fault:
         raise InputError(url, f"the transfer broke off ({type(fault).__name__})", remedy) from fault
+
+
+def _within_limits(download: Callable[[], object], url: str, path: Path, remedy: str) -> None:
+    """Run a download in a thread and watch the file grow; what it raises is raised here.
+
+    Raises:
+        InputError: too slow or too large. The thread is left to itself: it ends with the process.
+    """
+    faults = []
+
+    def run() -> None:
+        try:
+            download()
+        except BaseException as fault:
+            faults.append(fault)
+
+    thread = Thread(target=run, daemon=True)
+    started = monotonic()
+    thread.start()
+    while thread.is_alive():
+        thread.join(1)
+        size = path.stat().st_size if path.exists() else 0
+        if thread.is_alive() and size < SLOWEST_BYTES_PER_S * (monotonic() - started - GRACE_S):
+            raise InputError(url, f"sent {size} bytes in {monotonic() - started:.0f} s, which is too slow", remedy)
+        if size > LARGEST_BYTES:
+            raise InputError(url, f"sends more than {LARGEST_BYTES} bytes", remedy)
+    if faults:
+        raise faults[0]
 
 
 def _remedy(path: Path, location: str | None) -> str:

@@ -19,6 +19,8 @@ from gpca.files import sha256_of_file
 from gpca.objects import archive, download, procedural
 from gpca.objects.surface import Surface
 
+SYSTEM = ("/dev", "/proc", "/sys")
+
 
 def resolve(entry: dict, data_dir: str | None) -> dict:
     """Decide where a source's data comes from; reads no data, so it is quick enough for the loading of a workflow.
@@ -41,7 +43,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
     entry = dict(entry)
     local = entry.pop("local", None)
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
-    if data_dir is not None and not Path(data_dir).expanduser().is_dir():
+    if data_dir is not None and not require_place(data_dir).is_dir():
         raise InputError(data_dir, "no such folder", "correct data_dir in the config")
     for candidate in (entry, {**entry, **local}) if local else (entry,):
         if candidate.get("kind") == "procedural":
@@ -135,10 +137,39 @@ def _unpacked(file: Path) -> Path:
 
 def _found(entry: dict, data_dir: str | None) -> Path | None:
     location, patterns = entry.get("location"), entry.get("files")
-    folder = Path(data_dir or "", location or "").expanduser()
+    folder = require_place(Path(data_dir or "", require_place(location or "")))
+    for pattern in patterns or ():
+        _require_pattern(pattern)
     if (data_dir is None and not folder.is_absolute()) or not (location or patterns) or not folder.exists():
         return None
+    if not (folder.is_dir() or folder.is_file()):
+        raise InputError(folder, "is neither folder nor file", "correct location in the config")
     return folder if location or all(any(folder.glob(pattern)) for pattern in patterns or ()) else None
+
+
+def require_place(place: str | Path) -> Path:
+    """Return a place of data as a path, with the user's home in place of ``~``.
+
+    Raises:
+        InputError: nobody's home, or a place of the system's own, where nothing ends that is read.
+    """
+    try:
+        path = Path(place).expanduser()
+    except RuntimeError as fault:
+        raise InputError(place, "is the home of nobody", "write the whole path") from fault
+    real = path.resolve()
+    if any(real.is_relative_to(system) for system in SYSTEM) and not real.is_relative_to("/dev/shm"):
+        raise InputError(place, "is a place of devices, not of data", "name a folder of files")
+    return path
+
+
+def _require_pattern(pattern: str) -> None:
+    try:
+        next(Path(os.devnull).glob(pattern), None)  # nothing is below that, but the pattern is looked at
+    except (ValueError, IndexError, NotImplementedError) as fault:
+        raise InputError(
+            f"pattern '{pattern}'", f"finds no files ({fault})", "give one relative to location"
+        ) from fault
 
 
 def _module_of(kind: object) -> ModuleType:

@@ -15,6 +15,7 @@ import numpy as np
 from gpca.alignment.rigid import inverse, scale_translation
 from gpca.errors import InputError
 from gpca.frames.shots import Shot, agreement, fuse
+from gpca.settings import require_arguments
 
 LOOSER = 2.0  # the broader search has so many times ICP's correspondence distance
 JUDGED = 8  # so many results of the search are compared with the shots
@@ -158,12 +159,8 @@ ACTIONS: dict[str, Action] = {"reinitialise": reinitialise, "new_view": new_view
 def action_of(name: str, settings: Mapping[str, object]) -> Action:
     """Return the action of that name with its settings; InputError for an unknown name or setting."""
     from functools import partial
-    from inspect import signature
 
     if name not in ACTIONS:
         raise InputError(f"recovery action '{name}'", "unknown", f"known are {', '.join(ACTIONS)}")
-    try:
-        signature(ACTIONS[name]).bind(None, None, None, **settings)
-    except TypeError as fault:
-        raise InputError(f"recovery action '{name}'", str(fault), "correct its settings") from fault
+    require_arguments(f"recovery action '{name}'", ACTIONS[name], 3, settings)
     return partial(ACTIONS[name], **settings)

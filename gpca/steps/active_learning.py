@@ -14,6 +14,7 @@ from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curv
 from gpca.active_learning.rounds import Task, initial_gpc, make_task, run_rounds
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream import run_stream
+from gpca.arguments import SEED
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.classifier.settings import GPCSettings
@@ -30,7 +31,7 @@ PAPERS = ("random", "bald_kmeans")  # the paper's two strategies, which also mee
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the config's section ``active_learning``."""
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--embeddings", required=True, type=Path, help="of an encoder that saw every concept")
     parser.add_argument("--embeddings-without", required=True, type=Path, help="of encoders that never saw one")

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from baselines.registry import explainer_entry, require_settings
+from gpca.arguments import SEED
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
@@ -21,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names, one of each per seed; ``--settings`` are the explainer's in the config."""
     parser.add_argument("--explainer", required=True)
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
     parser.add_argument("--embeddings", type=Path, nargs="*", help="for explainers that read them")
     parser.add_argument("--uncertainty", type=Path, nargs="*", help="for explainers that read a design's outcomes")

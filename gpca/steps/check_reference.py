@@ -6,11 +6,10 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-import yaml
-
 from gpca.comparison.reference import check_reference
 from gpca.errors import InputError
 from gpca.settings import check_settings
+from gpca.structured_text import read_mapping
 
 CONFIG = Path("config/config.yaml")  # as seen from the folder of the suite, where its commands are given
 
@@ -45,14 +44,11 @@ def run(options: Namespace) -> int:
 
 def _section(config: Path) -> dict:
     """Return the section ``reference`` of a config."""
-    if not config.is_file():
+    if not config.exists():
         raise InputError(config, "no such file", "run this in the folder of the suite, or name the file with --config")
-    try:
-        section = yaml.safe_load(config.read_text(encoding="utf-8"))["reference"]
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError) as fault:
-        raise InputError(
-            config, "holds no section reference", f"name another file with --config, as {CONFIG}"
-        ) from fault
+    section = read_mapping(config).get("reference")
+    if section is None:
+        raise InputError(config, "holds no section reference", f"name another file with --config, as {CONFIG}")
     if not isinstance(section, dict) or not {"tolerances", "half_widths"} <= set(section):
         raise InputError(config, "its section reference lacks tolerances or half_widths", f"complete it as in {CONFIG}")
     return section

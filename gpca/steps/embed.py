@@ -8,6 +8,7 @@ from time import perf_counter
 
 import torch
 
+from gpca.arguments import SEED
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
@@ -23,7 +24,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--registration-timings", required=True, type=Path)
     parser.add_argument("--encoder", required=True, type=Path, help="weights")
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds, ICP included")
 

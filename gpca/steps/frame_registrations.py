@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.arguments import SEED
 from gpca.attribution.predictions import write_timings
 from gpca.files import write_csv
 from gpca.frames.instances import Instances
@@ -21,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--instances", required=True, type=Path)
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--poses", required=True, type=Path, help="CSV: where each sample is from, its pose errors")
     parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds of every ICP")

@@ -6,6 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.arguments import SURFACE_POINTS
 from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.plausibility import points_on_model
@@ -23,7 +24,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--scenes", type=Path, help="the folder that the step scenes wrote, in place of datasets")
     parser.add_argument("--data-dir", help="folder that holds the datasets; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", type=Path, help="where downloads are kept")
-    parser.add_argument("--surface-points", type=int, default=16384, help="points sampled on each model")
+    parser.add_argument("--surface-points", type=SURFACE_POINTS, default=16384, help="points sampled on each model")
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--objects", required=True, type=Path, help="canonical clouds, to be written")
 

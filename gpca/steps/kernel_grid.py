@@ -8,6 +8,7 @@ from pathlib import Path
 
 import torch
 
+from gpca.arguments import SEED
 from gpca.classifier.kernel_grid import KernelGrid, evaluate_grid, write_grid
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.provenance import record_provenance
@@ -18,7 +19,7 @@ from gpca.steps import per_seed
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names, one of each per seed; ``--settings`` is the config's section ``kernel_grid``."""
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
     parser.add_argument("--embeddings", required=True, type=Path, nargs="+")
     parser.add_argument("--out", required=True, type=Path, nargs="+")

@@ -16,10 +16,12 @@ import numpy as np
 import torch
 
 from gpca.active_learning.labelling import SKIPPED, LabelFile, Question, Session, require_name
+from gpca.arguments import COUNT
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.files import require_outputs
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
@@ -35,9 +37,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--embeddings", required=True, type=Path, help="of 'python -m gpca embed'")
     parser.add_argument("--labels", required=True, type=Path, help="CSV of the answers; it is appended to")
     parser.add_argument("--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labelled before")
-    parser.add_argument("--initial", type=int, default=60, help="how many samples of these (default 60)")
-    parser.add_argument("--batch", type=int, default=4, help="questions between two retrainings (default 4)")
-    parser.add_argument("--questions", type=int, default=20, help="at most so many in this session (default 20)")
+    parser.add_argument("--initial", type=COUNT, default=60, help="how many samples of these (default 60)")
+    parser.add_argument("--batch", type=COUNT, default=4, help="questions between two retrainings (default 4)")
+    parser.add_argument("--questions", type=COUNT, default=20, help="at most so many in this session (default 20)")
     parser.add_argument("--strategy", default="bald_kmeans", help="what is asked (default bald_kmeans, the paper's)")
     parser.add_argument("--picture", type=Path, default=Path("query.png"), help="drawn anew for every question")
     parser.add_argument("--answers", type=Path, help="a file with an answer on each line, instead of the terminal")
@@ -48,6 +50,8 @@ def run(options: Namespace) -> None:
     """Ask, write, retrain, until the questions, the answers or the samples are used up."""
     torch.set_num_threads(options.threads)
     check_settings(options.settings, "explainers", "gpca")
+    read = [options.registrations, options.embeddings, *([options.answers] if options.answers else [])]
+    require_outputs([path for path in (options.labels, options.picture, options.predictions) if path], read)
     registrations, h_S_d = _load(options)
     keys = list(zip(registrations.split.tolist(), registrations.sample.tolist(), strict=True))
     start = _start(registrations, keys, options)

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from baselines.registry import explainer_entry, require_settings
+from gpca.arguments import SEED
 from gpca.errors import InputError
 from gpca.files import write_csv
 from gpca.progress import progress
@@ -19,7 +20,7 @@ from gpca.shift.sets import ShiftedSets
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` holds the settings of every learner by its name."""
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--learners", required=True, nargs="+")
     parser.add_argument("--sets", required=True, type=Path, nargs="+", help="one per seed, of python -m gpca shift")
     parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one learner after the other")

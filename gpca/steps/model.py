@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from gpca.alignment.icp import ICPSettings
+from gpca.arguments import SEED
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
@@ -32,7 +33,7 @@ CALIBRATION = 5  # one training sample of so many is kept from a first classifie
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config."""
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--title", required=True, help="of the objects, as explanations name them")
     parser.add_argument("--stand-in", action="store_true", help="the objects were drawn by the package")
     parser.add_argument("--registrations", required=True, type=Path)

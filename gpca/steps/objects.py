@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.arguments import SURFACE_POINTS
 from gpca.objects.canonical import write_objects
 from gpca.objects.source import data_files, resolve, surfaces
 from gpca.provenance import record_provenance
@@ -16,7 +17,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
     parser.add_argument("--data-dir", help="folder that holds the data; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", help="where downloads are kept")
-    parser.add_argument("--surface-points", type=int, default=16384, help="points sampled on each mesh")
+    parser.add_argument("--surface-points", type=SURFACE_POINTS, default=16384, help="points sampled on each mesh")
     parser.add_argument("--out", required=True, type=Path)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import torch
 
+from gpca.arguments import SEED
 from gpca.files import whole_file, write_csv
 from gpca.provenance import record_provenance
 from gpca.recovery.actions import action_of
@@ -26,7 +27,7 @@ SOURCE = "recovery"  # names every random number of this step, tables included
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files; ``--settings`` holds the sections of the config that are read."""
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path, help="CSV: a row per failure, policy and step")
     parser.add_argument("--timings", required=True, type=Path, help="CSV of their seconds")
     parser.add_argument("--policy", required=True, type=Path, help="JSON of the thresholds chosen")

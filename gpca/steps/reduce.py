@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.arguments import SEED
 from gpca.encoders.reduction import make_reduction, reduce
 from gpca.errors import InputError
 from gpca.files import load_arrays, save_arrays
@@ -19,7 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names, one file of each kind per seed; ``--settings`` are the reduction's in the config."""
     parser.add_argument("--reduction", required=True)
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--embeddings", required=True, type=Path, nargs="+", help="as the step embed writes them")
     parser.add_argument("--out", required=True, type=Path, nargs="+")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from gpca.arguments import SEED
 from gpca.attribution.predictions import write_timings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
@@ -16,7 +17,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the config's section ``registrations``."""
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds of every ICP")
 

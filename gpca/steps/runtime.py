@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 
 from gpca.active_learning.rounds import make_task
+from gpca.arguments import SEED
 from gpca.files import write_csv
 from gpca.model.file import Model
 from gpca.model.runtime import measure
@@ -21,7 +22,7 @@ from gpca.steps.active_learning import settings_from
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` holds ``runtime`` and ``active_learning`` of the config."""
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--model", required=True, type=Path)
     parser.add_argument("--registrations", required=True, type=Path, help="that the model was made of")
     parser.add_argument("--embeddings", required=True, type=Path, help="of its encoder")

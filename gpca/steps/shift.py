@@ -8,6 +8,7 @@ from pathlib import Path
 
 import torch
 
+from gpca.arguments import SEED
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import load_model
 from gpca.errors import InputError
@@ -24,7 +25,7 @@ SECTIONS = {"shift": ("shift",), "registrations": ("registrations",), "encoder":
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names, one of each per seed; ``--settings`` holds ``shift``, ``registrations``, ``encoder``."""
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
     parser.add_argument("--other-registrations", type=Path, nargs="*", help="of another source; none, no such set")

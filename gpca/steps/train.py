@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from gpca.arguments import SEED
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import train_encoder
 from gpca.files import whole_file
@@ -20,7 +21,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the encoder's section of the config."""
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path, help="weights")
     parser.add_argument("--curve", required=True, type=Path, help="CSV of the training curve")
 

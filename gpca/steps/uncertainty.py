@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.alignment.icp import ICPSettings
+from gpca.arguments import SEED
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
@@ -20,7 +21,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names, one of each per seed; ``--settings`` are those of the design and of ICP."""
     parser.add_argument("--design", required=True, choices=sorted(DESIGNS))
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=int, nargs="+")
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
     parser.add_argument("--out", required=True, type=Path, nargs="+")
     parser.add_argument("--tables", required=True, type=Path, nargs="+", help="CSV of the uncertainties, to be read")

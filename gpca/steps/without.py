@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from gpca.arguments import SEED
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.files import save_arrays
@@ -21,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the encoder's section of the config."""
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=int)
+    parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--concepts", nargs="+", choices=CONCEPTS, default=CONCEPTS, help="to be held out in turn")
     parser.add_argument("--out", required=True, type=Path)
 

@@ -223,8 +223,8 @@ def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, c
     ("content", "message"),
     [
         ("seeds: [0]", "holds no section reference"),
-        ("- a list", "holds no section reference"),
-        ("a: b: c", "holds no section reference"),
+        ("- a list", "holds no keys at its top level"),
+        ("a: b: c", "is neither YAML nor JSON"),
         ("reference: {tolerances: {}}", "lacks tolerances or half_widths"),
         ("reference: 3", "lacks tolerances or half_widths"),
     ],

@@ -43,6 +43,22 @@ def test_names_in_the_schema_are_those_that_there_are():
     assert set(OPTIONS) == set(ENCODERS)
 
 
+def mappings(part):
+    """All mappings in a part of the schema."""
+    if isinstance(part, dict):
+        yield part
+    for inner in part.values() if isinstance(part, dict) else part if isinstance(part, list) else ():
+        yield from mappings(inner)
+
+
+@pytest.mark.parametrize("ends", [{"minimum", "exclusiveMinimum"}, {"maximum", "exclusiveMaximum"}])
+def test_every_number_of_the_config_has_its_bounds(ends):
+    kinds = ("integer", "number", ["integer", "null"], ["number", "null"])
+    numbers = [part for part in mappings(yaml.safe_load(SCHEMA.read_text())) if part.get("type") in kinds]
+    assert len(numbers) > 100
+    assert [part for part in numbers if not part.keys() & ends] == []
+
+
 def test_nothing_heavy_is_loaded_to_make_or_read_the_schema():
     heavy = {"torch", "open3d", "pandas", "numba", "sklearn"}
     program = f"import sys, gpca.config.schema, gpca.config.check; sys.exit(str({heavy} & set(sys.modules)))"
@@ -62,8 +78,9 @@ class Outer:
     share: Annotated[float, Bounds(minimum=0)] | None = None
 
 
-NUMBER = {"type": "number"}
-INNER = {"type": "object", "additionalProperties": False, "properties": {"size": {"type": "integer", "minimum": 1}}}
+NUMBER = {"type": "number", "maximum": 1e12}
+INTEGER = {"type": "integer", "maximum": 10**6}
+INNER = {"type": "object", "additionalProperties": False, "properties": {"size": INTEGER | {"minimum": 1}}}
 
 
 @pytest.mark.parametrize(
@@ -71,16 +88,17 @@ INNER = {"type": "object", "additionalProperties": False, "properties": {"size":
     [
         (bool, {"type": "boolean"}),
         (Literal["a", "b"], {"enum": ["a", "b"]}),
-        (float | None, {"type": ["number", "null"]}),
-        (str | int, {"anyOf": [{"type": "string"}, {"type": "integer"}]}),
+        (float | None, NUMBER | {"type": ["number", "null"]}),
+        (str | int, {"anyOf": [{"type": "string"}, INTEGER]}),
         (tuple[float, float], {"type": "array", "minItems": 2, "maxItems": 2, "items": NUMBER}),
         (tuple[float, ...], {"type": "array", "minItems": 1, "uniqueItems": True, "items": NUMBER}),
         (list[float], {"type": "array", "minItems": 1, "items": NUMBER}),
         (dict[str, float], {"type": "object", "additionalProperties": NUMBER}),
         (Annotated[dict[str, float], Named({"a": int})],
-         {"type": "object", "additionalProperties": NUMBER, "properties": {"a": {"type": "integer"}}}),
+         {"type": "object", "additionalProperties": NUMBER, "properties": {"a": INTEGER}}),
         (Annotated[dict[str, float], Named({"a": float}, closed=True)],
          {"type": "object", "additionalProperties": False, "required": ["a"], "properties": {"a": NUMBER}}),
+        (Annotated[float, Bounds(exclusiveMaximum=1)], {"type": "number", "exclusiveMaximum": 1}),
         (Inner, INNER),
         (Annotated[Inner, COMPLETE], INNER | {"required": ["size"]}),
     ],

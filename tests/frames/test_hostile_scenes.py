@@ -105,7 +105,7 @@ TRUTHS = {
     "deep lists": ('{"0": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
     "deep maps": ('{"0": ' * 100_000 + "1" + "}" * 100_000, "nested too deep"),
     "many digits": ('{"0": ' + "9" * 5000 + "}", "is not a scene's JSON file"),
-    "an image twice": ('{"0": [], "0": []}', "key '0' occurs twice"),
+    "an image twice": ('{"0": [], "0": []}', "key '0' stands twice"),
     "an image twice in other words": ('{"0": [], "00": []}', "image 0 occurs twice"),
     "a negative image": ('{"-1": []}', "its key '-1' is no number of an image"),
     "an image with an underline": ('{"1_0": []}', "its key '1_0' is no number"),
@@ -116,7 +116,7 @@ TRUTHS = {
     "a word for an object": ('{"0": ["obj_id"]}', "image 0, object 0: has no cam_R_m2c"),
     "an object of nothing": ('{"0": [{}]}', "image 0, object 0: has no cam_R_m2c"),
     "an image that is not there": ('{"7": []}', "has no image 7"),
-    "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' occurs twice"),
+    "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' stands twice"),
 }
 
 

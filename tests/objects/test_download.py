@@ -4,6 +4,7 @@ import socket
 import pytest
 
 from gpca.errors import InputError
+from gpca.objects import download
 from gpca.objects.download import cached_path, fetch
 
 CONTENT = b"some archive" * 1000
@@ -77,6 +78,22 @@ def test_error_answer_and_interrupted_transfer(server, tmp_path):
         fetch(f"{server.url}/none.zip", None, tmp_path)
     with pytest.raises(InputError, match=r"short\.zip: "):
         fetch(f"{server.url}/short.zip", None, tmp_path)
+    assert files(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["drip.zip", "drip-head.zip"])
+def test_a_server_that_sends_a_byte_now_and_then_is_left(server, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(download, "GRACE_S", 0)
+    monkeypatch.setattr(download, "SLOWEST_BYTES_PER_S", 10**6)
+    with pytest.raises(InputError, match=rf"{name}: sent \d+ bytes in \d+ s, which is too slow; set data_dir"):
+        fetch(f"{server.url}/{name}", None, tmp_path)
+    assert files(tmp_path) == []
+
+
+def test_a_download_that_is_larger_than_any_is_stopped(server, url, tmp_path, monkeypatch):
+    monkeypatch.setattr(download, "LARGEST_BYTES", len(CONTENT) - 1)
+    with pytest.raises(InputError, match=r"models\.zip: sends more than 11999 bytes"):
+        fetch(url, None, tmp_path)
     assert files(tmp_path) == []
 
 

@@ -106,6 +106,18 @@ def test_a_snakefile_elsewhere_plans_into_the_working_directory(project, tmp_pat
     assert "results/embedded/tables/table2_per_concept.md" in done.stdout
 
 
+def test_a_module_may_have_a_config_of_its_own_over_the_defaults(project, tmp_path):
+    here = tmp_path / "here"
+    here.mkdir()
+    (here / "Snakefile").write_text(
+        f"module bench:\n    snakefile: '{project.folder}/Snakefile'\n    config: {{'run': 'mine', 'seeds': [7]}}\n\n"
+        "use rule * from bench as bench_*\n"
+    )
+    done = project.snakemake("--snakefile", here / "Snakefile", "--directory", here, "-n", "bench_table2")
+    assert "results/mine/predictions/ycb/gpca/seed7.csv" in done.stdout
+    assert "seed0" not in done.stdout
+
+
 def test_another_workflow_takes_the_suite_as_a_module(project, tmp_path):
     here = tmp_path / "here"
     here.mkdir()

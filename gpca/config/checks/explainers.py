@@ -13,11 +13,20 @@ from gpca.errors import InputError
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import check_settings
 
+BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32
+LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the paper's protocol take a thousandth
+
 
 def check_registrations(config: dict) -> None:
-    """Check that no range of severities runs downwards."""
+    """Check that no range of severities runs downwards, and that the samples of one file can be held in memory."""
     with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
+    for section in ("registrations", "real_world"):
+        samples = config[section]["train"] + config[section]["test"]
+        size = samples * config["registrations"]["cloud_points"] * BYTES_PER_POINT
+        if size > LARGEST_BYTES:
+            fault = f"{samples} samples have {size / 2**30:.0f} GiB of points, which one job has to hold"
+            raise InputError(f"config key {section}.train", fault, "take fewer, or lower registrations.cloud_points")
 
 
 def check_encoders(config: dict, left_out: Set[str]) -> None:

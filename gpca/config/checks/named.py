@@ -9,10 +9,10 @@ from gpca.errors import InputError
 
 
 def with_key(key: str, function: Callable[..., Any], *arguments: object) -> Any:
-    """Call the function and name the config's key in front of its InputError."""
+    """Call the function and name the config's key in front of its InputError, or of what the system refuses."""
     try:
         return function(*arguments)
-    except InputError as fault:
+    except (InputError, OSError) as fault:
         raise InputError(f"config key {key}", str(fault)) from fault
 
 

@@ -1,0 +1,36 @@
+"""Options of a command line: a parser that refuses in one line, and types for the numbers that an option takes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import NoReturn
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """A parser whose errors are one line, as every other refusal of the suite."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2 and one line that names the command, the fault and the help."""
+        self.exit(2, f"{self.prog}: {' '.join(message.split())}; '{self.prog} --help' lists what it takes\n")
+
+
+def whole_number(least: int, most: int) -> Callable[[str], int]:
+    """Return the type of an option that takes a whole number from `least` to `most`."""
+
+    def read(text: str) -> int:
+        # Python reads more: digits of other scripts, underlines between them, and numbers that take it minutes.
+        digits = text.removeprefix("-")
+        if not (digits.isascii() and digits.isdigit() and len(digits) < 20 and least <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"'{text[:40]}' is no whole number from {least} to {most}")
+        return int(text)
+
+    return read
+
+
+# More threads than any machine of today has cores; OpenMP and numba crash where they cannot start as many as they are
+# told to, which is at some thousands.
+THREADS = whole_number(1, 256)
+SEED = whole_number(0, 2**32 - 1)  # what the config takes: UMAP's generator is seeded with 32 bits
+SURFACE_POINTS = whole_number(256, 2**20)  # of the config's objects.surface_points
+COUNT = whole_number(1, 10**6)  # of what is small; a million of anything that is asked for by hand is a slip

@@ -1,0 +1,25 @@
+"""Checks of where things lie: the run's own folder, data, downloads. None of them reads data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gpca.config.checks.named import with_key
+from gpca.errors import InputError
+from gpca.objects.source import require_place
+
+# Folders of results/ that no run may take: reference runs are kept in one, logs beside all runs in the other.
+TAKEN = ("reference", "logs")
+
+
+def check_places(config: dict) -> None:
+    """Check the run's name, and the folders that data comes from and downloads go to."""
+    if config["run"].lower() in TAKEN:
+        raise InputError("config key run", f"results/{config['run']} is no run's folder", "take another name")
+    for key in ("data_dir", "downloads"):
+        if config[key] is not None:
+            with_key(key, require_place, config[key])
+    folder = Path(config["downloads"]).expanduser()
+    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    if not existing.is_dir():
+        raise InputError("config key downloads", f"{existing} is no folder", "name a folder, which need not be there")

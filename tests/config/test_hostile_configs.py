@@ -1,0 +1,205 @@
+"""Configs that nobody should get into a run: each is refused in one line, by the command and by Snakemake's loading."""
+
+import json
+import os
+
+import pytest
+
+from gpca.config.layers import with_defaults
+from gpca.structured_text import LARGEST_BYTES
+
+from ..hostile import refusal
+from .configs import load
+
+
+def unfolding(first, line, depth=6):
+    """A YAML bomb: every line holds the one before ten times."""
+    return "\n".join([f"a0: &a0 {first}", *(f"a{i}: &a{i} {line(f'*a{i - 1}')}" for i in range(1, depth + 1))])
+
+
+TEXTS = {
+    "bomb of lists": (unfolding("[x]", lambda a: f"[{', '.join([a] * 10)}]"), "unfold"),
+    "bomb of mappings": (
+        unfolding("{x: 1}", lambda a: "{" + ", ".join(f"k{i}: {a}" for i in range(10)) + "}"),
+        "unfold",
+    ),
+    "bomb of merges": (unfolding("{x: 1}", lambda a: f"{{<<: [{', '.join([a] * 10)}]}}", 9), "unfold"),
+    "alias to itself": ("registrations: &r {icp: *r}", "line 1", "holds itself"),
+    "list in itself": ("seeds: &s [0, *s]", "line 1", "holds itself"),
+    "merge of itself": ("encoders: &e\n  <<: *e\n", "holds itself"),
+    "nested lists": ("seeds: " + "[" * 3000 + "]" * 3000, "nested too deeply"),
+    "nested JSON": ('{"seeds": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deeply"),
+    "chain of aliases": (
+        "\n".join(["a0: &a0 []", *(f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 3000))]),
+        "unfold",
+    ),
+    "key twice": ("seeds: [0]\nrun: a\nseeds: [1]", "line 3: key 'seeds' stands twice"),
+    "nested key twice": ("registrations:\n  train: 36\n  train: 90\n", "line 3: key 'train' stands twice"),
+    "key twice in JSON": ('{"seeds": [0], "seeds": [1]}', "key 'seeds' stands twice"),
+    "empty": ("", "no keys"),
+    "comment": ("# nothing\n", "no keys"),
+    "list": ("- 1\n- 2\n", "no keys"),
+    "text": ("hello", "no keys"),
+    "number in JSON": ("3", "no keys"),
+    "unclosed": ("seeds: [0, 1", "neither YAML nor JSON"),
+    "tab": ("registrations:\n\ttrain: 36\n", "neither YAML nor JSON", "line 2"),
+    "two documents": ("seeds: [0]\n---\nseeds: [1]\n", "neither YAML nor JSON"),
+    "unknown alias": ("seeds: *none", "undefined alias"),
+    "NUL": ("seeds: [0]\0", "neither YAML nor JSON"),
+    "code by a tag": ("run: !!python/object/apply:os.system ['touch here']", "neither YAML nor JSON"),
+    "code by a template": ("__use_yte__: true\nrun: ?open('here', 'w').name\n", "__use_yte__"),
+    "invalid date": ("run: 2024-13-45", "neither YAML nor JSON"),
+    "endless digits": ("seeds: [" + "9" * 5000 + "]", "neither YAML nor JSON"),
+    "date": ("run: 2024-01-01", "run", "is a date"),
+    "bytes": ("run: !!binary aGVsbG8=", "run", "is a bytes"),
+    "set": ("seeds: !!set {0, 1}", "seeds", "is a set"),
+    "number as name": ("sources: {1: {title: x, kind: procedural, family: ycb}}", "sources.1", "is no text"),
+    "switch as name": ("encoders: {on: {backbone: dgcnn}}", "encoders.True", "is no text"),
+    "nothing as name": ("learners: {~: {}}", "learners.None", "is no text"),
+    "list as name": ("? [a, b]\n: 1\n", "neither YAML nor JSON"),
+    "too long": ("#" * (LARGEST_BYTES + 1), "bytes"),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_a_text_that_is_no_sound_config(tmp_path, name):
+    text, *words = TEXTS[name]
+    (tmp_path / "mine.yaml").write_text(text)
+    refusal(["check-config", "mine.yaml"], tmp_path, "mine.yaml", *words)
+
+
+ENCODINGS = {
+    "Latin-1": ('figures: {source: "café"}'.encode("latin-1"), "UTF-8"),
+    "UTF-16": ("seeds: [0]".encode("utf-16"), "UTF-8"),
+    "binary": (bytes(range(256)), "UTF-8"),
+    "surrogates": (b'{"run": "\\ud800"}', "run", "control character"),
+}
+
+
+@pytest.mark.parametrize("name", ENCODINGS)
+def test_bytes_that_are_no_text(tmp_path, name):
+    content, *words = ENCODINGS[name]
+    (tmp_path / "mine.yaml").write_bytes(content)
+    refusal(["check-config", "mine.yaml"], tmp_path, "mine.yaml", *words)
+
+
+@pytest.mark.parametrize("path", ["missing.yaml", "folder", "/dev/zero", "/dev/null", "missing/mine.yaml"])
+def test_what_is_no_file(tmp_path, path):
+    (tmp_path / "folder").mkdir()
+    refusal(["check-config", path], tmp_path, path, "no")
+
+
+def source(**more):
+    return {"sources": {"mine": {"title": "Mine", "kind": "mesh_folder", "location": "parts", "unit": "mm"} | more}}
+
+
+def learner(**settings):
+    return {"learners": {"learner_forest": settings}}
+
+
+VALUES = [
+    # the run's own folder
+    ({"run": "smoke\n"}, "run", "control character"),
+    ({"run": "reference"}, "run", "take another name"),
+    ({"run": "Reference"}, "run", "take another name"),
+    ({"run": "logs"}, "run", "take another name"),
+    ({"run": ""}, "run"),
+    ({"run": "."}, "run"),
+    ({"run": "a/b"}, "run"),
+    ({"run": "a b"}, "run"),
+    ({"run": "-n"}, "run"),
+    ({"run": "x" * 101}, "run", "too long"),
+    ({"run": None}, "run"),
+    ({"run": 3}, "run"),
+    ({"run": "{seed}"}, "run"),
+    # sizes that cannot be
+    ({"registrations": {"train": 10**12}}, "registrations.train", "maximum"),
+    ({"registrations": {"train": 10**6, "cloud_points": 65536}}, "registrations.train", "GiB"),
+    ({"real_world": {"test": 10**6}, "registrations": {"cloud_points": 65536}}, "real_world.train", "GiB"),
+    ({"registrations": {"train": -9}}, "registrations.train", "minimum"),
+    ({"registrations": {"icp": {"max_iterations": 10**9}}}, "registrations.icp.max_iterations"),
+    ({"seeds": [2**32]}, "seeds.0", "maximum"),
+    ({"seeds": [10**400]}, "seeds.0", "maximum"),
+    ({"seeds": [0.5]}, "seeds.0"),
+    ({"seeds": [True]}, "seeds.0"),
+    ({"encoders": {"dgcnn": {"epochs": 10**9}}}, "encoders.dgcnn.epochs"),
+    ({"encoders": {"dgcnn": {"options": {"k": 10**9}}}}, "encoders.dgcnn.options.k"),
+    ({"encoders": {"dgcnn": {"learning_rate": 1e-400}}}, "encoders.dgcnn.learning_rate"),
+    ({"explainers": {"gpca": {"draws": 10**9}}}, "explainers.gpca.draws"),
+    ({"explainers": {"residuals_forest": {"floor": 1e300}}}, "explainers.residuals_forest.floor"),
+    ({"runtime": {"repeats": 10**12}}, "runtime.repeats"),
+    ({"recovery": {"tables": 10**12}}, "recovery.tables"),
+    ({"recovery": {"camera": {"focal_px": 1e300}}}, "recovery.camera.focal_px"),
+    ({"recovery": {"actions": {"denoise": {"frames": 10**12}}}}, "recovery.actions.denoise", "frames"),
+    ({"recovery": {"actions": {"denoise": {"frames": "ten"}}}}, "recovery.actions.denoise", "frames"),
+    (learner(trees=10**12), "learners.learner_forest", "trees"),
+    (learner(trees=-3), "learners.learner_forest", "trees"),
+    (learner(trees="many"), "learners.learner_forest", "trees"),
+    (learner(trees=True), "learners.learner_forest", "trees"),
+    (learner(trees=float("nan")), "learners.learner_forest", "trees"),
+    ({"learners": {"learner_logistic": {"inverse_regularisation": float("inf")}}}, "inverse_regularisation"),
+    # names
+    ({"sources": {"x" * 101: source()["sources"]["mine"]}}, "sources"),
+    ({"sources": {"mine\n": source()["sources"]["mine"]}}, "sources", "control character"),
+    ({"sources": {"../up": source()["sources"]["mine"]}}, "sources"),
+    ({"encoders": {"{seed}": {"backbone": "dgcnn"}}}, "encoders"),
+    # places
+    (source(location="/dev"), "sources.mine", "devices"),
+    (source(location="/dev/zero"), "sources.mine", "devices"),
+    (source(location="/proc/self"), "sources.mine", "devices"),
+    (source(location="/sys"), "sources.mine", "devices"),
+    (source(location="link"), "sources.mine", "devices"),
+    (source(location="fifo"), "sources.mine", "neither folder nor file"),
+    (source(location="nowhere"), "sources.mine", "is not there"),
+    (source(location=""), "sources.mine.location"),
+    (source(location="a\0b"), "sources.mine.location", "control character"),
+    (source(location="x" * 5000), "sources.mine", "too long"),
+    (source(location="~nobody_of_this_name/parts"), "sources.mine", "home of nobody"),
+    ({"data_dir": "/dev"}, "data_dir", "devices"),
+    ({"data_dir": "/proc"}, "data_dir", "devices"),
+    ({"data_dir": ""}, "data_dir"),
+    ({"data_dir": "x" * 5000}, "too long"),
+    ({"data_dir": "~nobody_of_this_name"}, "data_dir", "home of nobody"),
+    ({"data_dir": "mine.yaml"}, "mine.yaml", "no such folder"),
+    ({"data_dir": 3}, "data_dir"),
+    ({"downloads": "/dev"}, "downloads", "devices"),
+    ({"downloads": "/dev/null/here"}, "downloads", "devices"),
+    ({"downloads": "mine.yaml/here"}, "downloads", "is no folder"),
+    # patterns
+    (source(files=["/etc/*.ply"]), "sources.mine", "/etc/*.ply"),
+    (source(files=[""]), "sources.mine.files.0"),
+    (source(files=["."]), "sources.mine", "pattern"),
+    (source(files=["a**b"]), "sources.mine", "a**b"),
+    (source(files=[]), "sources.mine.files"),
+    (source(files="*.ply"), "sources.mine.files", "give a list"),
+    (source(files=[3]), "sources.mine.files.0"),
+    # addresses
+    (source(url="https://a.org/b\nc"), "sources.mine.url", "control character"),
+    (source(url="https://"), "sources.mine.url"),
+    (source(url="https://a b"), "sources.mine.url"),
+    (source(url="file:///etc/passwd"), "sources.mine.url"),
+    (source(url="https://a.org/b.zip", sha256="0" * 64 + "\n"), "sources.mine.sha256", "control character"),
+]
+
+
+@pytest.mark.parametrize(("config", "words"), [(config, words) for config, *words in VALUES])
+def test_a_value_that_cannot_be(tmp_path, config, words):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "link").symlink_to("/dev")
+    os.mkfifo(tmp_path / "fifo")
+    (tmp_path / "mine.yaml").write_text(json.dumps({"data_dir": str(tmp_path)} | config))
+    refusal(["check-config", "mine.yaml"], tmp_path, *words)
+
+
+def test_configs_are_laid_over_each_other_as_snakemake_does_it():
+    own = {"run": "mine", "seeds": [7], "registrations": {"train": 36}, "sources": {"ycb": False}}
+    assert with_defaults() == load()
+    assert with_defaults({"run": "first", "seeds": [1]}, own) == with_defaults(own)
+    assert with_defaults(own)["registrations"] == load()["registrations"] | {"train": 36}
+
+
+@pytest.mark.parametrize("text", ["run: mine\n", '{"run":\n\t"mine"}', "\ufeffrun: mine\n", "run: mine # café\n"])
+def test_a_sound_config_says_so(tmp_path, text):
+    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(AssertionError, match="status 0: run mine: sound"):
+        refusal(["check-config", "mine.yaml"], tmp_path)

@@ -1,0 +1,71 @@
+"""Numbers on the command line: each option of each step has its bounds, and what is out of them is one line."""
+
+from argparse import Action, ArgumentParser
+from importlib import import_module
+
+import pytest
+
+from gpca.__main__ import STEPS
+from gpca.arguments import SURFACE_POINTS, whole_number
+
+from .hostile import refusal
+
+
+def options(step) -> list[Action]:
+    parser = ArgumentParser()
+    import_module(f"gpca.steps.{step.replace('-', '_')}").add_arguments(parser)
+    return parser._actions
+
+
+NUMBERS = [
+    (step, action.option_strings[0])
+    for step in STEPS
+    for action in options(step)
+    if action.type not in (None, str) and "whole_number" in action.type.__qualname__
+]
+BAD = ("-3", "-1", "1e12", "1.5", "nan", "inf", "two", "", " ", "1_000", "٣", "0x10", "9" * 30, "9" * 5000, "--", "1 2")
+
+
+def test_no_step_takes_a_number_without_bounds():
+    kinds = {(step, action.dest): action.type for step in STEPS for action in options(step)}
+    assert [name for name, kind in kinds.items() if kind in (int, float)] == []
+    assert len(NUMBERS) > 15
+
+
+@pytest.mark.parametrize(("step", "option"), NUMBERS)
+def test_every_number_of_every_step_is_refused_where_it_cannot_be(tmp_path, step, option):
+    refusal([step, option, "-5"], tmp_path, f"argument {option}", "whole number", "--help")
+
+
+@pytest.mark.parametrize("text", [*BAD, "0", "100000", "257"])
+def test_threads_that_cannot_be(tmp_path, text):
+    refusal(["objects", "--threads", text], tmp_path, "argument --threads", "--help")
+
+
+@pytest.mark.parametrize("text", [*BAD, "0", "255", "1048577"])
+def test_points_that_cannot_be(tmp_path, text):
+    refusal(["objects", "--surface-points", text], tmp_path, "argument --surface-points", "--help")
+
+
+def test_both_ends_are_allowed():
+    assert [SURFACE_POINTS("256"), SURFACE_POINTS("1048576"), whole_number(-2, 2)("-2")] == [256, 1048576, -2]
+
+
+SETTINGS = {
+    "no JSON": ("{", "not JSON"),
+    "list": ("[]", "not a JSON object"),
+    "number": ("3", "not a JSON object"),
+    "empty": ("", "not JSON"),
+    "key twice": ('{"kind": "bop", "kind": "mesh_folder"}', "key 'kind' stands twice"),
+    "nested": ('{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deeply"),
+    "endless digits": ('{"a": ' + "9" * 5000 + "}", "not JSON"),
+    "control character": ('{"title": "a\\nb"}', "control character"),
+    "half a letter": ('{"title": "\\ud800"}', "control character"),
+    "unknown": ('{"knd": "bop"}', "did you mean kind?"),
+}
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_settings_that_cannot_be(tmp_path, name):
+    text, word = SETTINGS[name]
+    refusal(["objects", "--source", "mine", "--out", "objects.npz", "--settings", text], tmp_path, word)

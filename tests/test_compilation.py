@@ -1,0 +1,58 @@
+"""Compiled loops where nothing can be kept beside them, as in a read-only checkout of a user without a home."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from .documents import ROOT
+
+CODE = "import numba, gpca.alignment.icp_kernels; print(numba.config.CACHE_DIR)"
+PACKAGES = ("gpca", "gpca/alignment", "gpca/encoders")
+
+
+def imported(folder, **variables):
+    environment = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "PYTHONPATH")}
+    return subprocess.run(
+        [sys.executable, "-c", CODE], cwd=folder, env=environment | variables, capture_output=True, text=True
+    )
+
+
+@pytest.fixture
+def read_only(tmp_path):
+    """A copy of the package; a file stands where each cache would be, which stops root too."""
+    copy = tmp_path / "checkout"
+    shutil.copytree(ROOT / "gpca", copy / "gpca", ignore=shutil.ignore_patterns("__pycache__"))
+    for package in PACKAGES:
+        (copy / package / "__pycache__").write_text("")
+    return copy
+
+
+def test_without_a_place_of_its_own_the_cache_is_a_temporary_folder(read_only, tmp_path):
+    done = imported(read_only, HOME="/dev/null", XDG_CACHE_HOME="", TMPDIR=str(tmp_path))
+    assert done.returncode == 0, done.stderr[-2000:]
+    folder = tmp_path / f"gpca-numba-{os.getuid()}"
+    assert done.stdout.strip() == str(folder)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert imported(read_only, HOME="/dev/null", XDG_CACHE_HOME="", TMPDIR=str(tmp_path)).stdout == done.stdout
+
+
+def test_a_folder_that_somebody_else_has_made_is_not_taken(read_only, tmp_path):
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / f"gpca-numba-{os.getuid()}").symlink_to(tmp_path / "theirs")
+    done = imported(read_only, HOME="/dev/null", XDG_CACHE_HOME="", TMPDIR=str(tmp_path))
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "gpca-numba-" in done.stdout
+    assert done.stdout.strip() != str(tmp_path / f"gpca-numba-{os.getuid()}")
+
+
+def test_a_missing_folder_for_temporary_files_is_no_fault(read_only):
+    done = imported(read_only, HOME="/dev/null", XDG_CACHE_HOME="", TMPDIR="/nowhere/at/all")
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_elsewhere_numba_chooses_itself(tmp_path):
+    assert imported(ROOT).stdout == "\n"
+    assert imported(ROOT, NUMBA_CACHE_DIR=str(tmp_path)).stdout == f"{tmp_path}\n"
