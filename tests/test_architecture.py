@@ -11,7 +11,7 @@ from .documents import ROOT
 
 PAGE = (ROOT / "docs/architecture.md").read_text()
 LONGEST = {"gpca/alignment/icp_kernels.py": 450}  # the compiled loop of ICP, which is one function for its speed
-TOP = {"errors", "seeds", "files", "progress", "environment", "provenance", "settings", "code_files"}
+TOP = {"errors", "seeds", "files", "progress", "environment", "provenance", "settings", "code_files", "limits"}
 MODULES = sorted([*(ROOT / "gpca").rglob("*.py"), *(ROOT / "baselines").rglob("*.py")])
 
 

@@ -17,7 +17,7 @@ def made(sample=range(S), split=("train",) * 2 + ("test",) * 4, seed=0):
     return Outcomes(
         sample=np.array(sample),
         split=np.array(split),
-        covariance=random.normal(size=(n, K, 6, 6)),
+        covariance=np.abs(random.normal(size=(n, K, 6, 6))),  # variances are not negative
         uncertainty=random.uniform(0, 9, size=(n, K)),
         residual=random.normal(size=(n, K)),
         degenerate=random.uniform(size=(n, K)) < 0.3,
