@@ -59,7 +59,7 @@ def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file; missing column; a concept without a score column; a sample
             twice in one split (and set); a split other than train and test; a score or a number of ICP calls that is
-            not a finite number; a variance that is neither that nor empty.
+            not a finite number; a variance that is neither that nor empty; negative variances or numbers of calls.
     """
     rows = read_csv(path, ("set", *PREDICTION_COLUMNS) if sets else PREDICTION_COLUMNS)
     concepts = concepts_of(rows)
@@ -79,11 +79,11 @@ def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
                 path, f"unknown concept '{unknown}' in '{column}'", f"its concepts are {', '.join(concepts)}"
             )
     require_samples(path, rows, ("set", "split", "sample") if sets else ("split", "sample"))
-    rows["icp_calls"] = numbers(path, rows, "icp_calls")
+    rows["icp_calls"] = _not_negative(path, rows, "icp_calls")
     for column in (name for name in rows.columns if name.startswith(("score_", "variance_"))):
         # Every explainer that does not abstain has scores; one without variances leaves them empty.
         needed = ~rows["abstained"] if column.startswith("score_") else rows[column] != ""
-        rows[column] = numbers(path, rows, column, needed)
+        rows[column] = (numbers if column.startswith("score_") else _not_negative)(path, rows, column, needed)
     return rows
 
 
@@ -106,14 +106,22 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     """Return seconds (S,) and icp_seconds (S,) of the registrations.
 
     Raises:
-        InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers.
+        InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers, or
+            negative.
     """
     rows = read_csv(path, TIMING_COLUMNS)
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
             raise InputError(path, "does not hold the seconds of these samples", "make it anew")
-    seconds, icp_seconds = (numbers(path, rows, name).to_numpy() for name in ("seconds", "icp_seconds"))
+    seconds, icp_seconds = (_not_negative(path, rows, name).to_numpy() for name in ("seconds", "icp_seconds"))
     return seconds, icp_seconds
+
+
+def _not_negative(path: str | Path, rows: pd.DataFrame, column: str, needed=True) -> pd.Series:
+    values = numbers(path, rows, column, needed)
+    if (values < 0).any():
+        raise InputError(path, f"column '{column}' holds negative numbers", "make it anew")
+    return values
 
 
 def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:

@@ -77,7 +77,8 @@ def read_surface(path: Path, scale: float) -> Surface:
     try:
         require_whole(path)
         # Unprocessed: processing would drop NaN vertices and merge others in silence.
-        loaded = trimesh.load(path, process=False, skip_materials=True, fix_texture=False)
+        with np.errstate(all="ignore"):  # numbers that overflow are found below
+            loaded = trimesh.load(path, process=False, skip_materials=True, fix_texture=False)
         if isinstance(loaded, trimesh.Scene) and loaded.geometry:  # an OBJ with several materials
             loaded = loaded.to_mesh()
         _require_equal_lists(loaded)
