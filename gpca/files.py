@@ -197,13 +197,19 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
     return rows
 
 
-def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True) -> pd.Series:
-    """Return a column as float64; NaN where it is not `needed` and no number. InputError where it is needed."""
+def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, least: float = -np.inf) -> pd.Series:
+    """Return a column as float64; NaN where it is not `needed` and no number.
+
+    Raises:
+        InputError: no number where one is needed; a number below `least`.
+    """
     import pandas as pd
 
     values = pd.to_numeric(rows[column], errors="coerce").astype(float)
     if (~np.isfinite(values) & needed).any():
         raise InputError(path, f"column '{column}' holds something that is not a finite number", "make it anew")
+    if (values < least).any():
+        raise InputError(path, f"column '{column}' holds numbers below {least:g}", "make it anew")
     return values
 
 

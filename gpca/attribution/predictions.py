@@ -79,11 +79,12 @@ def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
                 path, f"unknown concept '{unknown}' in '{column}'", f"its concepts are {', '.join(concepts)}"
             )
     require_samples(path, rows, ("set", "split", "sample") if sets else ("split", "sample"))
-    rows["icp_calls"] = _not_negative(path, rows, "icp_calls")
+    rows["icp_calls"] = numbers(path, rows, "icp_calls", least=0)
     for column in (name for name in rows.columns if name.startswith(("score_", "variance_"))):
         # Every explainer that does not abstain has scores; one without variances leaves them empty.
         needed = ~rows["abstained"] if column.startswith("score_") else rows[column] != ""
-        rows[column] = (numbers if column.startswith("score_") else _not_negative)(path, rows, column, needed)
+        least = -np.inf if column.startswith("score_") else 0
+        rows[column] = numbers(path, rows, column, needed, least)
     return rows
 
 
@@ -113,15 +114,8 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
             raise InputError(path, "does not hold the seconds of these samples", "make it anew")
-    seconds, icp_seconds = (_not_negative(path, rows, name).to_numpy() for name in ("seconds", "icp_seconds"))
+    seconds, icp_seconds = (numbers(path, rows, name, least=0).to_numpy() for name in ("seconds", "icp_seconds"))
     return seconds, icp_seconds
-
-
-def _not_negative(path: str | Path, rows: pd.DataFrame, column: str, needed=True) -> pd.Series:
-    values = numbers(path, rows, column, needed)
-    if (values < 0).any():
-        raise InputError(path, f"column '{column}' holds negative numbers", "make it anew")
-    return values
 
 
 def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:

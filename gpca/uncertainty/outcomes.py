@@ -110,5 +110,7 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
         found = (rows[name] if name == "split" else numbers(path, rows, name)).to_numpy().reshape(shape)
         if not (found == values).all():
             raise InputError(path, "holds other samples or conditions than the outcomes", remedy)
-    seconds, icp_seconds = (numbers(path, rows, name).to_numpy().reshape(shape) for name in ("seconds", "icp_seconds"))
+    seconds, icp_seconds = (
+        numbers(path, rows, name, least=0).to_numpy().reshape(shape) for name in ("seconds", "icp_seconds")
+    )
     return seconds, icp_seconds
