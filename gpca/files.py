@@ -119,8 +119,8 @@ def load_arrays(
         raise InputError(path, "is not a readable npz archive", remedy) from fault
     for name, array in arrays.items():
         if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():
-            fault = "NaN or infinity" if not np.isfinite(array).all() else f"numbers above {LARGEST_NUMBER:.0e}"
-            raise InputError(path, f"array '{name}' holds {fault}", remedy)
+            found = "NaN or infinity" if not np.isfinite(array).all() else f"numbers above {LARGEST_NUMBER:.0e}"
+            raise InputError(path, f"array '{name}' holds {found}", remedy)
     return arrays
 
 

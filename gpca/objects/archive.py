@@ -171,7 +171,7 @@ class _TarInfo(tarfile.TarInfo):
     """Refuses what would be read into memory while the members are listed, since a bomb may say it is gigabytes."""
 
     @classmethod
-    def frombuf(cls, buf: bytes, encoding: str, errors: str) -> _TarInfo:
+    def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _TarInfo:
         info = super().frombuf(buf, encoding, errors)
         if info.type in _HEADERS and info.size > LONGEST_HEADER:
             raise tarfile.ReadError(f"a header of {info.size} bytes")

@@ -12,6 +12,9 @@ from gpca.errors import InputError
 from gpca.files import REAL, TEXT, WHOLE, load_arrays, numbers, read_csv, save_arrays, write_csv
 from gpca.pairs.dataset import Registrations
 
+# How many conditions each design has. A test holds it to designs.py, which readers of outcomes need not depend on.
+CONDITIONS = {"additive": 11, "latin": 25, "saltelli": 41, "oracle": 8, "removal": 8, "causal": 3}
+
 
 @dataclass(frozen=True)
 class Outcomes:

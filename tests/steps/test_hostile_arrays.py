@@ -167,6 +167,17 @@ def test_values_that_cannot_be_are_refused(case, folder):
     assert ".npz" in line or ".csv" in line
 
 
+@pytest.mark.parametrize("explainer", ["shap_removal", "sa_prcc_additive", "residuals_logistic"])
+def test_outcomes_of_another_design_are_refused(explainer, folder):
+    names = ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
+    change_arrays(folder / "uncertainty.npz", **{name: lambda array: array[:, :2] for name in names})
+    head, *lines = (folder / "conditions.csv").read_text().splitlines()
+    kept = [line for line in lines if int(line.split(",")[2]) < 2]
+    (folder / "conditions.csv").write_text("\n".join([head, *kept, ""]))
+    command = [explainer if word == "shap_removal" else word for word in COMMANDS["uncertainty.npz"]]
+    refusal(command, folder, "uncertainty.npz", "2 conditions are not those of design")
+
+
 def header(shape, descr="'<f4'", version=b"\x01\x00"):
     text = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}".encode()
     length = len(text).to_bytes(2 if version[0] == 1 else 4, "little")
