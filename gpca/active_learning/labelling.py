@@ -35,7 +35,7 @@ class LabelFile:
     def __init__(self, path: str | Path, known: Mapping[Key, object]) -> None:
         self.path = Path(path)
         self.labels: dict[Key, str] = {}
-        written = self.path.read_text(encoding="utf-8").strip() if self.path.is_file() else ""
+        written = self.path.read_text(encoding="utf-8", errors="replace").strip() if self.path.is_file() else ""
         if written in ("", ",".join(LABEL_COLUMNS)):
             return
         rows = read_csv(self.path, LABEL_COLUMNS)

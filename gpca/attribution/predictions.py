@@ -59,7 +59,7 @@ def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file; missing column; a concept without a score column; a sample
             twice in one split (and set); a split other than train and test; a score or a number of ICP calls that is
-            not a finite number; a variance that is neither that nor empty.
+            not a finite number; a variance that is neither that nor empty; negative variances or numbers of calls.
     """
     rows = read_csv(path, ("set", *PREDICTION_COLUMNS) if sets else PREDICTION_COLUMNS)
     concepts = concepts_of(rows)
@@ -79,11 +79,12 @@ def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
                 path, f"unknown concept '{unknown}' in '{column}'", f"its concepts are {', '.join(concepts)}"
             )
     require_samples(path, rows, ("set", "split", "sample") if sets else ("split", "sample"))
-    rows["icp_calls"] = numbers(path, rows, "icp_calls")
+    rows["icp_calls"] = numbers(path, rows, "icp_calls", least=0)
     for column in (name for name in rows.columns if name.startswith(("score_", "variance_"))):
         # Every explainer that does not abstain has scores; one without variances leaves them empty.
         needed = ~rows["abstained"] if column.startswith("score_") else rows[column] != ""
-        rows[column] = numbers(path, rows, column, needed)
+        least = -np.inf if column.startswith("score_") else 0
+        rows[column] = numbers(path, rows, column, needed, least)
     return rows
 
 
@@ -106,13 +107,14 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     """Return seconds (S,) and icp_seconds (S,) of the registrations.
 
     Raises:
-        InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers.
+        InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers, or
+            negative.
     """
     rows = read_csv(path, TIMING_COLUMNS)
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
             raise InputError(path, "does not hold the seconds of these samples", "make it anew")
-    seconds, icp_seconds = (numbers(path, rows, name).to_numpy() for name in ("seconds", "icp_seconds"))
+    seconds, icp_seconds = (numbers(path, rows, name, least=0).to_numpy() for name in ("seconds", "icp_seconds"))
     return seconds, icp_seconds
 
 

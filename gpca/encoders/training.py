@@ -17,6 +17,7 @@ from torch import nn
 
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import read_tensors, require_like
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.pairs.dataset import Registrations
@@ -136,10 +137,15 @@ def load_model(weights: Path, settings: EncoderSettings) -> Classifier:
     remedy = "make them anew with 'python -m gpca train'"
     if not Path(weights).is_file():
         raise InputError(weights, "no such weights", remedy)
+    wrong = f"not the weights of backbone '{settings.backbone}'"
     try:
-        model.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
+        state = read_tensors(weights)
+        require_like(state, model.state_dict(), "network")
+    except ValueError as fault:
+        raise InputError(weights, f"{wrong}, or damaged ({fault})", remedy) from fault
     except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
-        raise InputError(weights, f"not the weights of backbone '{settings.backbone}'", remedy) from fault
+        raise InputError(weights, wrong, remedy) from fault
+    model.load_state_dict(state)
     return model.eval()
 
 
@@ -180,7 +186,7 @@ def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
     if checkpoint is None or not checkpoint.is_file():
         return []
     try:
-        content = torch.load(checkpoint, weights_only=True, map_location=best_device())
+        content = read_tensors(checkpoint)
     except Exception:  # whatever a damaged file makes torch raise, training from the start is right
         return []
     if not isinstance(content, dict) or content.get("identity") != identity:

@@ -94,6 +94,8 @@ class Explainer:
             h_1_d = self.embed(transform(T_icp, source))
         with _timed(seconds, "attribution"):
             (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
+        if not np.isfinite(h_1_d).all() or not np.isfinite(scores_C).all():
+            raise InputError("model", "it gives no finite numbers for these clouds", "make another one")
         spread = None
         if uncertainty is not None:
             with _timed(seconds, "uncertainty"):

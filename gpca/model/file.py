@@ -17,8 +17,10 @@ from gpca.alignment.icp import ICPSettings
 from gpca.classifier.gpc import GPC
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import read_tensors
 from gpca.errors import InputError
 from gpca.files import whole_file
+from gpca.model.contents import require_possible
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 FORMAT, VERSION = "GP-CA model", 2
@@ -80,12 +82,14 @@ class Model:
         """Read the file.
 
         Raises:
-            InputError: missing, damaged, pickled, no model, or one of another version.
+            InputError: missing, damaged, pickled, no model, one of another version, or one with what cannot be.
         """
         if not Path(path).is_file():
             raise InputError(path, "no such model", REMEDY)
         try:
-            content = torch.load(path, weights_only=True, map_location="cpu")
+            content = read_tensors(path)
+        except ValueError as fault:
+            raise InputError(path, f"is damaged or no model ({fault})", REMEDY) from fault
         except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
             raise InputError(path, "is damaged or no model", REMEDY) from fault
         if not isinstance(content, Mapping) or content.get("format") != FORMAT:
@@ -94,6 +98,7 @@ class Model:
             raise InputError(path, f"is a model of version {version}, not of version {VERSION}", REMEDY)
         try:
             settings = EncoderSettings(**_renamed(content["encoder_settings"], "points", "draw_points"))
+            require_possible(content, settings)
             encoder = make_encoder(settings.backbone, settings.options)
             encoder.load_state_dict(content["encoder"])
             return cls(
@@ -105,7 +110,7 @@ class Model:
                 cloud_points=content["points"],
                 **{name: content[name] for name in ("title", "stand_in")},
             )
-        except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
+        except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
             raise InputError(path, f"is a model with something missing or damaged ({fault})", REMEDY) from fault
 
 

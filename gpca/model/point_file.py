@@ -9,10 +9,12 @@ import numpy as np
 from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
+from gpca.limits import require_file
 from gpca.objects import mesh_folder, pcd
 from gpca.objects.canonical import bounding_centre, canonical_cloud
 
 SAMPLED_POINTS = 16384  # so many are drawn on a mesh, as on the objects of the training
+LARGEST_POSE_BYTES = 10**5  # 16 numbers, however they are written
 SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd")
 
 
@@ -27,8 +29,7 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
             that this unit does not give.
     """
     scale = mesh_folder.metres_per(unit)
-    if not path.is_file():
-        raise InputError(path, "no such file", f"give one of {', '.join(SUFFIXES)}")
+    require_file(path, "no such file", f"give one of {', '.join(SUFFIXES)}")
     if (suffix := path.suffix.lower()) not in SUFFIXES:
         raise InputError(path, "is of another format", f"give one of {', '.join(SUFFIXES)}")
     if suffix == ".pcd":
@@ -50,10 +51,9 @@ def read_pose(path: Path) -> np.ndarray:
         InputError: no such file, other than 16 numbers, or no rigid transform.
     """
     remedy = "give 4×4 numbers, row by row"
+    require_file(path, "no such file", remedy, LARGEST_POSE_BYTES)
     try:
         numbers = [float(word) for word in path.read_text(encoding="utf-8").replace(",", " ").split()]
-    except FileNotFoundError as fault:
-        raise InputError(path, "no such file", remedy) from fault
     except ValueError as fault:
         raise InputError(path, f"holds something that is no number ({fault})", remedy) from fault
     if len(numbers) != 16:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import hashlib
+import json
 import os
 import shutil
 import stat
@@ -18,9 +20,19 @@ from pathlib import Path, PureWindowsPath
 from typing import IO
 
 from gpca.errors import InputError
+from gpca.files import sha256_of_file, whole_file
+from gpca.limits import LARGEST_FILE_BYTES, is_bounded
 
-LARGEST_BYTES = 20 * 10**9
+LARGEST_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
+LONGEST_HEADER = 2**20  # bytes of what comes before a member, such as its long name; tarfile reads it as a whole
 REMEDY = "delete it and fetch it again, or check the url"
+_HEADERS = (
+    tarfile.XHDTYPE,
+    tarfile.XGLTYPE,
+    tarfile.SOLARIS_XHDTYPE,
+    tarfile.GNUTYPE_LONGNAME,
+    tarfile.GNUTYPE_LONGLINK,
+)
 _DAMAGE = (tarfile.TarError, zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zlib.error, NotImplementedError)
 
 
@@ -34,7 +46,10 @@ class Member:
     open: Callable[[], IO[bytes]]
 
     def read(self) -> bytes:
-        """Return the content; InputError when it is damaged."""
+        """Return the content; InputError when it is damaged, or too large to be parsed."""
+        if self.size > LARGEST_FILE_BYTES:
+            most = f"more than the {LARGEST_FILE_BYTES / 1e9:.3g} GB read"
+            raise InputError(self.archive, f"member '{self.name}' has {self.size / 1e9:.3g} GB, {most}", REMEDY)
         with _damage_named(self.archive), self.open() as stream:
             return stream.read()
 
@@ -59,35 +74,79 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterat
 
 
 def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_BYTES) -> Path:
-    """Unpack an archive into a new folder, whole or not at all; an existing folder is taken as done.
+    """Unpack an archive into a new folder, whole or not at all; of an existing folder, every file is checked.
+
+    Beside the folder stands a list of its files with their SHA-256. Where the list is missing, it is made of the
+    archive, which stays what the folder has to agree with.
 
     Returns:
         The folder.
 
     Raises:
-        InputError: see :func:`open_archive`.
+        InputError: see :func:`open_archive`; too little space on the disk; a file of the folder that is changed,
+            missing or not of the archive.
     """
     folder = Path(folder)
+    listed = folder.with_name(f"{folder.name}.sha256.json")
     if folder.is_dir():
+        if not listed.is_file():
+            with open_archive(path, largest_bytes) as members:
+                _write_list(listed, {member.name: _copy(member, len) for member in members})
+        _require_listed(folder, listed)
         return folder
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".unpacking-") as temporary:
         content = Path(temporary, "content")
         content.mkdir()
         with open_archive(path, largest_bytes) as members:
-            for member in members:
-                _write(member, content / member.name)
+            needed, free = sum(member.size for member in members), shutil.disk_usage(temporary).free
+            if needed > free:
+                found = f"unpacks to {needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB of the disk are free"
+                raise InputError(path, found, f"free some, or keep downloads elsewhere than in {folder.parent}")
+            _write_list(listed, {member.name: _write(member, content / member.name) for member in members})
         os.replace(content, folder)
     return folder
 
 
-def _write(member: Member, target: Path) -> None:
+def _write(member: Member, target: Path) -> str:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with _damage_named(member.archive), member.open() as stream, target.open("wb") as file:
-            shutil.copyfileobj(stream, file)
+        with target.open("wb") as file:
+            return _copy(member, file.write)
     except (FileExistsError, IsADirectoryError, NotADirectoryError) as fault:
         raise InputError(member.archive, f"member '{member.name}' is both a file and a folder", REMEDY) from fault
+
+
+def _copy(member: Member, write: Callable[[bytes], object]) -> str:
+    """Hand a member on, piece by piece, and return its SHA-256."""
+    digest = hashlib.sha256()
+    with _damage_named(member.archive), member.open() as stream:
+        while piece := stream.read(1 << 20):
+            digest.update(piece)
+            write(piece)
+    return digest.hexdigest()
+
+
+def _write_list(path: Path, sha256_of: dict[str, str]) -> None:
+    with whole_file(path) as partial:
+        partial.write_text(json.dumps({os.path.normpath(name): sha256_of[name] for name in sha256_of}, indent=0))
+
+
+def _require_listed(folder: Path, listed: Path) -> None:
+    remedy = f"remove {folder} and {listed.name} beside it, and the archive is unpacked anew"
+    try:
+        expected = dict(json.loads(listed.read_text(encoding="utf-8")))
+    except (ValueError, TypeError) as fault:
+        raise InputError(listed, "is no list of files", remedy) from fault
+    # What a desktop leaves in a folder that somebody looked at begins with a dot; no reader takes it for data.
+    found = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file() or file.is_symlink()}
+    for name in sorted({*expected, *(name for name in found if not Path(name).name.startswith("."))}):
+        if name not in found:
+            raise InputError(folder / name, "is missing in what was unpacked", remedy)
+        if name not in expected:
+            raise InputError(folder / name, "is not of the archive that was unpacked here", remedy)
+        if sha256_of_file(folder / name) != expected[name]:
+            raise InputError(folder / name, "was changed after it was unpacked", remedy)
 
 
 @contextmanager
@@ -104,8 +163,19 @@ def _open(path: Path):
     if magic == b"PK":
         return zipfile.ZipFile(path), _zip_members
     if magic == b"\x1f\x8b":
-        return tarfile.open(path, "r:gz"), _tar_members
-    return tarfile.open(path, "r:"), _tar_members
+        return tarfile.open(path, "r:gz", tarinfo=_TarInfo), _tar_members
+    return tarfile.open(path, "r:", tarinfo=_TarInfo), _tar_members
+
+
+class _TarInfo(tarfile.TarInfo):
+    """Refuses what would be read into memory while the members are listed, since a bomb may say it is gigabytes."""
+
+    @classmethod
+    def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _TarInfo:
+        info = super().frombuf(buf, encoding, errors)
+        if info.type in _HEADERS and info.size > LONGEST_HEADER:
+            raise tarfile.ReadError(f"a header of {info.size} bytes")
+        return info
 
 
 def _zip_members(archive: zipfile.ZipFile, path: Path, largest_bytes: int) -> list[Member]:
@@ -114,6 +184,8 @@ def _zip_members(archive: zipfile.ZipFile, path: Path, largest_bytes: int) -> li
         _check(info.filename, path)
         if stat.S_ISLNK(info.external_attr >> 16) or info.flag_bits & 1:
             raise InputError(path, f"member '{info.filename}' is a link or encrypted", REMEDY)
+        if not is_bounded(info):
+            raise InputError(path, f"member '{info.filename}' is compressed by another method than deflate", REMEDY)
         if not info.is_dir():
             members.append(Member(path, info.filename, info.file_size, partial(archive.open, info)))
     _check_size(sum(member.size for member in members), path, largest_bytes)

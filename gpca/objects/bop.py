@@ -6,10 +6,12 @@ Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_form
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.limits import require_file
 from gpca.objects.canonical import diameter
 from gpca.objects.mesh_folder import metres_per, read_surface
 from gpca.objects.surface import Surface
@@ -68,10 +70,14 @@ def models_folder(folder: Path) -> Path:
 
 def read_models_info(path: Path) -> dict[int, dict]:
     """Return what models_info.json lists by object id; InputError where it is missing, damaged or lacks diameters."""
-    if not path.is_file():
-        raise InputError(path, "no such file", "fetch the models again, or use kind: mesh_folder for plain meshes")
+    remedy = "fetch the models again"
+    require_file(path, "no such file", f"{remedy}, or use kind: mesh_folder for plain meshes")
     try:
         info = json.loads(path.read_text(encoding="utf-8"))
-        return {int(number): {**model, "diameter": float(model["diameter"])} for number, model in info.items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise InputError(path, "is not a BOP models_info.json", "fetch the models again") from fault
+        listed = {int(number): {**model, "diameter": float(model["diameter"])} for number, model in info.items()}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
+        raise InputError(path, "is not a BOP models_info.json", remedy) from fault
+    for number, model in listed.items():
+        if not 0 < model["diameter"] < math.inf:  # NaN compares with nothing, so it would agree with any model
+            raise InputError(path, f"the diameter of object {number} is {model['diameter']} mm", remedy)
+    return listed

@@ -12,12 +12,15 @@ import numpy as np
 from gpca import seeds
 from gpca.environment import require_open3d
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays
+from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.objects.surface import Surface
 
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
 NORMAL_NEIGHBOURS = 30
+# A cloud spans nearly its object's diameter. Few points miss some of it, but never nine tenths.
+SMALLEST_EXTENT = 0.1  # diameters
+UNIT_TOLERANCE = 1e-3  # of the length of a normal, a hundred times what float32 rounds
 FEW_POINTS = 600  # up to so many, all distances take less time than the hull
 
 
@@ -70,7 +73,8 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
         points_m (P, 3) float32, normals (P, 3) float32 unit, diameter in metres of the vertices.
 
     Raises:
-        InputError: no points, NaN, zero area, too small a cloud, or a diameter that no declared unit would give.
+        InputError: no points, NaN, zero area, too small a cloud, too few points to draw, or a diameter that no
+            declared unit would give.
     """
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
@@ -83,6 +87,8 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
             )
         hull_m, draw = vertices_m, _shuffled
     else:
+        if n_points < FEWEST_CLOUD_POINTS:
+            raise InputError(subject, f"{n_points} surface points", f"ask for {FEWEST_CLOUD_POINTS} or more")
         if len(faces) == 0 or not np.linalg.norm(_area_vectors(vertices_m, faces), axis=1).sum() > 0:
             raise InputError(subject, "the mesh has no area", "export it anew, with its faces")
         hull_m, draw = _used_vertices(surface), _sampled
@@ -185,14 +191,34 @@ class ObjectClouds:
     def load(cls, path: str | Path) -> ObjectClouds:
         """Read an objects npz; InputError when it is missing, unreadable or inconsistent."""
         made_by = f"snakemake -j2 {path}"
+        remedy = f"make it anew with '{made_by}'"
         shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
-        arrays = load_arrays(path, shapes, made_by)
-        points_m, offsets = arrays["points_m"], arrays["offsets"]
-        whole = len(offsets) == len(arrays["names"]) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
-        if not whole or not (np.diff(offsets) > 0).all() or arrays["names"].dtype.kind != "U":
-            raise InputError(path, "names, offsets and points do not fit together", f"make it anew with '{made_by}'")
+        kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE}
+        arrays = load_arrays(path, shapes, made_by, kinds)
+        points_m, offsets, names = arrays["points_m"], arrays["offsets"], arrays["names"].tolist()
+        whole = len(offsets) == len(names) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
+        if not whole or not names or not (np.diff(offsets) > 0).all():
+            raise InputError(path, "names, offsets and points do not fit together", remedy)
+        if len(set(names)) < len(names):
+            raise InputError(path, "holds two objects of one name", remedy)
         parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
-        return cls(tuple(arrays["names"].tolist()), arrays["diameters_m"], tuple(zip(*parts, strict=True)))
+        objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)))
+        for i, name in enumerate(names):
+            objects._require_object(i, f"{path}, object '{name}'", remedy)
+        return objects
+
+    def _require_object(self, i: int, subject: str, remedy: str) -> None:
+        points_m, diameter_m = self.points(i), self.diameters_m[i]
+        if not SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
+            raise InputError(subject, f"its diameter is {diameter_m:.4g} m", remedy)
+        # From the centre of its box, no point of an object is farther away than its diameter.
+        extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
+        if np.abs(points_m).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
+            found = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
+            raise InputError(subject, f"{found}, or they are not centred", remedy)
+        lengths = np.linalg.norm(self.normals(i), axis=1)
+        if np.abs(lengths - 1).max() > UNIT_TOLERANCE:
+            raise InputError(subject, "a normal is not of length 1", remedy)
 
     def __len__(self) -> int:
         return len(self.names)

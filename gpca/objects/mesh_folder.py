@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.limits import require_file
 from gpca.objects.canonical import require_points
+from gpca.objects.mesh_text import require_whole
 from gpca.objects.surface import Surface
 
 SUFFIXES = (".ply", ".obj", ".stl", ".off")
@@ -65,17 +67,21 @@ def read_surface(path: Path, scale: float) -> Surface:
     """Read one file, vertices times `scale`. Points without faces are a cloud, which only PLY may hold.
 
     Raises:
-        InputError: unreadable, truncated, without points or faces, NaN, or faces that name no vertex.
+        InputError: unreadable, too large, truncated or longer than it declares, without points or faces, NaN, or faces
+            that name no vertex.
     """
     import trimesh
 
     remedy = "fetch or export it anew"
+    require_file(path, "no such file", remedy)
     try:
+        require_whole(path)
         # Unprocessed: processing would drop NaN vertices and merge others in silence.
-        loaded = trimesh.load(path, process=False, skip_materials=True, fix_texture=False)
+        with np.errstate(all="ignore"):  # numbers that overflow are found below
+            loaded = trimesh.load(path, process=False, skip_materials=True, fix_texture=False)
         if isinstance(loaded, trimesh.Scene) and loaded.geometry:  # an OBJ with several materials
             loaded = loaded.to_mesh()
-        _require_whole(path)
+        _require_equal_lists(loaded)
     except Exception as fault:  # a malformed file makes the parsers raise nearly anything
         raise InputError(path, f"is truncated or not a readable {path.suffix} file ({fault})", remedy) from fault
     vertices = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64)
@@ -103,40 +109,11 @@ def _cloud_normals(cloud, path: Path) -> np.ndarray | None:
     return normals / lengths
 
 
-def _require_whole(path: Path) -> None:
-    """Raise ValueError for an OFF or ASCII PLY that ends before the rows that it declares.
-
-    trimesh reads such a file as a smaller mesh, without a word; in a binary PLY it checks the length itself.
-    """
-    if path.suffix.lower() == ".off":
-        declared, rows, columns, is_list = _off_rows(path.read_bytes())
-    elif path.suffix.lower() == ".ply":
-        declared, rows, columns, is_list = _ply_rows(path.read_bytes())
-    else:
-        return
-    if len(rows) < declared:
-        raise ValueError(f"{len(rows)} of {declared} declared vertices and faces")
-    if declared:
-        last = rows[declared - 1].split()  # a list, as of a face's vertices, says itself how long it is
-        if len(last) < columns + (int(last[0]) if is_list else 0):
-            raise ValueError("its last row is incomplete")
-
-
-def _off_rows(content: bytes) -> tuple[int, list[bytes], int, bool]:
-    """Return declared rows, the rows, least columns of the last one, and whether it begins with a list's length."""
-    rows = [row for row in (line.split(b"#")[0].strip() for line in content.splitlines()) if row]
-    counts, rows = (rows[1], rows[2:]) if rows[0].isalpha() else (rows[0][3:], rows[1:])  # OFF may share their line
-    vertices, faces = map(int, counts.split()[:2])
-    return vertices + faces, rows, 1 if faces else 3, faces > 0
-
-
-def _ply_rows(content: bytes) -> tuple[int, list[bytes], int, bool]:
-    """Return the same for an ASCII PLY; a binary one has no rows."""
-    header, _, body = content.partition(b"end_header")
-    if b"format ascii" not in header:
-        return 0, [], 0, False
-    elements = [element.splitlines() for element in header.split(b"\nelement ")[1:]]
-    properties = [line for line in elements[-1][1:] if line.startswith(b"property")]
-    rows = [row for row in body.splitlines() if row.strip()]
-    declared = sum(int(element[0].split()[1]) for element in elements)
-    return declared, rows, len(properties), properties[0].startswith(b"property list")
+def _require_equal_lists(loaded) -> None:
+    """Raise a ValueError where a list of a binary PLY differs in length from the first: trimesh reads all like that."""
+    raw = getattr(loaded, "metadata", {}).get("_ply_raw", {})
+    for name, element in raw.items():
+        data = element.get("data")
+        for field in (isinstance(data, np.ndarray) and data.dtype.names) or ():
+            if data.dtype[field].names and (data[field]["f0"] != data[field]["f0"][:1]).any():
+                raise ValueError(f"lists of element {name} differ in length")

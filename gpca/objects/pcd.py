@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.limits import require_memory
 from gpca.objects.canonical import require_points
 
 SCALARS = {
@@ -120,7 +121,8 @@ def _binary_compressed(body: bytes, header: _Header) -> np.ndarray:
     compressed, size = struct.unpack_from("<II", body)
     if len(body) < 8 + compressed:
         raise ValueError("the file ends within its compressed data")
-    columns = _lzf_decompress(body[8 : 8 + compressed])
+    require_memory(size, compressed, "its compressed data", "")
+    columns = _lzf_decompress(body[8 : 8 + compressed], size)
     if not len(columns) == size == header.points * header.dtype.itemsize:
         raise ValueError("its compressed data is not of the size that the header says")
     starts = header.points * np.cumsum([0, *(field.itemsize for field in header.columns)])
@@ -131,11 +133,14 @@ def _binary_compressed(body: bytes, header: _Header) -> np.ndarray:
 _DECODERS = {"ascii": _ascii, "binary": _binary, "binary_compressed": _binary_compressed}
 
 
-def _lzf_decompress(data: bytes) -> bytes:
-    """Undo LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write."""
+def _lzf_decompress(data: bytes, size: int) -> bytearray:
+    """Undo LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write.
+
+    It stops once there are more than `size` bytes.
+    """
     out = bytearray()
     i = 0
-    while i < len(data):
+    while i < len(data) and len(out) <= size:
         control = data[i]
         i += 1
         if control < 32:
@@ -153,4 +158,4 @@ def _lzf_decompress(data: bytes) -> bytes:
         length += 2
         earlier = out[start : start + length]
         out += (earlier * (length // len(earlier) + 1))[:length]
-    return bytes(out)
+    return out

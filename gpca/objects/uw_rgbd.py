@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.limits import require_file
 from gpca.objects import archive, pcd
 from gpca.objects.mesh_folder import files_in, metres_per
 from gpca.objects.surface import Surface
@@ -44,6 +45,8 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
     paths = [Path(path) for path in paths]
     scale = metres_per(unit)
     single = [path for path in paths if path.suffix.lower() == ".pcd"]
+    for path in single:
+        require_file(path, "no such file", "check files in the config")
     yield from _chosen([(path.stem, path.read_bytes, str(path)) for path in single], scale, views_per_instance)
     for path in (path for path in paths if path not in single):
         with archive.open_archive(path) as members:

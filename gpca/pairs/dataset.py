@@ -11,10 +11,13 @@ import numpy as np
 
 from gpca.alignment.rigid import scale_translation
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays
+from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 
 SPLITS = ("train", "test")
+FARTHEST = 1e3  # diameters from the target's centre; a registration may fail, but nothing lies so far away
+RIGID_TOLERANCE = 1e-2  # of a rotation's products with itself; datasets round their poses
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,9 @@ class Registrations:
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(REGISTRATION_COLUMNS, ("S",))
         shapes |= {name: ("S", 4, 4) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
         shapes |= {"points": ("P", 3), "offsets": ("O",), "target_points": ("Q", 3), "target_offsets": ("R",)}
-        arrays = load_arrays(path, shapes, made_by="python -m gpca registrations")
+        kinds = dict.fromkeys(shapes, REAL) | dict.fromkeys(("split", "concept", "object_name"), TEXT)
+        kinds |= dict.fromkeys(("sample", "object_index", "offsets", "target_offsets"), WHOLE)
+        arrays = load_arrays(path, shapes, "python -m gpca registrations", kinds)
         remedy = "make it anew with 'python -m gpca registrations'"
         for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):
             offsets = arrays[ends]
@@ -121,8 +126,35 @@ class Registrations:
         for name, known in (("split", SPLITS), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
                 raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
+        for name, within in _possible(arrays).items():
+            if not within.all():
+                raise InputError(path, f"'{name}' holds what cannot be", remedy)
         columns: dict[str, Any] = {name: arrays[name] for name in shapes}
         return cls(**columns)
+
+
+def _possible(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return for each array which of its entries can be."""
+    possible = {name: arrays[name] >= 0 for name in ("sample", "object_index", "inlier_rmse")}
+    possible |= {name: arrays[name] >= 0 for name in arrays if name.startswith("severity_")}
+    possible |= {name: np.abs(arrays[name]) <= FARTHEST for name in ("points", "target_points")}
+    possible["fitness"] = (arrays["fitness"] >= 0) & (arrays["fitness"] <= 1)
+    diameter_m = arrays["diameter_m"]
+    possible["diameter_m"] = (diameter_m >= SMALLEST_DIAMETER_M) & (diameter_m <= LARGEST_DIAMETER_M)
+    for name in (name for name in arrays if name.startswith("T_")):
+        R_S_3_3 = arrays[name][:, :3, :3]
+        products_S_3_3 = np.einsum("sij,skj->sik", R_S_3_3, R_S_3_3)
+        rigid_S = np.abs(products_S_3_3 - np.eye(3)).max(axis=(1, 2)) < RIGID_TOLERANCE
+        reach_m = FARTHEST * LARGEST_DIAMETER_M  # a camera, too, is no farther from what it sees
+        possible[name] = (
+            rigid_S
+            & (np.linalg.det(R_S_3_3) > 0)
+            & (arrays[name][:, 3] == (0, 0, 0, 1)).all(axis=1)
+            & (np.abs(arrays[name][:, :3, 3]) <= reach_m).all(axis=1)
+        )
+    samples = list(zip(arrays["split"].tolist(), arrays["sample"].tolist(), strict=True))
+    possible["sample"] = possible["sample"] & (len(set(samples)) == len(samples))
+    return possible
 
 
 def load_embeddings(
@@ -133,7 +165,8 @@ def load_embeddings(
     Raises:
         InputError: also where the file is of other samples.
     """
-    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by)
+    kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT}
+    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by, kinds)
     if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
         raise InputError(path, "holds other samples than the registrations", f"make it anew with '{made_by}'")
     return arrays

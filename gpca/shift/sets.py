@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays
+from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -75,11 +75,14 @@ class ShiftedSets:
         """
         shapes: dict[str, tuple[int | str, ...]] = {field.name: ("S",) for field in fields(cls)}
         shapes |= {"h": ("S", "d"), "distance": ("S", len(DISTANCES))}
-        arrays = load_arrays(path, shapes, made_by="python -m gpca shift")
+        kinds = dict.fromkeys(shapes, TEXT) | {"sample": WHOLE, "h": REAL, "distance": REAL}
+        arrays = load_arrays(path, shapes, "python -m gpca shift", kinds)
         remedy = "make it anew with 'python -m gpca shift'"
         for name, known in (("set", TRAINED_ON), ("split", ("train", "test")), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
                 raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
+        if not len(arrays["set"]) or (arrays["distance"] < 0).any():
+            raise InputError(path, "holds no samples, or negative distances", remedy)
         sets = cls(**{name: arrays[name] for name in shapes})
         for name in np.unique(sets.set):
             if not len(sets.rows(TRAINED_ON[name], "train")):

@@ -15,7 +15,7 @@ from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
-from gpca.uncertainty.outcomes import Outcomes, read_seconds
+from gpca.uncertainty.outcomes import CONDITIONS, Outcomes, read_seconds
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -74,6 +74,10 @@ def _load(
                 "give it with --uncertainty and --uncertainty-timings",
             )
         outcomes = Outcomes.load(uncertainty)
+        found = outcomes.uncertainty.shape[1]
+        if found != CONDITIONS.get(entry.design, found):
+            remedy = f"make it with 'python -m gpca uncertainty --design {entry.design}'"
+            raise InputError(uncertainty, f"{found} conditions are not those of design '{entry.design}'", remedy)
         return outcomes.attach_to(loaded, *read_seconds(uncertainty_timings, outcomes))
     if entry.reads == "embeddings":
         return _with_embedding(loaded, embeddings, name)

@@ -8,12 +8,13 @@ from pathlib import Path
 from gpca.arguments import SEED
 from gpca.encoders.reduction import make_reduction, reduce
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays
+from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
 
 SHAPES = {"h": ("S", "d"), "head_logits": ("S", "C"), "sample": ("S",), "split": ("S",)}
+KINDS = {"h": REAL, "head_logits": REAL, "sample": WHOLE, "split": TEXT}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -31,7 +32,7 @@ def run(options: Namespace) -> None:
     check_settings(options.settings, "reductions", options.reduction)
     for seed, embeddings, out in per_seed(options, "embeddings", "out"):
         with record_provenance([out], [embeddings], options.settings, seed=seed):
-            arrays = load_arrays(embeddings, SHAPES, made_by="python -m gpca embed")
+            arrays = load_arrays(embeddings, SHAPES, "python -m gpca embed", KINDS)
             h_S_d = arrays["h"]
             train_S = arrays["split"] == "train"
             if not train_S.any():

@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.files import load_arrays, numbers, read_csv, save_arrays, write_csv
+from gpca.files import REAL, TEXT, WHOLE, load_arrays, numbers, read_csv, save_arrays, write_csv
 from gpca.pairs.dataset import Registrations
+
+# How many conditions each design has. A test holds it to designs.py, which readers of outcomes need not depend on.
+CONDITIONS = {"additive": 11, "latin": 25, "saltelli": 41, "oracle": 8, "removal": 8, "causal": 3}
 
 
 @dataclass(frozen=True)
@@ -69,9 +72,17 @@ class Outcomes:
         """
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys((field.name for field in fields(cls)), ("S", "K"))
         shapes |= {"sample": ("S",), "split": ("S",), "covariance": ("S", "K", 6, 6)}
-        arrays = load_arrays(path, shapes, made_by="python -m gpca uncertainty")
+        kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT, "icp_calls": WHOLE, "degenerate": "b"}
+        arrays = load_arrays(path, shapes, "python -m gpca uncertainty", kinds)
+        remedy = "make it anew with 'python -m gpca uncertainty'"
         if len(arrays["sample"]) == 0:
-            raise InputError(path, "holds no samples", "make it anew with 'python -m gpca uncertainty'")
+            raise InputError(path, "holds no samples", remedy)
+        for name, values in {
+            "covariance": np.diagonal(arrays["covariance"], axis1=2, axis2=3),
+            "icp_calls": arrays["icp_calls"],
+        }.items():
+            if (values < 0).any():
+                raise InputError(path, f"'{name}' holds what cannot be", remedy)
         return cls(**{name: arrays[name] for name in shapes})
 
 
@@ -102,5 +113,7 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
         found = (rows[name] if name == "split" else numbers(path, rows, name)).to_numpy().reshape(shape)
         if not (found == values).all():
             raise InputError(path, "holds other samples or conditions than the outcomes", remedy)
-    seconds, icp_seconds = (numbers(path, rows, name).to_numpy().reshape(shape) for name in ("seconds", "icp_seconds"))
+    seconds, icp_seconds = (
+        numbers(path, rows, name, least=0).to_numpy().reshape(shape) for name in ("seconds", "icp_seconds")
+    )
     return seconds, icp_seconds

@@ -112,6 +112,9 @@ def test_faulty_timings_are_refused_in_one_line(tmp_path, text, expected):
         ({"variance_pose": "wide"}, "'variance_pose'"),
         ({"icp_calls": "many"}, "'icp_calls'"),
         ({"icp_calls": np.nan}, "'icp_calls'"),
+        ({"icp_calls": -1}, "'icp_calls' holds numbers below 0"),
+        ({"variance_pose": -0.1}, "'variance_pose' holds numbers below 0"),
+        ({"score_pose": np.inf}, "'score_pose'"),
     ],
 )
 def test_faulty_predictions_are_refused(tmp_path, columns, expected):

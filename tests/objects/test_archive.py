@@ -1,5 +1,6 @@
 import io
 import os
+import shutil
 import tarfile
 import zipfile
 
@@ -49,14 +50,62 @@ FORMATS = pytest.mark.parametrize("suffix", ["zip", "tar", "tgz"])
 def test_unpacks(tmp_path, suffix):
     archive = pack(tmp_path / f"a.{suffix}")
     assert unpack(archive, tmp_path / "new" / "target") == tmp_path / "new" / "target"
-    assert contents(tmp_path / "new") == {f"target/{name}": content for name, content in FILES.items()}
+    assert contents(tmp_path / "new/target") == FILES
 
 
-def test_an_unpacked_folder_is_taken_as_done(tmp_path):
-    folder = unpack(pack(tmp_path / "a.zip"), tmp_path / "target")
-    (folder / "top.txt").write_text("changed")
-    assert unpack(tmp_path / "a.zip", folder) == folder
-    assert (folder / "top.txt").read_text() == "changed"
+def change(folder):
+    (folder / "top.txt").write_bytes(b"u")  # as long as before
+
+
+def lengthen(folder):
+    (folder / "models/deep/er/info.json").write_bytes(b"{} ")
+
+
+def lose(folder):
+    (folder / "models/obj_000001.ply").unlink()
+
+
+def add(folder):
+    (folder / "models/obj_000002.ply").write_bytes(b"ply")
+
+
+CHANGES = {change: "top.txt: was changed", lengthen: "info.json: was changed"}
+CHANGES |= {lose: "obj_000001.ply: is missing", add: "obj_000002.ply: is not of the archive"}
+
+
+@FORMATS
+def test_a_folder_that_was_unpacked_is_checked_and_kept(tmp_path, suffix):
+    archive = pack(tmp_path / f"a.{suffix}")
+    folder = unpack(archive, tmp_path / "target")
+    (folder / ".DS_Store").write_bytes(b"what a desktop leaves")
+    before = (folder / "top.txt").stat().st_mtime_ns
+    assert unpack(archive, folder) == folder
+    assert (folder / "top.txt").stat().st_mtime_ns == before
+
+
+@FORMATS
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_folder_that_was_changed_since_is_refused(tmp_path, suffix, change, listed):
+    archive = pack(tmp_path / f"a.{suffix}")
+    folder = unpack(archive, tmp_path / "target")
+    change(folder)
+    if not listed:  # of a version that kept no list
+        (tmp_path / "target.sha256.json").unlink()
+    with pytest.raises(InputError, match=f"{CHANGES[change]}.*; remove {folder} and target.sha256.json"):
+        unpack(archive, folder)
+    for path in (folder, tmp_path / "target.sha256.json"):
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    assert contents(unpack(archive, folder)) == FILES
+
+
+@pytest.mark.parametrize("text", ["", "{", "[1, 2]", "null"])
+def test_a_list_that_is_damaged_is_refused(tmp_path, text):
+    archive = pack(tmp_path / "a.zip")
+    folder = unpack(archive, tmp_path / "target")
+    (tmp_path / "target.sha256.json").write_text(text)
+    with pytest.raises(InputError, match=r"target\.sha256\.json: is no list of files; remove"):
+        unpack(archive, folder)
 
 
 @FORMATS

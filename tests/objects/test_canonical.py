@@ -45,7 +45,7 @@ def test_draw_depends_on_names_alone():
 def test_unused_vertices_move_nothing():
     plain = box()
     stray = Surface("box", np.vstack([plain.vertices_m, [[9.0, 9.0, 9.0]]]), plain.faces)
-    for expected, actual in zip(canonical_cloud(plain, "s", 50), canonical_cloud(stray, "s", 50), strict=True):
+    for expected, actual in zip(canonical_cloud(plain, "s", 64), canonical_cloud(stray, "s", 64), strict=True):
         assert np.array_equal(expected, actual)
 
 

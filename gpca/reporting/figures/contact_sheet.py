@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.files import load_arrays
+from gpca.objects.canonical import ObjectClouds
 from gpca.reporting.figures.cloud_views import view_from
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 from gpca.reporting.words import in_words
@@ -152,32 +152,28 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, pdf_path: str | Path
     Raises:
         InputError: the npz is missing, unreadable or not of that format.
     """
-    shapes = {
-        "names": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("B",), "diameters_m": ("O",)
-    }  # fmt: skip
-    objects = load_arrays(objects_npz, shapes, made_by="python -m gpca objects")
+    objects = ObjectClouds.load(objects_npz)
     use_style()
     import matplotlib.pyplot as plt
 
-    count = len(objects["names"])
+    count = len(objects)
     columns = _columns(count)
     rows = math.ceil(count / columns)
     tile = TEXT_WIDTH_IN / columns
     size_pt = min(7.0, max(4.5, 7.0 * tile))
-    captions = [_caption(name, tile * 72, size_pt) for name in objects["names"]]
+    captions = [_caption(name, tile * 72, size_pt) for name in objects.names]
     line = size_pt * 1.2 / 72
     caption_height = line * (max(caption.count("\n") for caption in captions) + 2) + 0.08
     title_height = 0.28
     height = title_height + rows * (tile + caption_height)
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, height))
     write_title(figure, title)
-    for index, (name_lines, diameter_m) in enumerate(zip(captions, objects["diameters_m"], strict=True)):
+    for index, (name_lines, diameter_m) in enumerate(zip(captions, objects.diameters_m, strict=True)):
         row, column = divmod(index, columns)
         in_row = min(columns, count - row * columns)
         left = (column + (columns - in_row) / 2) * tile  # A short last row stands in the middle.
         bottom = height - title_height - row * (tile + caption_height) - tile
-        cloud = slice(objects["offsets"][index], objects["offsets"][index + 1])
-        image = render_cloud(objects["points_m"][cloud], objects["normals"][cloud], VIEW, round(tile * 300))
+        image = render_cloud(*objects.clouds[index], VIEW, round(tile * 300))
         axes = figure.add_axes((left / TEXT_WIDTH_IN, bottom / height, tile / TEXT_WIDTH_IN, tile / height))
         axes.imshow(image, interpolation="antialiased")
         axes.set_axis_off()

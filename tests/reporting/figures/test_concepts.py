@@ -44,7 +44,7 @@ def files(clouds, tmp_path_factory):
     points_m = np.concatenate([cloud * d for cloud, d in zip(clouds, DIAMETERS_M, strict=True)]).astype(np.float32)
     save_arrays(
         folder / "objects.npz",
-        {"names": NAMES, "points_m": points_m, "normals": np.ones_like(points_m)}
+        {"names": NAMES, "points_m": points_m, "normals": np.full_like(points_m, 3**-0.5)}
         | {"offsets": np.array([0, 2000, 4000]), "diameters_m": DIAMETERS_M},
     )
     T_init, T_icp = rigid([0.1, 0, 0.2], [0.01, 0, 0.03]), rigid([0, 0.7, 0.1], [0, 0.1, 0])

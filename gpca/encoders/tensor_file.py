@@ -1,0 +1,76 @@
+"""Files of torch.save, read without trust: whole to the byte, no code, and only numbers that can be.
+
+torch itself takes a file in which a bit has flipped for a whole one: it reads no checksum.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from gpca.limits import LARGEST_NUMBER
+
+
+def read_tensors(path: str | Path) -> Any:
+    """Return what torch.save wrote, on the CPU.
+
+    Raises:
+        ValueError: a member whose checksum differs, that is compressed or shared with another; a tensor that is
+            larger than what the file holds of it, or holds NaN or numbers beyond all that can be.
+        Exception: of many kinds, for a file that torch does not read.
+    """
+    with zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
+        if any(info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size for info in members):
+            raise ValueError("it is compressed, which torch does not write")
+        if sum(info.file_size for info in members) > Path(path).stat().st_size:
+            raise ValueError("it says that it holds more than it does")
+        if (damaged := archive.testzip()) is not None:
+            raise ValueError(f"the checksum of its member '{damaged}' differs")
+    content = torch.load(path, weights_only=True, map_location="cpu")
+    for name, tensor in _tensors(content):
+        _require_sound(name, tensor)
+    return content
+
+
+def require_like(state: object, expected: Mapping[str, torch.Tensor], what: str) -> None:
+    """Raise a ValueError unless a state has the names, shapes and types of `expected`, and no negative variances.
+
+    The expected tensors may be on torch's meta device, which says what they would be and takes no memory.
+    """
+    if not isinstance(state, Mapping) or set(state) != set(expected):
+        raise ValueError(f"its {what} has other parts")
+    for name, tensor in expected.items():
+        found = state[name]
+        if not isinstance(found, torch.Tensor) or found.shape != tensor.shape or found.dtype != tensor.dtype:
+            raise ValueError(f"'{name}' of its {what} is of another shape or type")
+        if name.endswith("running_var") and (found < 0).any():
+            raise ValueError(f"'{name}' of its {what} holds negative variances")
+
+
+def _tensors(content: object) -> Iterator[tuple[str, torch.Tensor]]:
+    """Yield every tensor with its name; a list may hold itself, so each is looked at once."""
+    seen: set[int] = set()
+    waiting = [("", content)]
+    while waiting:
+        name, part = waiting.pop()
+        if isinstance(part, torch.Tensor):
+            yield name, part
+        elif isinstance(part, Mapping | list | tuple) and id(part) not in seen:
+            seen.add(id(part))
+            parts = part.items() if isinstance(part, Mapping) else enumerate(part)
+            waiting += [(f"{name}.{key}" if name else str(key), inner) for key, inner in parts]
+
+
+def _require_sound(name: str, tensor: torch.Tensor) -> None:
+    if tensor.layout != torch.strided or tensor.device.type != "cpu" or tensor.is_quantized or tensor.is_complex():
+        raise ValueError(f"'{name}' is a tensor of a kind that is never written")
+    if tensor.numel() * tensor.element_size() > tensor.untyped_storage().nbytes():
+        raise ValueError(f"'{name}' says that it is larger than what the file holds of it")
+    # gpytorch keeps the bounds of its parameters, which may be infinite.
+    if tensor.is_floating_point() and not name.endswith("_bound") and not (tensor.abs() <= LARGEST_NUMBER).all():
+        raise ValueError(f"'{name}' holds NaN, infinity or numbers above {LARGEST_NUMBER:.0e}")

@@ -1,0 +1,53 @@
+"""How much is read into memory: what a user may have, but no more than the machine can hold.
+
+A small file may say that it is a large one, or unpack to one. So sizes are looked at before anything is read.
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+
+from gpca.errors import InputError
+
+# Of a file that is parsed as a whole. The largest scan in common use, Stanford's Lucy of 28 million triangles, takes
+# half of it, and parsing takes several times the size of the file.
+LARGEST_FILE_BYTES = 10**9
+# A compressed archive may hold so many times its own size, or so much in any case. Measured numbers shrink to a half at
+# best and masks to a twentieth; what shrinks further is small, or made to fill the memory.
+LARGEST_RATIO = 20
+SMALL_BYTES = 2**28
+# Squares of larger numbers leave the range of float32. Nothing that the suite measures comes near.
+LARGEST_NUMBER = 1e15
+_BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+
+def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: int = LARGEST_FILE_BYTES) -> None:
+    """Raise an InputError with `fault` where there is no regular file, and another where it is too large to parse.
+
+    A device or a pipe is no file: reading one may never end.
+    """
+    if not Path(path).is_file():
+        raise InputError(path, fault, remedy)
+    if (size := Path(path).stat().st_size) > largest_bytes:
+        raise InputError(path, f"has {size / 1e9:.3g} GB, more than the {largest_bytes / 1e9:.3g} GB read", remedy)
+
+
+def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: str) -> None:
+    """Raise an InputError unless a file of `file_bytes` may well hold so much, and the machine can.
+
+    Half of the physical memory has to do: what is read is checked, cut and converted, which takes as much again.
+    """
+    if needed_bytes > max(SMALL_BYTES, LARGEST_RATIO * file_bytes):
+        found = f"would unpack to {needed_bytes / 1e9:.3g} GB, more than {LARGEST_RATIO} times its size"
+        raise InputError(subject, found, remedy)
+    memory_bytes = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed_bytes > memory_bytes / 2:
+        found = f"takes {needed_bytes / 1e9:.3g} GB, more than half of this machine's {memory_bytes / 1e9:.3g} GB"
+        raise InputError(subject, found, "use a machine with more memory, or smaller data")
+
+
+def is_bounded(info: zipfile.ZipInfo) -> bool:
+    """Return whether the member of a zip can be read piece by piece: bzip2 and LZMA give megabytes for a byte."""
+    return info.compress_type in _BOUNDED

@@ -1,0 +1,83 @@
+"""What can stand in a model file: settings within their bounds, and numbers that fit together.
+
+A model may come from anywhere. What is wrong in it has to be found when it is loaded, not when it hangs or explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import torch
+
+from gpca.classifier.covariances import make_covariance
+from gpca.encoders.registry import make_encoder
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import require_like
+from gpca.objects.canonical import FEWEST_CLOUD_POINTS
+from gpca.settings import check_settings
+
+# The most that one explanation can be asked for: above it takes minutes, or all memory, and gains nothing. A score is
+# the mean over the draws of the classifier, so a million of them leave an error of 0.0005 at most.
+MOST_DRAWS = 10**6
+MOST_ENCODED_POINTS = 10**6  # in all draws of the encoder together
+MOST_CLOUD_POINTS = 10**6
+MOST_ITERATIONS = 10**5  # of ICP
+MOST_NEIGHBOURS = 10**4  # or whatever else a backbone's options count
+
+
+def require_possible(content: Mapping, settings: EncoderSettings) -> None:
+    """Raise a ValueError that says what cannot be in the content of a model file, whose encoder has these settings."""
+    check_settings(vars(settings), "encoders", "*")
+    check_settings(content["gpc"]["settings"], "explainers", "gpca")
+    check_settings(content["icp"], "registrations", "icp")
+    counts = {
+        "draws of the classifier": (content["gpc"]["settings"]["draws"], 2, MOST_DRAWS),
+        "points": (content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
+        "iterations of ICP": (content["icp"]["max_iterations"], 1, MOST_ITERATIONS),
+        "draws of the encoder": (settings.draws, 1, MOST_ENCODED_POINTS // settings.draw_points),
+        "attempts": (content["thresholds"]["attempts"], 1, MOST_ITERATIONS),
+    }
+    for name, (count, least, most) in counts.items():
+        if type(count) is not int or not least <= count <= most:
+            raise ValueError(f"{name}: {count!r} is no number from {least} to {most}")
+    for name, value in settings.options.items():  # a backbone of a user's own has options of its own
+        if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBOURS:
+            raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBOURS}")
+    names = [content["title"], *content["treatments"], *content["treatments"].values(), *content["gpc"]["classes"]]
+    if not all(isinstance(name, str) and name.isprintable() for name in names):
+        raise ValueError("a name is no line of text")
+    if type(content["stand_in"]) is not bool:
+        raise ValueError("stand_in is neither true nor false")
+    with torch.device("meta"):  # what the options ask for may not fit into the memory
+        encoder = make_encoder(settings.backbone, settings.options)
+    require_like(content["encoder"], encoder.state_dict(), "encoder")
+    _require_classifier(content["gpc"], encoder.embedding_size)
+
+
+def _require_classifier(state: Mapping, d: int) -> None:
+    n_classes = len(state["classes"])
+    if n_classes < 2 or len(set(state["classes"])) < n_classes:
+        raise ValueError("its concepts are fewer than two, or not all different")
+    m, n = len(state["inducing"]), len(state["labelled"])
+    shapes = {
+        "scaler_mean": (d,),
+        "scaler_scale": (d,),
+        "inducing": (m, d),
+        "mean": (n_classes, m),
+        "covariance": (n_classes, m, m),
+        "labelled": (n, d),
+        "targets": (n,),
+    }
+    for name, shape in shapes.items():
+        if tuple(state[name].shape) != shape:
+            raise ValueError(f"'{name}' is of shape {tuple(state[name].shape)}, not {shape}")
+    kernel = make_covariance(state["settings"]["kernel"], n_classes, lengthscale=1.0).state_dict()
+    require_like(state["kernel"], kernel, "kernel")
+    if not all(torch.equal(state["kernel"][name], kernel[name]) for name in kernel if name.endswith("_bound")):
+        raise ValueError("its kernel has other bounds")
+    if not (state["scaler_scale"] > 0).all():
+        raise ValueError("'scaler_scale' holds what is not above 0")
+    if (torch.diagonal(state["covariance"], dim1=1, dim2=2) < 0).any():
+        raise ValueError("'covariance' holds negative variances")
+    if state["targets"].is_floating_point() or not ((state["targets"] >= 0) & (state["targets"] < n_classes)).all():
+        raise ValueError("'targets' names a concept that is not there")

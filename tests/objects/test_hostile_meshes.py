@@ -1,0 +1,232 @@
+"""Mesh and cloud files that are damaged, or say what they do not hold, through the command line."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from ..hostile import refusal
+
+BALL = trimesh.creation.icosphere(2, radius=50)
+VERTICES = [" ".join(f"{x:.5f}" for x in vertex) for vertex in BALL.vertices]
+FACES = ["3 " + " ".join(map(str, face)) for face in BALL.faces]
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+
+
+def ply(vertices=VERTICES, faces=FACES, n_vertices=None, n_faces=None, properties=XYZ):
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(vertices) if n_vertices is None else n_vertices}\n{properties}"
+    head += f"element face {len(faces) if n_faces is None else n_faces}\nproperty list uchar int vertex_indices\n"
+    return "\n".join([f"{head}end_header", *vertices, *faces, ""])
+
+
+def off(vertices=VERTICES, faces=FACES, head="OFF"):
+    return "\n".join([head, f"{len(VERTICES)} {len(FACES)} 0", *vertices, *faces, ""])
+
+
+def obj(vertices=VERTICES, faces=None):
+    faces = BALL.faces + 1 if faces is None else faces
+    return "\n".join([*(f"v {v}" for v in vertices), *("f " + " ".join(map(str, face)) for face in faces), ""])
+
+
+def pcd(rows=("0.1 0.2 0.3",) * 70, data="ascii", **changes):
+    head = {"FIELDS": "x y z", "SIZE": "4 4 4", "TYPE": "F F F", "COUNT": "1 1 1", "WIDTH": len(rows), "HEIGHT": 1}
+    head |= {"POINTS": len(rows)} | changes
+    text = "\n".join(f"{key} {value}" for key, value in head.items()) + f"\nDATA {data}\n"
+    return text.encode() + (rows if isinstance(rows, bytes) else "\n".join([*rows, ""]).encode())
+
+
+def compressed(points):
+    body = np.array([len(BOMB), 12 * points], "<u4").tobytes() + BOMB
+    return pcd(body, "binary_compressed", WIDTH=points, POINTS=points)
+
+
+def changed(rows, row, index=5):
+    return [*rows[:index], row, *rows[index + 1 :]]
+
+
+def binary(spoil):
+    content = bytearray(BALL.export(file_type="ply", encoding="binary"))
+    spoil(content, content.index(b"end_header\n") + len(b"end_header\n"))
+    return bytes(content)
+
+
+def stl(spoil):
+    content = bytearray(BALL.export(file_type="stl"))
+    spoil(content)
+    return bytes(content)
+
+
+def stl_text():
+    return BALL.export(file_type="stl_ascii")
+
+
+def write(content, start, new):
+    content[start : start + len(new)] = new
+
+
+NAN = np.float32(np.nan).tobytes()
+LAST_LIST = -13  # bytes of a triangle
+BOMB = b"\x00A" + b"\xe0\xff\x00" * 3_000_000  # LZF: each three bytes copy 264
+MESHES = {
+    # rows that are too wide: the coordinates would be others
+    "every_wide.ply": ply([f"1051 {row}" for row in VERTICES]),
+    "one_wide.ply": ply(changed(VERTICES, f"1051 {VERTICES[5]}")),
+    "tail.ply": ply([f"{row} 7" for row in VERTICES]),
+    "narrow.ply": ply(changed(VERTICES, "1 2")),
+    "words.ply": ply(changed(VERTICES, "1 2 x")),
+    "wide_face.ply": ply(faces=[f"{row} 9" for row in FACES]),
+    "list_too_long.ply": ply(faces=changed(FACES, "4 1 2 3")),
+    "two_corners.ply": ply(faces=changed(FACES, "2 1 2")),
+    "half_corner.ply": ply(faces=changed(FACES, "3 1.5 2 3")),
+    "negative_corner.ply": ply(faces=changed(FACES, "3 1 2 -1")),
+    "far_corner.ply": ply(faces=changed(FACES, "3 1 2 162")),
+    # counts
+    "more_rows.ply": ply(n_faces=len(FACES) - 5),
+    "fewer_rows.ply": ply(n_faces=len(FACES) + 5),
+    "moved_counts.ply": ply(n_vertices=len(VERTICES) - 10, n_faces=len(FACES) + 10),
+    "negative_count.ply": ply(n_vertices=-5),
+    "huge_count.ply": ply(n_vertices=10**15),
+    "no_count.ply": ply(n_vertices="many"),
+    "no_vertices.ply": ply([], []),
+    "two_axes.ply": ply([row.rsplit(" ", 1)[0] for row in VERTICES], properties=XYZ.replace("property float z\n", "")),
+    "no_end.ply": ply()[:100],
+    "empty.ply": "",
+    # numbers
+    "nan.ply": ply(changed(VERTICES, "nan 0 0")),
+    "infinite.ply": ply(changed(VERTICES, "1e39 0 0")),
+    "huge.ply": ply([f"{row}e30" for row in VERTICES]),
+    "one_point.ply": ply(["1 2 3"] * len(VERTICES)),
+    "line.ply": ply([f"{i} 0 0" for i in range(len(VERTICES))]),
+    "binary_nan.ply": binary(lambda content, start: write(content, start, NAN)),
+    "binary_count.ply": binary(lambda content, start: write(content, 0, content[:start].replace(b" 162", b" 163"))),
+    "binary_list.ply": binary(lambda content, start: write(content, len(content) + LAST_LIST, b"\x04")),
+    "binary_corner.ply": binary(lambda content, start: write(content, len(content) - 4, b"\xff\xff\xff\x7f")),
+    "binary_cut.ply": binary(lambda content, start: content.__delitem__(slice(len(content) - 130, None))),
+    # OFF
+    "every_wide.off": off([f"1051 {row}" for row in VERTICES]),
+    "narrow.off": off(changed(VERTICES, "1 2")),
+    "list_too_long.off": off(faces=changed(FACES, "5 1 2 3")),
+    "more_rows.off": off(faces=[*FACES, *FACES]),
+    "cut.off": off(faces=FACES[:-1]),
+    "nan.off": off(changed(VERTICES, "nan 0 0")),
+    "no_counts.off": "OFF\n",
+    "not.off": off(head="ABC"),
+    # OBJ
+    "index_0.obj": obj(faces=BALL.faces),
+    "cut_between_faces.obj": obj(faces=BALL.faces[:160] + 1),
+    "cut_within_a_face.obj": obj(faces=[*(BALL.faces[:300] + 1), [12]]),
+    "far_corner.obj": obj(faces=[*(BALL.faces + 1), [1, 2, 163]]),
+    "far_back.obj": obj(faces=[*(BALL.faces + 1), [1, 2, -163]]),
+    "counts_back.obj": obj(faces=BALL.faces - 162) + "v 1 2 3\n",
+    "weights.obj": obj([f"1051 {row}" for row in VERTICES]),
+    "narrow.obj": obj(changed(VERTICES, "1 2")),
+    "nan.obj": obj(changed(VERTICES, "nan 0 0")),
+    "half_corner.obj": obj(faces=[*(BALL.faces + 1), [1, 2, 3.5]]),
+    # STL
+    "cut.stl": stl_text()[:4000],
+    "cut_between_faces.stl": "\n".join(stl_text().splitlines()[:351]),
+    "nan_text.stl": stl_text().replace("vertex", "vertex nan", 1),
+    "count_too_high.stl": stl(lambda content: write(content, 80, (10**9).to_bytes(4, "little"))),
+    "count_too_low.stl": stl(lambda content: write(content, 80, (10).to_bytes(4, "little"))),
+    "binary_cut.stl": stl(lambda content: content.__delitem__(slice(84 + 2000, None))),
+    "binary_nan.stl": stl(lambda content: write(content, 96, NAN)),
+}
+CLOUDS = {
+    "one_place.pcd": pcd(),
+    "empty.pcd": pcd(()),
+    "two_columns.pcd": pcd(FIELDS="x y", SIZE="4 4", TYPE="F F", COUNT="1 1"),
+    "nan.pcd": pcd(("nan 0 0",) * 70),
+    "infinite.pcd": pcd(("0 0 inf",) * 70),
+    "complex.pcd": pcd(("1+2j 0 0",) * 70),
+    "huge_count.pcd": pcd(COUNT="1 1 99999999999"),
+    "huge_field.pcd": pcd(FIELDS="x y z w", SIZE="4 4 4 4", TYPE="F F F F", COUNT="1 1 1 99999999999"),
+    "huge_width.pcd": pcd(WIDTH=10**15, POINTS=10**15),
+    "bomb.pcd": compressed(6 * 10**7),
+    "longer_than_said.pcd": compressed(70),
+}
+
+
+def arguments(kind, **options):
+    settings = {"kind": kind, "location": ".", "unit": "mm"} | options
+    return ["objects", "--source", "s", "--data-dir", ".", "--out", "objects.npz", "--settings", json.dumps(settings)]
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_mesh_that_is_not_what_it_says_is_refused(name, tmp_path):
+    content = MESHES[name]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    refusal(arguments("mesh_folder"), tmp_path, name.split(".")[0])
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_a_cloud_that_is_not_what_it_says_is_refused(name, tmp_path):
+    (tmp_path / name).write_bytes(CLOUDS[name])
+    refusal(arguments("uw_rgbd", unit="m"), tmp_path, name.split(".")[0])
+
+
+def test_a_file_too_large_to_be_parsed_is_not_opened(tmp_path):
+    for name, kind in (("sparse.ply", "mesh_folder"), ("sparse.pcd", "uw_rgbd")):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(5 * 10**9)
+        refusal(arguments(kind, unit="m"), tmp_path, name, "has 5 GB, more than the 1 GB read")
+
+
+@pytest.mark.parametrize("points", [0, 63, -5])
+def test_too_few_points_of_a_surface(points, tmp_path):
+    (tmp_path / "ball.ply").write_text(ply())
+    refusal([*arguments("mesh_folder"), "--surface-points", points], tmp_path, "ball", "64 or more")
+
+
+def test_the_same_files_unspoilt_are_read(tmp_path):
+    from gpca.objects.mesh_folder import files_in, surfaces
+
+    for name, content in {"ball.ply": ply(), "ball.off": off(), "ball.obj": obj()}.items():
+        (tmp_path / name).write_text(content)
+    (tmp_path / "back.obj").write_text(obj(faces=BALL.faces - 162))
+    (tmp_path / "colours.off").write_text(off([f"{row} 255 0 0" for row in VERTICES], head="COFF"))
+    (tmp_path / "ball.stl").write_text(stl_text())
+    (tmp_path / "binary.ply").write_bytes(binary(lambda content, start: None))
+    (tmp_path / "binary.stl").write_bytes(stl(lambda content: None))
+    for surface in surfaces(files_in(tmp_path, None, (".ply", ".obj", ".off", ".stl")), "mm"):
+        np.testing.assert_allclose(np.ptp(surface.vertices_m, axis=0), 0.1, atol=1e-6)
+
+
+INFO = {"1": {"diameter": 100.0}}
+INFOS = {
+    "NaN": {"1": {"diameter": float("nan")}},
+    "infinity": {"1": {"diameter": float("inf")}},
+    "nothing": {"1": {"diameter": 0}},
+    "negative": {"1": {"diameter": -100}},
+    "metres": {"1": {"diameter": 0.1}},
+    "text": {"1": {"diameter": "large"}},
+    "none": {"1": {}},
+    "list": [100.0],
+    "other": {"2": {"diameter": 100.0}},
+    "name": {"one": {"diameter": 100.0}},
+    "null": None,
+}
+
+
+def models(folder, info):
+    (folder / "models").mkdir()
+    (folder / "models/obj_000001.ply").write_text(ply())
+    (folder / "models/models_info.json").write_text(info)
+
+
+@pytest.mark.parametrize("fault", INFOS)
+def test_a_list_of_models_that_cannot_be(fault, tmp_path):
+    models(tmp_path, json.dumps(INFOS[fault]))
+    refusal(arguments("bop"), tmp_path, "models_info.json", "again")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 10**6, "\0"])
+def test_a_list_of_models_that_is_no_json(text, tmp_path):
+    models(tmp_path, text)
+    refusal(arguments("bop"), tmp_path, "models_info.json", "again")
+
+
+def test_a_model_wider_than_its_rows_say_is_refused(tmp_path):
+    models(tmp_path, json.dumps(INFO))
+    (tmp_path / "models/obj_000001.ply").write_text(MESHES["one_wide.ply"])
+    refusal(arguments("bop"), tmp_path, "obj_000001.ply", "row 6 of 162")
