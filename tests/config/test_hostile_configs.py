@@ -1,9 +1,9 @@
 """Configs that nobody should get into a run: each is refused in one line, by the command and by Snakemake's loading."""
 
-import json
 import os
 
 import pytest
+import yaml
 
 from gpca.config.layers import with_defaults
 from gpca.structured_text import LARGEST_BYTES
@@ -187,7 +187,7 @@ def test_a_value_that_cannot_be(tmp_path, config, words):
     (tmp_path / "parts").mkdir()
     (tmp_path / "link").symlink_to("/dev")
     os.mkfifo(tmp_path / "fifo")
-    (tmp_path / "mine.yaml").write_text(json.dumps({"data_dir": str(tmp_path)} | config))
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"data_dir": str(tmp_path)} | config))
     refusal(["check-config", "mine.yaml"], tmp_path, *words)
 
 
