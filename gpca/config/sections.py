@@ -121,4 +121,6 @@ class Reference:
     """How a run is compared with a reference run."""
 
     half_widths: NotNegative
+    flipped: Annotated[float, Bounds(minimum=0, maximum=1)]
+    deviations: NotNegative
     tolerances: ReferenceTolerances

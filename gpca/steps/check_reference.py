@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from dataclasses import fields
 from pathlib import Path
 
-from gpca.comparison.reference import check_reference
+from gpca.comparison.reference import DIFFERENT, MISSING, ROUNDING, VERDICTS, Allowance, check_reference, device_of
 from gpca.errors import InputError
 from gpca.settings import check_settings
 from gpca.structured_text import read_mapping
@@ -24,22 +25,25 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print what each file came to; return 0 where all agree, 1 where one differs or is missing."""
+    """Print what each file came to; return 1 where one is different or missing, 0 where rounding explains all."""
     if not options.folder.is_dir():
         raise InputError(options.folder, "no such folder", f"make it with '{_command(options.folder, [])}'")
     reference = options.reference or options.folder.parent / "reference" / options.folder.name
     settings = _section(options.config) | options.settings
     check_settings(settings, "reference")
-    outcomes = check_reference(options.folder, reference, settings["tolerances"], settings["half_widths"])
+    outcomes = check_reference(options.folder, reference, Allowance(**settings))
     width = max(len(outcome.file) for outcome in outcomes)
     for outcome in outcomes:
-        print(f"{outcome.file:<{width}}  {outcome.verdict:<8}{outcome.detail}".rstrip())
-    agree, differ = (sum(outcome.verdict == verdict for outcome in outcomes) for verdict in ("agrees", "differs"))
-    missing = [str(options.folder / outcome.file) for outcome in outcomes if outcome.verdict == "missing"]
-    print(f"{options.folder} against {reference}: {agree} agree, {differ} differ, {len(missing)} missing")
-    if missing:
-        print(f"{len(missing)} missing; make them with: {_command(options.folder, missing)}", file=sys.stderr)
-    return 1 if differ or missing else 0
+        print(f"{outcome.file:<{width}}  {outcome.verdict:<9}  {outcome.detail}".rstrip())
+    of = {verdict: [o.file for o in outcomes if o.verdict == verdict] for verdict in VERDICTS}
+    print(f"{options.folder} against {reference}: " + ", ".join(f"{len(of[name])} {name}" for name in VERDICTS))
+    if of[ROUNDING] or of[DIFFERENT]:
+        for who, folder in (("reference", reference), ("run", options.folder)):
+            print(f"{who}: {device_of(folder, outcomes[0].file)}")
+    if of[MISSING]:
+        command = _command(options.folder, [str(options.folder / file) for file in of[MISSING]])
+        print(f"{len(of[MISSING])} missing; make them with: {command}", file=sys.stderr)
+    return 1 if of[DIFFERENT] or of[MISSING] else 0
 
 
 def _section(config: Path) -> dict:
@@ -49,8 +53,11 @@ def _section(config: Path) -> dict:
     section = read_mapping(config).get("reference")
     if section is None:
         raise InputError(config, "holds no section reference", f"name another file with --config, as {CONFIG}")
-    if not isinstance(section, dict) or not {"tolerances", "half_widths"} <= set(section):
-        raise InputError(config, "its section reference lacks tolerances or half_widths", f"complete it as in {CONFIG}")
+    needed = [field.name for field in fields(Allowance)]
+    if not isinstance(section, dict) or not set(needed) <= set(section):
+        raise InputError(
+            config, f"its section reference lacks one of {', '.join(needed)}", f"complete it as in {CONFIG}"
+        )
     return section
 
 
