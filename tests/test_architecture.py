@@ -12,7 +12,19 @@ from .documents import ROOT
 PAGE = (ROOT / "docs/architecture.md").read_text()
 LONGEST = {"gpca/alignment/icp_kernels.py": 450}  # the compiled loop of ICP, which is one function for its speed
 TOP = {
-    *("arguments", "code_files", "compilation", "environment", "errors", "files", "interrupts", "json_file", "limits"),
+    *(
+        "arguments",
+        "arrays",
+        "code_files",
+        "compilation",
+        "csv_file",
+        "environment",
+        "errors",
+        "files",
+        "interrupts",
+        "json_file",
+        "limits",
+    ),
     *("processor", "progress", "provenance", "seeds", "settings", "standard_streams", "structured_text"),
 }
 MODULES = sorted([*(ROOT / "gpca").rglob("*.py"), *(ROOT / "baselines").rglob("*.py")])

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gpca.arrays import load_arrays, save_arrays
 from gpca.errors import InputError
-from gpca.files import load_arrays, save_arrays, whole_file, whole_folder
+from gpca.files import whole_file, whole_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 SHAPES = {"points": ("P", 3), "labels": ("P",)}

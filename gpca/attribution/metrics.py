@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import TIMING_COLUMNS, concepts_of, read_predictions, require_samples
+from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
-from gpca.files import numbers, read_csv
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,8 +12,8 @@ import numpy as np
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
 from gpca.attribution.metrics import source_method_seed
 from gpca.classifier.settings import Draws, Kernel, LearningRate
+from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
-from gpca.files import numbers, read_csv, write_csv
 from gpca.settings import Count
 
 if TYPE_CHECKING:

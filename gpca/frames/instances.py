@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import require_rigid
+from gpca.arrays import load_arrays, save_arrays
 from gpca.errors import InputError
-from gpca.files import MOST_PIXELS, load_arrays, save_arrays
+from gpca.files import MOST_PIXELS
 from gpca.frames.scene_files import require_camera
 from gpca.seeds import generator
 

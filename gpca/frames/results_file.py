@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import require_rotation
+from gpca.csv_file import read_csv
 from gpca.errors import InputError
-from gpca.files import read_csv
 
 COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
 REMEDY = "export it anew"

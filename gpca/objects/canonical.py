@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from gpca import seeds
+from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.environment import require_open3d
 from gpca.errors import InputError
-from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.objects.surface import Surface
 
 FEWEST_CLOUD_POINTS = 64

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.rigid import scale_translation
+from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.errors import InputError
-from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -160,7 +160,7 @@ def _possible(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 def load_embeddings(
     path: str | Path, registrations: Registrations, shapes: Mapping[str, tuple[int | str, ...]], made_by: str
 ) -> dict[str, np.ndarray]:
-    """Read arrays of the registrations from a file of embeddings; see :func:`gpca.files.load_arrays`.
+    """Read arrays of the registrations from a file of embeddings; see :func:`gpca.arrays.load_arrays`.
 
     Raises:
         InputError: also where the file is of other samples.

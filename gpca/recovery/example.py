@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.rigid import inverse
-from gpca.files import save_arrays
+from gpca.arrays import save_arrays
 from gpca.frames.camera import shade
 from gpca.frames.rgbd_scene import TABLE_COLOUR, model_colour
 from gpca.frames.shots import Shot

@@ -9,8 +9,8 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL, tidy
+from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
-from gpca.files import numbers, read_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import QUEUE
 

@@ -11,8 +11,8 @@ import numpy as np
 from gpca.attribution import diagnostics
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.csv_file import numbers
 from gpca.errors import InputError
-from gpca.files import numbers
 from gpca.seeds import generator
 from gpca.shift.sets import DISTANCES, TRAINED_ON, ShiftedSets
 

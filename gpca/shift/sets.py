@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.errors import InputError
-from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -9,10 +9,10 @@ from time import perf_counter
 import torch
 
 from gpca.arguments import SEED
+from gpca.arrays import save_arrays
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
-from gpca.files import save_arrays
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings

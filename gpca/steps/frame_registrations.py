@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gpca.arguments import SEED
 from gpca.attribution.predictions import write_timings
-from gpca.files import write_csv
+from gpca.csv_file import write_csv
 from gpca.frames.instances import Instances
 from gpca.frames.plausibility import require_of_objects
 from gpca.frames.synthesis import FrameSettings, make_frame_registrations

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from baselines.registry import explainer_entry, require_settings
 from gpca.arguments import SEED
+from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.files import write_csv
 from gpca.progress import progress
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings

@@ -10,7 +10,8 @@ from pathlib import Path
 import torch
 
 from gpca.arguments import SEED
-from gpca.files import whole_file, write_csv
+from gpca.csv_file import write_csv
+from gpca.files import whole_file
 from gpca.provenance import record_provenance
 from gpca.recovery.actions import action_of
 from gpca.recovery.calibration import robot_policy, summary

@@ -6,9 +6,9 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.arguments import SEED
+from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.encoders.reduction import make_reduction, reduce
 from gpca.errors import InputError
-from gpca.files import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed

@@ -10,7 +10,7 @@ import torch
 
 from gpca.active_learning.rounds import make_task
 from gpca.arguments import SEED
-from gpca.files import write_csv
+from gpca.csv_file import write_csv
 from gpca.model.file import Model
 from gpca.model.runtime import measure
 from gpca.pairs.dataset import Registrations, load_embeddings

@@ -9,9 +9,9 @@ import numpy as np
 import torch
 
 from gpca.arguments import SEED
+from gpca.arrays import save_arrays
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.files import save_arrays
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance

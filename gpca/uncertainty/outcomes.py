@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
-from gpca.files import REAL, TEXT, WHOLE, load_arrays, numbers, read_csv, save_arrays, write_csv
 from gpca.pairs.dataset import Registrations
 
 # How many conditions each design has. A test holds it to designs.py, which readers of outcomes need not depend on.

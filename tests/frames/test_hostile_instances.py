@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from gpca.files import save_arrays
+from gpca.arrays import save_arrays
 from gpca.frames.instances import Instances
 
 from ..hostile import refusal

@@ -3,8 +3,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from gpca.arrays import save_arrays
 from gpca.errors import InputError
-from gpca.files import save_arrays
 from gpca.frames.instances import Instances, groups_of_frames
 
 

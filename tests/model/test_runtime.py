@@ -5,8 +5,8 @@ import pytest
 from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.settings import GPCSettings
+from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.files import write_csv
 from gpca.model.runtime import measure
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS, read_runtime
 

@@ -1,8 +1,8 @@
 import pandas as pd
 import pytest
 
+from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.files import write_csv
 from gpca.recovery.metrics import (
     collect_recovery,
     mean_seconds,

@@ -36,7 +36,7 @@ def predicted():
 @pytest.fixture(scope="session")
 def stage_files(registrations, tmp_path_factory):
     """Paths (registrations, embeddings, predictions); pose of sample p has score 0.5 + p / 100, all named right."""
-    from gpca.files import save_arrays
+    from gpca.arrays import save_arrays
     from gpca.pairs.perturbation import CONCEPTS
 
     folder = tmp_path_factory.mktemp("stages")

@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from gpca.arrays import save_arrays
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
-from gpca.files import read_image, save_arrays
+from gpca.files import read_image
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import wilson_interval
 from gpca.reporting.figures.policy import draw_mitigation, read_policy

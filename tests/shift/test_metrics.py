@@ -3,8 +3,8 @@ import pandas as pd
 import pytest
 
 from gpca.attribution import diagnostics
+from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.files import write_csv
 from gpca.shift.learners import predict_sets
 from gpca.shift.metrics import TABLE, collect_diagnostics, read_learner_predictions, uncertainty_metrics
 from gpca.shift.sets import DISTANCES, ShiftedSets

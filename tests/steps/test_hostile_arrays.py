@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from gpca.files import save_arrays
+from gpca.arrays import save_arrays
 from gpca.shift.sets import DISTANCES
 from gpca.uncertainty.designs import DESIGNS
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
+from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
-from gpca.files import numbers, read_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds
 from gpca.reporting.figures.style import CONCEPT_COLOURS, SMALL_PT

@@ -8,7 +8,7 @@ import numpy as np
 
 from gpca.alignment.pose_error import CORRECT
 from gpca.alignment.rigid import transform
-from gpca.files import load_arrays
+from gpca.arrays import load_arrays
 from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.frame_views import draw_score_bars

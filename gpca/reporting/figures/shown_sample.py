@@ -10,8 +10,8 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.csv_file import numbers
 from gpca.errors import InputError
-from gpca.files import numbers
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.comparison.verdicts import CLOSE, NOT_REPRODUCED, REPRODUCED
+from gpca.csv_file import read_csv
 from gpca.errors import InputError
-from gpca.files import read_csv
 
 TONES = {REPRODUCED: "good", CLOSE: "near", NOT_REPRODUCED: "bad"}  # Other verdicts judge nothing.
 _COLUMNS = (

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from gpca.alignment.rigid import scale_translation, transform
+from gpca.arrays import save_arrays
 from gpca.errors import InputError
-from gpca.files import save_arrays
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.reporting.figures.concepts import (

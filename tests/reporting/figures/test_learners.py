@@ -1,8 +1,8 @@
 import pytest
 
 from baselines.registry import explainer_entry
+from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.files import write_csv
 from gpca.reporting.figures.learners import draw_coverage_risk, draw_reliability, draw_uncertainty_vs_distance
 from gpca.shift.learners import predict_sets
 from gpca.shift.metrics import read_learner_predictions

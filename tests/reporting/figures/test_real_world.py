@@ -7,8 +7,9 @@ import pytest
 from gpca.attribution.metrics import collect, write_metrics
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
+from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.files import read_image, write_csv
+from gpca.files import read_image
 from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings
@@ -39,7 +40,7 @@ def results(tiny, tmp_path_factory):
     )
     write_predictions(predictions, registrations, filled)
     write_metrics(collect([predictions]), folder / "metrics.csv")
-    from gpca.files import save_arrays
+    from gpca.arrays import save_arrays
 
     save_arrays(
         folder / "objects.npz",

@@ -1,0 +1,111 @@
+"""Arrays in npz files: without pickles, and no more of them in memory than the machine can hold."""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.files import whole_file
+from gpca.limits import LARGEST_NUMBER, is_bounded, require_memory
+
+TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy
+_KNOWN = f"b{REAL}{TEXT}"
+_LONGEST_HEADER = 10_000  # bytes; NumPy parses none that is longer
+
+
+def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write an npz whose bytes depend on the arrays alone (NumPy stamps every member 1980-01-01)."""
+    with whole_file(path) as partial:
+        np.savez(partial, allow_pickle=False, **arrays)
+
+
+def load_arrays(
+    path: str | Path, shapes: Mapping[str, tuple[int | str, ...]], made_by: str, kinds: Mapping[str, str] | None = None
+) -> dict[str, np.ndarray]:
+    """Load the arrays of an npz that a stage needs, and no others.
+
+    What their headers say is checked before any data is read, so that a small file cannot fill the memory.
+
+    Args:
+        path: the file.
+        shapes: for each needed array its shape; a number must match, a letter (``"S"``) must be the
+            same size wherever it occurs.
+        made_by: the command that writes such a file; named in the message.
+        kinds: for some of them what they may hold: `TEXT`, `WHOLE` or `REAL`. Any other may hold each of these.
+
+    Raises:
+        InputError: missing or unreadable file, pickled objects, missing array, wrong shape or type, more than the
+            machine can hold, NaN, infinity, or numbers beyond all that can be measured.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no such file", f"make it with '{made_by}'")
+    remedy = f"make it anew with '{made_by}'"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = _checked_members(archive, path, shapes, kinds or {}, remedy)
+            arrays = {name: _read_array(archive, info) for name, info in members.items()}
+    except InputError:
+        raise
+    except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
+        raise InputError(path, "is not a readable npz archive", remedy) from fault
+    for name, array in arrays.items():
+        if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():
+            found = "NaN or infinity" if not np.isfinite(array).all() else f"numbers above {LARGEST_NUMBER:.0e}"
+            raise InputError(path, f"array '{name}' holds {found}", remedy)
+    return arrays
+
+
+def _checked_members(archive, path, shapes, kinds, remedy) -> dict[str, zipfile.ZipInfo]:
+    """Return the member of each array, once its header is found to be right."""
+    listed = archive.namelist()
+    sizes: dict[str, int] = {}
+    members = {}
+    for name, shape in shapes.items():
+        if (count := listed.count(f"{name}.npy")) != 1:
+            raise InputError(path, f"array '{name}' is {'there twice' if count else 'missing'}", remedy)
+        members[name] = info = archive.getinfo(f"{name}.npy")
+        if not is_bounded(info):
+            raise InputError(path, f"array '{name}' is compressed in a way that npz does not know", remedy)
+        with archive.open(info) as stream:
+            actual, dtype, start = _npy_header(stream)
+        if dtype.hasobject:
+            raise InputError(path, "holds pickled objects, which are never loaded", remedy)
+        _check_shape(path, name, actual, shape, sizes, remedy)
+        if math.prod(actual) and dtype.kind not in kinds.get(name, _KNOWN):
+            raise InputError(path, f"array '{name}' is of type {dtype}", remedy)
+        if start + math.prod(actual) * dtype.itemsize != info.file_size:
+            raise ValueError(f"array '{name}' is not as long as its header says")
+    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
+    return members
+
+
+def _npy_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype, int]:
+    """Return shape, type and length of the header of a member; it may claim to be gigabytes long itself."""
+    head = io.BytesIO(stream.read(_LONGEST_HEADER))
+    version = np.lib.format.read_magic(head)
+    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+    shape, _, dtype = read(head)
+    return shape, dtype, head.tell()
+
+
+def _read_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    with archive.open(info) as stream:
+        return np.lib.format.read_array(stream, allow_pickle=False)
+
+
+def _check_shape(path, name, actual, shape, sizes, remedy) -> None:
+    matches = len(actual) == len(shape) and all(
+        sizes.setdefault(size, found) == found if isinstance(size, str) else size == found
+        for size, found in zip(shape, actual, strict=True)
+    )
+    if not matches:
+        expected = "×".join(str(sizes.get(size, size)) for size in shape) or "scalar"
+        raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {expected}", remedy)
