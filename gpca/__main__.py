@@ -24,6 +24,7 @@ STEPS = {
     "embed": "registrations and encoder -> embeddings",
     "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
+    "causes": "canonical clouds -> pairs with any subset of the causes, and what each cause does to the error",
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",

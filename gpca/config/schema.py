@@ -13,11 +13,12 @@ from typing import Annotated, Any
 
 import yaml
 
+from gpca.causes.settings import CauseSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.verdicts import Tolerance
 from gpca.config import sections
 from gpca.config.explainer_section import EXPLAINERS
-from gpca.config.json_schema import COMPLETE, Keys, Named, schema_of
+from gpca.config.json_schema import COMPLETE, EVERY, Keys, Named, schema_of
 from gpca.config.robot_sections import RealWorld, Recovery
 from gpca.config.source_section import NAME, Place, Source
 from gpca.encoders.settings import OPTIONS, EncoderSettings
@@ -57,6 +58,7 @@ BY_NAME = Bounds(minProperties=1, propertyNames=NAME)
 SHIFT = Keys(
     required=("samples", "severities", "held_out_share", "encoder", "neighbours", "shape_points"), without=("beyond",)
 )
+COMPLETE_CAUSES = Keys(required=EVERY, without=("icp", "icp_points"))
 GRID = Keys(required=("sources", "kernels", "learning_rates", "iterations"))
 LEARNING = Keys(
     required=(
@@ -90,6 +92,7 @@ class Config:
         dict[str, Annotated[sections.Design, Keys(without=("icp",))]],
         Bounds(propertyNames={"enum": list(DESIGNS)}, required=["causal"]),
     ]
+    causes: Annotated[CauseSettings, COMPLETE_CAUSES]
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
     active_learning: Annotated[sections.ActiveLearning, LEARNING]
     kernel_grid: Annotated[sections.Grid, GRID]

@@ -71,6 +71,11 @@ def _chosen(views: list[_View], scale: float, views_per_instance: int) -> Iterat
             yield Surface(name, pcd.parse(read(), subject) * scale, None)
 
 
+def instance_of(name: str) -> str:
+    """Return the instance that a view is of, by its name; a name of another form is an instance of its own."""
+    return _order(name)[0]
+
+
 def _order(name: str) -> tuple[str, int, int]:
     """Instance, sequence, frame; a name of another form is an instance of its own."""
     match = re.fullmatch(r"(.+)_(\d+)_(\d+)", name)
