@@ -34,6 +34,7 @@ pathvars:
 include: "workflow/rules/common.smk"
 include: "workflow/rules/objects.smk"
 include: "workflow/rules/registrations.smk"
+include: "workflow/rules/causes.smk"
 include: "workflow/rules/frames.smk"
 include: "workflow/rules/encoders.smk"
 include: "workflow/rules/uncertainty.smk"
