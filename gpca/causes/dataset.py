@@ -119,9 +119,10 @@ def _possible(arrays: dict[str, np.ndarray], registrations: Registrations) -> di
     tested_S = registrations.split == "test"
     for again, applied in (("", arrays["applied"]), ("_again", arrays["applied"][tested_S])):
         error, uncertainty = arrays[f"error{again}"], arrays[f"uncertainty{again}"]
-        alike = _same_where_not_applied(error, applied) & _same_where_not_applied(uncertainty, applied)
-        possible[f"error{again}"] = (error >= 0) & (error <= LARGEST_ERROR + ROUNDING) & alike[:, None]
+        possible[f"error{again}"] = (error >= 0) & (error <= LARGEST_ERROR + ROUNDING)
         possible[f"uncertainty{again}"] = (uncertainty >= 0) & (uncertainty[:, :1] <= ROUNDING)
+        for name, worth in ((f"error{again}", error), (f"uncertainty{again}", uncertainty)):
+            possible[name] = possible[name] & _same_where_not_applied(worth, applied)[:, None]
     # ICP from the initial pose is the first of the runs, and the registration.
     runs_S_n = arrays["T_target_source_runs"]
     first_S = np.abs(runs_S_n[:, :1] - registrations.T_target_source_icp[:, None]).max(axis=(1, 2, 3), initial=0)

@@ -84,7 +84,8 @@ class Quotas:
     def refuse_to_go_on(self, source: str, seed: int, split: str, candidates: int) -> InputError:
         """Return what to raise: which group is the rarest, and what to widen."""
         open_groups = [group for group, left in self._left.items() if left]
-        name, several = min(open_groups, key=lambda group: 1 - self._left[group] / self._wanted[group])
+        # The least filled one; of several that are empty, the largest.
+        name, several = min(open_groups, key=lambda g: (1 - self._left[g] / self._wanted[g], -self._wanted[g]))
         wanted = self._wanted[name, several]
         state = {NOMINAL: "nominal", BORDERLINE: "borderline", GEOMETRY: "off when clean"}.get(name)
         if state is None:
@@ -92,8 +93,8 @@ class Quotas:
         found = (
             f"{candidates} candidates gave {wanted - self._left[name, several]} of {wanted} samples that are {state}"
         )
-        fewer = f"causes.shares.{name}" + (" or change causes.several" if name in CONCEPTS else "")
-        remedy = f"{REMEDIES[name]}, or lower {fewer}"
+        change = f", {'lower' if several else 'raise'} causes.several" if name in CONCEPTS else ""
+        remedy = f"{REMEDIES[name]}{change}, or give some of causes.shares.{name} to another share"
         return InputError(f"causes of {source}, seed {seed}, {split}", found, remedy)
 
 

@@ -24,6 +24,11 @@ SHIFT = {
     "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
     "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "shape_points": 16,
 }  # fmt: skip
+CAUSES = {  # of two symmetric objects with few points: only pose errors make them fail
+    "train": 12, "test": 6, "points": [64, 128], "limits": {"nominal": 0.05, "failed": 0.06},
+    "shares": {"nominal": 0.5, "borderline": 0.1, "noise": 0, "pose": 0.4, "overlap": 0}, "several": 0,
+    "severities": {"noise": [0.01, 0.05]}, "clean_pairs": 20, "candidates": 50,
+}  # fmt: skip
 COMMON = {"--source": "tiny"}
 STEP_OPTIONS = {
     "objects": COMMON | {
@@ -33,6 +38,10 @@ STEP_OPTIONS = {
     "registrations": COMMON | {
         "--settings": {"train": 18, "test": 6, "cloud_points": 128}, "--seed": 0, "--objects": "objects.npz",
         "--out": "registrations.npz", "--timings": "icp.csv",
+    },
+    "causes": COMMON | {
+        "--settings": CAUSES | {"icp": {"max_iterations": 30}}, "--seed": 100, "--objects": "objects.npz",
+        "--out": "causes.npz", "--candidates": "candidates.csv", "--timings": "causes_timings.csv",
     },
     "train": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--out": "weights.pt",
