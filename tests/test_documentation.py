@@ -139,6 +139,7 @@ def test_every_page_of_the_docs_is_in_the_index():
         ("comparison", 14),
         ("active_learning", 15),
         ("real_world", 5),
+        ("causes", 20),
     ],
 )
 def test_every_number_of_a_page_is_that_of_the_config(page, fewest):

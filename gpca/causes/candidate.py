@@ -63,8 +63,8 @@ def draw_candidate(
         surface: (N, 3) points of the object, of which model and observation take different ones.
         applied: (3,) of :func:`draw_applied`.
     """
-    ranges = settings.severities
-    counts = np.exp(random.uniform(*np.log(settings.points), size=2)).round().astype(int)
+    ranges, (fewest, most) = settings.severities, settings.points
+    counts = np.exp(random.uniform(np.log(fewest), np.log(most), size=2)).round().astype(int)
     n_model, n_observed = np.minimum(counts, len(surface) // 2)
     order = random.permutation(len(surface))
     model, clean = surface[order[:n_model]], surface[order[n_model : n_model + n_observed]]

@@ -97,10 +97,13 @@ class Causes:
             if not np.all(within):
                 raise InputError(path, f"'{name}' holds what cannot be", f"make it anew with '{MADE_BY}'")
         limits = {name: float(arrays[name]) for name in LIMITS}
+        truth, truth_again = (
+            Truth(arrays[f"error{again}"], arrays[f"uncertainty{again}"], **limits) for again in ("", "_again")
+        )
         return cls(
             registrations=registrations,
-            truth=Truth(*(arrays[name] for name in MEASURED), **limits),
-            truth_again=Truth(*(arrays[f"{name}_again"] for name in MEASURED), **limits),
+            truth=truth,
+            truth_again=truth_again,
             **{name: arrays[name] for name in COLUMNS},
         )
 

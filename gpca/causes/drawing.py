@@ -12,7 +12,7 @@ from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.causes.candidate import draw_applied, draw_candidate
 from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.dataset import COLUMNS, Causes
-from gpca.causes.quotas import UNSEEN, Quotas, Tally, group_of, state_of
+from gpca.causes.quotas import UNSEEN, Group, Quotas, Tally, group_of, state_of
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL, NONE, SUBSETS
 from gpca.causes.subjects import Subject, measure_clean_pairs, read_subjects, split_by_object
@@ -43,7 +43,7 @@ def draw_causes(
     """
     subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
     drawing = _Drawing(source, seed, settings, uncertainty_limit)
-    records = []
+    records: list[dict[str, Any]] = []
     for split, of_split in split_by_object(subjects, source, seed, settings).items():
         records += drawing.of_split(split, of_split)
     causes, icp_seconds_S = _as_causes(records)
@@ -58,44 +58,46 @@ class _Drawing:
     uncertainty_limit: float
     tally: Tally = field(default_factory=Tally)
 
-    def of_split(self, split: str, subjects: list[Subject]) -> list[dict]:
+    def of_split(self, split: str, subjects: list[Subject]) -> list[dict[str, Any]]:
         """Return the rows of one split; its candidates show its objects in turn."""
         wanted = getattr(self.settings, split)
-        quotas, records = Quotas(wanted, self.settings), []
+        quotas = Quotas(wanted, self.settings)
+        records: list[dict[str, Any]] = []
         most = self.settings.candidates * wanted
         for number in progress(range(most), f"candidates of {self.source}, seed {self.seed}, {split}", total=None):
-            record = self._try(split, number, subjects[number % len(subjects)], quotas)
+            subject = subjects[number % len(subjects)]
+            record, group = self._try(split, number, subject, quotas)
+            self.tally.count(split, subject.name, group, kept=record is not None)
             if record is not None:
+                quotas.take(group)
                 records.append(record | {"sample": len(records), "split": split, "candidate": number})
             if quotas.all_filled():
                 return records
         raise quotas.refuse_to_go_on(self.source, self.seed, split, most)
 
-    def _try(self, split: str, number: int, subject: Subject, quotas: Quotas) -> dict | None:
-        """Return the row of a candidate, None where it is refused: as soon as it cannot be wanted."""
+    def _try(self, split: str, number: int, subject: Subject, quotas: Quotas) -> tuple[dict[str, Any] | None, Group]:
+        """Return the row of a candidate and its group; no row where it is refused, as soon as it cannot be wanted."""
         axes = (self.source, self.seed, "causes", split, number)
         random = generator(*axes)
         applied = draw_applied(self.settings, random)
         if not quotas.wants_applied(applied):
-            return self.tally.count(split, subject.name, UNSEEN, kept=False)
+            return None, UNSEEN
         registrar = Registrar(draw_candidate(subject.surface, applied, self.settings, random), self.settings)
         measured = self._counterfactuals(registrar, subject, axes, "starts")
         try:
             state = state_of(self._truth(measured, ENDS))
             if not quotas.wants_state(state, applied):
-                return self.tally.count(split, subject.name, (state, False), kept=False)
+                return None, (state, False)
             truth = self._truth(measured)
             group = group_of(truth)
             if not quotas.wants(group):
-                return self.tally.count(split, subject.name, group, kept=False)
+                return None, group
             record = {**self._observed(registrar, subject, axes), "truth": truth}
             if split == "test":
                 record["again"] = self._truth(self._counterfactuals(registrar, subject, axes, "other starts"))
         except Unmeasurable as fault:
-            return self.tally.count(split, subject.name, (str(fault), False), kept=False)
-        quotas.take(group)
-        self.tally.count(split, subject.name, group, kept=True)
-        return record
+            return None, (str(fault), False)
+        return record, group
 
     def _counterfactuals(self, registrar: Registrar, subject: Subject, axes: tuple, starts: str) -> Counterfactuals:
         return Counterfactuals(registrar, subject.errors, self._twists(axes, starts), self.settings)
@@ -147,7 +149,7 @@ class _Drawing:
         }
 
 
-def _as_causes(records: list[dict]) -> tuple[Causes, np.ndarray]:
+def _as_causes(records: list[dict[str, Any]]) -> tuple[Causes, np.ndarray]:
     truth = joined([record["truth"] for record in records])
     concept_S = np.array(CONCEPTS)[truth.phi.argmax(axis=1)]
     registrations, icp_seconds_S = as_registrations(

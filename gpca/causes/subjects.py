@@ -128,7 +128,7 @@ def _clean_pair(
     xi_n_6 = random.normal(size=(settings.starts, 6)) * settings.deviation_6()
     runs = [Counterfactuals(Registrar(pair, settings), subject.errors, xi_n_6, settings) for pair in (first, second)]
     try:
-        covariances = [pair.covariance(NONE) for pair in runs]
-        return runs[0].error(NONE), float(divergence(*covariances, settings.floor))
+        uncertainty = divergence(runs[0].covariance(NONE), runs[1].covariance(NONE), settings.floor)
+        return runs[0].error(NONE), float(uncertainty)
     except Unmeasurable:
         return None
