@@ -45,15 +45,17 @@ class Quotas:
     """
 
     def __init__(self, total: int, settings: CauseSettings) -> None:
-        self._wanted: dict[Group, int] = {}
-        for name, count in apportion(total, asdict(settings.shares)).items():
-            several = round(settings.several * count) if name in CONCEPTS else 0
-            self._wanted |= {(name, False): count - several, (name, True): several}
-        self._left = dict(self._wanted)
+        low, high = settings.several
+        self._wanted = apportion(total, asdict(settings.shares))
+        self._most: dict[Group, int] = {}  # so that the other kind can still reach its least number
+        for name, count in self._wanted.items():
+            fewest, most = (round(low * count), round(high * count)) if name in CONCEPTS else (0, 0)
+            self._most |= {(name, False): count - fewest, (name, True): most}
+        self._taken: Counter[Group] = Counter()
 
     def all_filled(self) -> bool:
         """Whether nothing is wanted any more."""
-        return not any(self._left.values())
+        return all(self._count(name) == wanted for name, wanted in self._wanted.items())
 
     def wants_applied(self, applied: np.ndarray) -> bool:
         """Whether a candidate with these causes (3,) could be wanted, whatever comes of it."""
@@ -65,37 +67,41 @@ class Quotas:
         A cause that was not applied is never dominant, and several causes need as many that were applied.
         """
         if state != FAILED:
-            return self._left[state, False] > 0
+            return self.wants((state, False))
         several_possible = applied.sum() > 1
         return any(
-            self._left[concept, several] > 0
+            self.wants((concept, several))
             for concept in np.array(CONCEPTS)[applied].tolist()
             for several in ((False, True) if several_possible else (False,))
         )
 
     def wants(self, group: Group) -> bool:
         """Whether a candidate of this group is wanted."""
-        return self._left[group] > 0
+        return self._taken[group] < self._most[group] and self._count(group[0]) < self._wanted[group[0]]
 
     def take(self, group: Group) -> None:
         """Count a candidate that is kept."""
-        self._left[group] -= 1
+        self._taken[group] += 1
 
     def refuse_to_go_on(self, source: str, seed: int, split: str, candidates: int) -> InputError:
         """Return what to raise: which group is the rarest, and what to widen."""
-        open_groups = [group for group, left in self._left.items() if left]
+        unfilled = [name for name, wanted in self._wanted.items() if self._count(name) < wanted]
         # The least filled one; of several that are empty, the largest.
-        name, several = min(open_groups, key=lambda g: (1 - self._left[g] / self._wanted[g], -self._wanted[g]))
-        wanted = self._wanted[name, several]
+        name = min(unfilled, key=lambda name: (self._count(name) / self._wanted[name], -self._wanted[name]))
         state = {NOMINAL: "nominal", BORDERLINE: "borderline", GEOMETRY: "off when clean"}.get(name)
+        change = ""
         if state is None:
-            state = f"failed by {name} {'among several causes' if several else 'alone'}"
-        found = (
-            f"{candidates} candidates gave {wanted - self._left[name, several]} of {wanted} samples that are {state}"
-        )
-        change = f", {'lower' if several else 'raise'} causes.several" if name in CONCEPTS else ""
+            state = f"failed by {name}"
+            lacking = [several for several in (False, True) if self.wants((name, several))]
+            if len(lacking) == 1:
+                state += " among several causes" if lacking[0] else " alone"
+                change = ", widen causes.several"
+        found = f"{candidates} candidates gave {self._count(name)} of {self._wanted[name]} samples that are {state}"
         remedy = f"{REMEDIES[name]}{change}, or give some of causes.shares.{name} to another share"
         return InputError(f"causes of {source}, seed {seed}, {split}", found, remedy)
+
+    def _count(self, name: str) -> int:
+        return self._taken[name, False] + self._taken[name, True]
 
 
 def state_of(truth: Truth) -> str:

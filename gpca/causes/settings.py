@@ -83,7 +83,7 @@ class CauseSettings(UncertaintySettings):
         test_objects: share of the objects that only test samples show, at least one.
         points: range of the number of points of a cloud, drawn for the model and for what was observed apart.
         present: probability of each cause.
-        several: share of the failed of each dominant cause that have more than one cause.
+        several: range of the share that has several causes, of the failed of each dominant cause.
         clean_pairs: on which the limit of the uncertainty is measured.
         candidates: drawn for each sample that is wanted, at most.
     """
@@ -98,15 +98,17 @@ class CauseSettings(UncertaintySettings):
     severities: CauseSeverities = field(default_factory=CauseSeverities)
     limits: Limits = field(default_factory=Limits)
     shares: Shares = field(default_factory=Shares)
-    several: Share = 0.5
+    several: tuple[Share, Share] = (0.3, 0.7)
     clean_pairs: Annotated[int, Bounds(minimum=20)] = 200
     candidates: Annotated[int, Bounds(minimum=1, maximum=1000)] = 20
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        low, high = self.points
-        if low > high:
-            raise InputError("causes points", f"[{low}, {high}] runs downwards", "swap the two")
+        for name in ("points", "several"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise InputError(f"causes {name}", f"[{low}, {high}] runs downwards", "swap the two")
+        low = self.points[0]
         if (left := round(low * (1 - self.severities.crop[1]))) < FEWEST_POINTS:
             fault = f"of {low} points the largest crop leaves {left}"
             remedy = f"raise causes.points or lower causes.severities.crop until {FEWEST_POINTS} are left"
@@ -126,6 +128,5 @@ class CauseSettings(UncertaintySettings):
         for name, kind in (("limits", Limits), ("shares", Shares)):
             if name in given:
                 given[name] = kind(**given[name])
-        if "points" in given:
-            given["points"] = tuple(given["points"])
+        given |= {name: tuple(given[name]) for name in ("points", "several") if name in given}
         return cls(**given, icp=ICPSettings(**icp or {}))

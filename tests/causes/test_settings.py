@@ -12,6 +12,7 @@ FAULTS = [
         "of 64 points the largest crop leaves 6; raise causes.p",
     ),
     ({"severities": {"outliers": [0.2, 0.1]}}, r"severity outliers: \[0.2, 0.1\] runs downwards"),
+    ({"several": [0.7, 0.3]}, r"causes several: \[0.7, 0.3\] runs downwards"),
     ({"starts": 12}, "'starts': 12; give at least 13"),
 ]
 

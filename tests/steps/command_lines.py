@@ -26,7 +26,7 @@ SHIFT = {
 }  # fmt: skip
 CAUSES = {  # of two symmetric objects with few points: only pose errors make them fail
     "train": 12, "test": 6, "points": [64, 128], "limits": {"nominal": 0.05, "failed": 0.06},
-    "shares": {"nominal": 0.5, "borderline": 0.1, "noise": 0, "pose": 0.4, "overlap": 0}, "several": 0,
+    "shares": {"nominal": 0.5, "borderline": 0.1, "noise": 0, "pose": 0.4, "overlap": 0}, "several": [0, 0],
     "severities": {"noise": [0.01, 0.05]}, "clean_pairs": 20, "candidates": 50,
 }  # fmt: skip
 COMMON = {"--source": "tiny"}

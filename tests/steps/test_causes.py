@@ -48,7 +48,12 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, fault):
 
 def test_states_that_cannot_be_filled_end_with_what_to_widen(folder):
     changes = settings("causes", severities={"rotation_deg": [0, 0], "translation": [0, 0.001]}, candidates=1)
-    line = refusal(arguments("causes", changes), folder, "12 candidates gave 0 of 5", "failed by pose alone")
+    line = refusal(
+        arguments("causes", changes),
+        folder,
+        "12 candidates gave 0 of 5",
+        "failed by pose alone; raise causes.severities",
+    )
     assert "raise causes.severities.rotation_deg or causes.severities.translation" in line
 
 
