@@ -24,7 +24,9 @@ from gpca.uncertainty.spread import divergence
 
 JUDGED_POINTS = 256  # of the model, over which an error is the mean
 SYMMETRY_POINTS = 4096  # as everywhere where symmetries are sought
-MOST_FAILING = 0.5  # of an object's clean pairs; where more are off, the object tells nothing about causes
+# Of an object's clean pairs. Where more are off, hardly any of its candidates would be kept; of the others, those whose
+# own clean pair is off are refused one by one. Half would be a matter of chance for mugs, at so few pairs each.
+MOST_FAILING = 0.9
 FEWEST_INSTANCES = 2  # one for training, one for testing; intervals over objects need more
 
 
@@ -85,7 +87,7 @@ def measure_clean_pairs(
 ) -> tuple[list[Subject], float]:
     """Measure pairs to which nothing was done.
 
-    An object whose clean pairs are off for the most part is left out, unless the settings ask for samples of that kind.
+    An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind.
 
     Returns:
         the subjects that are left; the limit of the uncertainty: the quantile `settings.limits.clean` of the divergence
@@ -111,7 +113,7 @@ def measure_clean_pairs(
         uncertainties += [uncertainty for _, uncertainty in found]
     if not uncertainties:
         limit = f"{100 * settings.limits.nominal:g} % of the diameter"
-        fault = f"of every object most clean pairs are off by {limit} or more, or cannot be registered"
+        fault = f"of every object nearly all clean pairs are off by {limit} or more, or cannot be registered"
         raise InputError(f"causes of {source}", fault, "raise causes.limits.nominal or causes.points")
     return left, float(np.quantile(uncertainties, settings.limits.clean))
 

@@ -66,7 +66,7 @@ def test_they_stay_where_that_kind_is_asked_for(subjects, capsys):
     asked = replace(SETTINGS, shares=Shares(nominal=0.1, geometry=0.2))
     assert measure_clean_pairs(wrong, "four", 100, asked)[0] == wrong
     with pytest.raises(
-        InputError, match=r"of every object most clean pairs are off by 2 % .*; raise causes.limits.nomi"
+        InputError, match=r"of every object nearly all clean pairs are off by 2 % .*; raise causes.limits.nomi"
     ):
         measure_clean_pairs(wrong, "four", 100, SETTINGS)
     assert len(capsys.readouterr().err.splitlines()) == len(wrong)
