@@ -1,4 +1,5 @@
-# GP-CA Bench: `snakemake -j2 all` makes everything; tables, figures and stages are targets by name: `table2`, `objects`.
+# GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names; every table, figure
+# and stage is a target by its name: `snakemake -j2 table2`, `fig5`, `objects`, `paper` (what the paper shows).
 import sys
 
 sys.path.insert(0, str(workflow.current_basedir))
