@@ -29,13 +29,17 @@ class Allowance:
         tolerances: the largest difference, for each kind in `KINDS`.
         half_widths: or so many half-widths of the reference's 95 % interval.
         flipped: or what follows from the share of samples that another rounding may decide otherwise,
-        deviations: and so many standard deviations of their balance.
+        deviations: and so many standard deviations of their balance;
+        ratio: or so much of a number of labels or epochs, which a target reached one step later changes.
+        beyond: the share of a file's values that may differ by more, as a learning curve that reaches its target does.
     """
 
     tolerances: Mapping[str, float]
     half_widths: float
     flipped: float
     deviations: float
+    ratio: float
+    beyond: float
 
     def of(self, file: str, mean: Mean) -> float:
         """Return the largest difference from a mean of the reference's file that rounding explains."""
@@ -43,6 +47,8 @@ class Allowance:
         if kind not in self.tolerances:
             raise InputError("config key reference.tolerances", f"no kind '{kind}'", "give its tolerance")
         allowed = max(self.tolerances[kind], self.half_widths * mean.half_width)
+        if kind == "count" and not mean.unit:
+            allowed = max(allowed, self.ratio * abs(mean.value))
         if mean.samples and mean.unit:
             allowed = max(allowed, mean.unit * self.deviations * math.sqrt(self.flipped / mean.samples))
         return allowed
@@ -105,8 +111,9 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     largest = _difference(here[worst].value - there[worst].value, allowance.of(file, there[worst]), there[worst])
     told = f"{len(differing)} of {len(there)} values differ"
     if beyond:
-        told = f"{told}, {len(beyond)} by more than rounding does"
-    return FileCheck(file, DIFFERENT if beyond else ROUNDING, f"{told}; at most, {_named(worst)}: {largest}")
+        told = f"{told}, {len(beyond)} by more than rounding usually does"
+    too_many = len(beyond) > allowance.beyond * len(there)
+    return FileCheck(file, DIFFERENT if too_many else ROUNDING, f"{told}; at most, {_named(worst)}: {largest}")
 
 
 def _excess(difference: float, allowed: float) -> float:

@@ -127,12 +127,39 @@ def test_files_that_count_no_samples_have_those_of_their_source(folders):
     assert outcomes(folders, flipped=0)["kernels.csv"].verdict == "different"
 
 
+def test_a_few_of_many_values_may_differ_by_more(folders):
+    rows = [("kernels", "ycb", f"rbf{i}", "accuracy", "all", 0, 0.5) for i in range(40)]
+    for folder in folders:
+        write(folder / "kernels.csv", TIDY, rows)
+    for i in range(3):
+        change(folders[0] / "kernels.csv", f"rbf{i},accuracy,all,0,0.5", f"rbf{i},accuracy,all,0,0.9")
+        assert outcomes(folders)["kernels.csv"].verdict == ("different" if i == 2 else "rounding")
+    assert outcomes(folders, beyond=0.1)["kernels.csv"].verdict == "rounding"
+
+
+def test_labels_and_epochs_may_differ_by_a_ratio(folders):
+    for folder in folders:
+        write(folder / "active_learning.csv", TIDY, [("a", "ycb", "random", "labels_to_target", "all", 0, 100)])
+    change(folders[0] / "active_learning.csv", "all,0,100", "all,0,124")
+    assert outcomes(folders)["active_learning.csv"].verdict == "rounding"
+    assert outcomes(folders, ratio=0.2)["active_learning.csv"].verdict == "different"
+
+
+def test_yes_and_no_are_results_and_not_names(folders):
+    heads = ("learner", "accurate", "mean", "ci_low", "ci_high", "n_seeds", "n_test")
+    for folder in folders:
+        write(folder / "tables/table5_claims.csv", heads, [("gpca", "yes", 1.0, "", "", 1, 9)])
+    change(folders[0] / "tables/table5_claims.csv", "gpca,yes", "gpca,no")
+    assert outcomes(folders)["tables/table5_claims.csv"].verdict == "identical"
+
+
 def test_the_largest_difference_is_measured_by_what_is_allowed(folders):
     change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,1.0\n")
     change(folders[0] / "metrics.csv", "noise,all,0,50\n", "noise,all,0,52\n")
     assert outcomes(folders)["metrics.csv"].detail == (
-        "2 of 4 values differ, 1 by more than rounding does; at most, attribution / ycb / gpca / accuracy / all: "
-        "+0.05, where 0.04743 is allowed (10 of 200 samples, where 9 are expected at most)"
+        "2 of 4 values differ, 1 by more than rounding usually does; at most, "
+        "attribution / ycb / gpca / accuracy / all: +0.05, where 0.04743 is allowed "
+        "(10 of 200 samples, where 9 are expected at most)"
     )
 
 
@@ -259,8 +286,8 @@ def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, c
         ("seeds: [0]", "holds no section reference"),
         ("- a list", "holds no keys at its top level"),
         ("a: b: c", "is neither YAML nor JSON"),
-        ("reference: {tolerances: {}}", "lacks one of tolerances, half_widths, flipped, deviations"),
-        ("reference: 3", "lacks one of tolerances, half_widths, flipped, deviations"),
+        ("reference: {tolerances: {}}", "lacks one of tolerances, half_widths, flipped, deviations, ratio, beyond"),
+        ("reference: 3", "lacks one of tolerances, half_widths, flipped, deviations, ratio, beyond"),
     ],
 )
 def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_path, content, message):
