@@ -131,7 +131,9 @@ def _difference(difference: float, allowed: float, mean: Mean) -> str:
 
 def device_of(folder: Path, file: str) -> str:
     """Return the processor that a file was made on, and the level of instructions that its libraries were held to."""
-    device = _record(folder / f"{file}.provenance.json").get("device", {})
+    device = _record(folder / f"{file}.provenance.json").get("device") or {}
+    if isinstance(device, str):  # records of earlier versions have no more than the name
+        return device
     known = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
     return ", ".join(filter(None, [*known, device.get("instructions")])) or "on a processor that is not recorded"
 

@@ -107,6 +107,17 @@ def _kind():
     return "".join(f"{name} {describe()[name]}, " for name in ("family", "model") if describe()[name])
 
 
+@pytest.mark.parametrize(
+    ("device", "told"), [("Some cores", "Some cores"), (None, "on a processor that is not recorded")]
+)
+def test_records_of_earlier_versions_name_their_processor_or_none(folders, capsys, device, told):
+    path = folders[1] / "metrics.csv.provenance.json"
+    path.write_text(json.dumps({"config_sha256": "c0ffee", "device": device}))
+    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.91\n")
+    assert check(folders) == 0
+    assert f"\nreference: {told}\n" in capsys.readouterr().out
+
+
 def test_without_samples_the_tolerance_of_the_kind_holds(folders):
     for folder in (*folders, *folders):  # both seeds
         change(folder / "metrics.csv", "gpca,test_samples", "gpca,samples")
