@@ -90,11 +90,15 @@ def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[Fi
 
 
 def require_same_config(run: Path, reference: Path, files: list[str]) -> None:
-    """Raise an InputError for the first file whose provenance names another config than the reference's."""
+    """Raise an InputError for the first file whose provenance names other settings than the reference's.
+
+    A section of the config that the reference's record does not name is newer than the reference, whose results cannot
+    depend on it.
+    """
     for file in files:
         here, there = (_config_of(folder / f"{file}.provenance.json") for folder in (run, reference))
-        if here and there and here != there:
-            fault = f"{file} was made by another config than {run / file}"
+        if here and (other := sorted(section for section in there if here.get(section) != there[section])):
+            fault = f"{file} was made with another section '{other[0]}' of the config than {run / file}"
             raise InputError(reference, fault, "compare a run of that config, or make the reference anew")
 
 
@@ -138,8 +142,10 @@ def device_of(folder: Path, file: str) -> str:
     return ", ".join(filter(None, [*known, device.get("instructions")])) or "on a processor that is not recorded"
 
 
-def _config_of(path: Path) -> str | None:
-    return _record(path).get("config_sha256")
+def _config_of(path: Path) -> dict[str, str]:
+    """The hash of each section of the config, where the record has them: those of earlier versions have one for all."""
+    sections = _record(path).get("config_sha256")
+    return sections if isinstance(sections, dict) else {}
 
 
 def _record(path: Path) -> dict:

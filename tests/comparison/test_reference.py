@@ -49,7 +49,7 @@ def folders(tmp_path):
     )
     write(there / "comparison.csv", ("table", "row"), [("I", "YCB")])
     for file in ("metrics.csv", "tables/table1.csv"):
-        record = {"config_sha256": "c0ffee", "device": describe() | {"name": "A processor"}}
+        record = {"config_sha256": {"seeds": "c0ffee"}, "device": describe() | {"name": "A processor"}}
         (there / f"{file}.provenance.json").write_text(json.dumps(record))
     here = tmp_path / "results/tiny"
     shutil.copytree(there, here)
@@ -112,7 +112,7 @@ def _kind():
 )
 def test_records_of_earlier_versions_name_their_processor_or_none(folders, capsys, device, told):
     path = folders[1] / "metrics.csv.provenance.json"
-    path.write_text(json.dumps({"config_sha256": "c0ffee", "device": device}))
+    path.write_text(json.dumps({"config_sha256": {"seeds": "c0ffee"}, "device": device}))
     change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.91\n")
     assert check(folders) == 0
     assert f"\nreference: {told}\n" in capsys.readouterr().out
@@ -228,9 +228,17 @@ def test_a_reference_of_another_config_is_refused(folders, capsys):
     change(folders[1] / "metrics.csv.provenance.json", "c0ffee", "tea")
     assert check(folders) == 2
     line = one_line(capsys)
-    assert f"{folders[1]}: metrics.csv was made by another config than {folders[0] / 'metrics.csv'}" in line
+    other = f"metrics.csv was made with another section 'seeds' of the config than {folders[0] / 'metrics.csv'}"
+    assert f"{folders[1]}: {other}" in line
     (folders[0] / "metrics.csv.provenance.json").unlink()
     assert check(folders) == 0
+
+
+def test_a_section_that_is_newer_than_the_reference_is_no_other_config(folders):
+    change(folders[0] / "metrics.csv.provenance.json", '"seeds"', '"causes": "tea", "seeds"')
+    assert check(folders) == 0
+    change(folders[0] / "metrics.csv.provenance.json", '"seeds": "c0ffee"', '"others": "c0ffee"')
+    assert check(folders) == 2
 
 
 @pytest.mark.parametrize(
