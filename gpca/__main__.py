@@ -25,6 +25,8 @@ STEPS = {
     "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
     "causes": "canonical clouds -> pairs with any subset of the causes, and what each cause does to the error",
+    "describe": "causes -> what can be measured of each pair without knowing the truth",
+    "diagnose": "causes, and descriptors or embeddings -> predictions of one explainer of causes",
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gpca.config.checks.explainers import (
+    check_diagnosis,
     check_encoders,
     check_explainers,
     check_learners,
@@ -66,6 +67,7 @@ def check(config: dict) -> dict[str, dict]:
     check_registrations(whole)
     check_encoders(whole, encoders)
     check_explainers(whole, designs)
+    check_diagnosis(whole)
     check_strategies(whole)
     check_learners(whole)
     check_tolerances(whole)

@@ -17,10 +17,11 @@ from gpca.causes.settings import CauseSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.verdicts import Tolerance
 from gpca.config import sections
-from gpca.config.explainer_section import EXPLAINERS
+from gpca.config.explainer_section import CAUSE_EXPLAINERS, EXPLAINERS
 from gpca.config.json_schema import COMPLETE, EVERY, Keys, Named, schema_of
 from gpca.config.robot_sections import RealWorld, Recovery
 from gpca.config.source_section import NAME, Place, Source
+from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
@@ -76,6 +77,15 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Diagnosis:
+    """What says why the registrations of ``causes`` failed."""
+
+    descriptors: Annotated[DescriptorSettings, COMPLETE]
+    encoder: Encoder
+    explainers: Annotated[dict[str, Settings], BY_NAME, Named(CAUSE_EXPLAINERS)]
+
+
+@dataclass(frozen=True)
 class Config:
     """Configuration of GP-CA Bench: all its sections."""
 
@@ -93,6 +103,7 @@ class Config:
         Bounds(propertyNames={"enum": list(DESIGNS)}, required=["causal"]),
     ]
     causes: Annotated[CauseSettings, COMPLETE_CAUSES]
+    diagnosis: Diagnosis
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
     active_learning: Annotated[sections.ActiveLearning, LEARNING]
     kernel_grid: Annotated[sections.Grid, GRID]

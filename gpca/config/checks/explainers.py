@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from baselines.registry import explainer_entry, require_settings
+from baselines.registry import CAUSES, explainer_entry, require_settings
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
@@ -34,6 +34,13 @@ def check_registrations(config: dict) -> None:
         if size > LARGEST_BYTES:
             fault = f"{samples} samples have {size / 2**30:.0f} GiB of points, which one job has to hold"
             raise InputError(f"config key {section}.train", fault, f"take fewer, or lower {key}")
+
+
+def check_diagnosis(config: dict) -> None:
+    """Check the encoder and the explainers of causes."""
+    with_key("diagnosis.encoder.backbone", require_backbone, config["diagnosis"]["encoder"]["backbone"])
+    for name, settings in config["diagnosis"]["explainers"].items():
+        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
 
 
 def check_encoders(config: dict, left_out: Set[str]) -> None:
