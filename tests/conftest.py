@@ -91,3 +91,32 @@ def tiny(scenes, tmp_path_factory):
     from .frames.tiny import read
 
     return read(scenes, tmp_path_factory.mktemp("objects") / "tiny.npz")
+
+
+FOUR = ("002_master_chef_can", "019_pitcher_base", "035_power_drill", "037_scissors")
+FEW_CAUSES = {"train": 12, "test": 8, "points": (128, 256), "clean_pairs": 20}
+
+
+@pytest.fixture(scope="session")
+def four(tmp_path_factory):
+    """Four procedural objects, one of them symmetric."""
+    from gpca.objects.canonical import ObjectClouds, write_objects
+    from gpca.objects.procedural import surfaces
+
+    path = tmp_path_factory.mktemp("objects") / "four.npz"
+    write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", path, n_points=6000)
+    return ObjectClouds.load(path)
+
+
+@pytest.fixture(scope="session")
+def drawn(four):
+    """Registrations with measured causes, the tally of their candidates, and seconds."""
+    from gpca.causes.drawing import draw_causes
+    from gpca.causes.settings import CauseSettings
+
+    return draw_causes(four, "four", 100, CauseSettings(**FEW_CAUSES))
+
+
+@pytest.fixture(scope="session")
+def causes(drawn):
+    return drawn[0]

@@ -15,7 +15,7 @@ from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.uncertainty.settings import FEWEST_STARTS
 
-from .conftest import FEW
+from ..conftest import FEW_CAUSES as FEW
 
 
 def groups(causes, split):
