@@ -175,7 +175,7 @@ def members(path, change):
     """Write the zip anew, each member as `change` gives it: name, content and compression."""
     with zipfile.ZipFile(path) as archive:
         found = [(info.filename, archive.read(info)) for info in archive.infolist()]
-    with zipfile.ZipFile(path, "w") as archive:
+    with zipfile.ZipFile(path, "w", compresslevel=1) as archive:
         for name, content in found:
             for new_name, new_content, compression in change(name, content):
                 archive.writestr(new_name, new_content, compression)
