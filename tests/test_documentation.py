@@ -173,6 +173,12 @@ def test_every_configured_rival_is_described():
         assert f"`{name}`" in page or f"`…{name.removeprefix('shap_removal').removeprefix('sa_local_removal')}`" in page
 
 
+def test_every_configured_explainer_of_causes_is_described():
+    explainers = yaml.safe_load((ROOT / "config/config.yaml").read_text())["diagnosis"]["explainers"]
+    page = (ROOT / "docs/causes.md").read_text()
+    assert [name for name in explainers if f"`{name}`" not in page] == []
+
+
 def test_every_configured_learner_is_described():
     learners = yaml.safe_load((ROOT / "config/config.yaml").read_text())["learners"]
     page = (ROOT / "docs/diagnostics.md").read_text()

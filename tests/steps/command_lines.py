@@ -43,6 +43,16 @@ STEP_OPTIONS = {
         "--settings": CAUSES | {"icp": {"max_iterations": 30}}, "--seed": 100, "--objects": "objects.npz",
         "--out": "causes.npz", "--candidates": "candidates.csv", "--timings": "causes_timings.csv",
     },
+    "describe": COMMON | {
+        "--settings": {"starts": 1, "restarts": 2, "icp_points": 64, "icp": {"max_iterations": 30}}, "--seed": 100,
+        "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--out": "descriptors.npz",
+        "--timings": "descriptors.csv",
+    },
+    "diagnose": COMMON | {
+        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 100,
+        "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
+        "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
+    },
     "train": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--out": "weights.pt",
         "--curve": "curve.csv",

@@ -34,6 +34,8 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
     for step in (
         "registrations",
         "causes",
+        "describe",
+        "diagnose",
         "train",
         "embed",
         "reduce",
@@ -50,6 +52,8 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
         "registrations.npz",
         "causes.npz",
         "candidates.csv",
+        "descriptors.npz",
+        "diagnosis.csv",
         "weights.pt",
         "curve.csv",
         "embeddings.npz",
