@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.pose_error import PoseErrors
-from gpca.alignment.rigid import inverse
+from gpca.alignment.rigid import inverses
 from gpca.alignment.twist import exp
 from gpca.causes.candidate import POSE, Candidate
 from gpca.causes.shapley import NONE, SUBSETS
@@ -46,13 +46,13 @@ class Registrar:
             self._targets[alike] = BatchedICP(self.candidate.observed(causes), self._settings.icp)
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
         started = perf_counter()
-        poses_n, fitness_n, rmse_n = self._targets[alike].register(self.candidate.model, _inverses(starts_n))
+        poses_n, fitness_n, rmse_n = self._targets[alike].register(self.candidate.model, inverses(starts_n))
         seconds = perf_counter() - started
         if not np.isfinite(poses_n).all():
             raise Unmeasurable("not finite")
         if not fitness_n.any():
             raise Unmeasurable("no correspondences")
-        return Runs(_inverses(poses_n), fitness_n, rmse_n, len(poses_n), seconds)
+        return Runs(inverses(poses_n), fitness_n, rmse_n, len(poses_n), seconds)
 
 
 class Counterfactuals:
@@ -95,12 +95,8 @@ class Counterfactuals:
         if causes not in self._measured:
             runs = self._registrar.run(causes, self._xi_n_6)
             # An error is that of the model's pose in what was observed.
-            errors_n = np.minimum(self._errors(_inverses(runs.T_target_source_n)), LARGEST_ERROR)
+            errors_n = np.minimum(self._errors(inverses(runs.T_target_source_n)), LARGEST_ERROR)
             if not np.isfinite(errors_n).all():
                 raise Unmeasurable("not finite")
             self._measured[causes] = float(errors_n.mean()), runs.covariance(np.eye(4))
         return self._measured[causes]
-
-
-def _inverses(T_n: np.ndarray) -> np.ndarray:
-    return np.stack([inverse(T) for T in T_n])

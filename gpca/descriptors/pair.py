@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.alignment.icp import ICPSettings
+from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.rigid import inverse, scale_translation
 from gpca.causes.dataset import Causes
 
@@ -34,7 +34,7 @@ class ObservedPair:
 
     def cost_n(self, icp: ICPSettings) -> np.ndarray:
         """Return the mean squared distance of each run (n,), cut off at the correspondence distance."""
-        return clipped_cost(self.fitness_n, self.inlier_rmse_n, icp)
+        return clipped_cost(self.fitness_n, self.inlier_rmse_n, icp.correspondence_distance)
 
 
 def observed_pair(causes: Causes, row: int, *axes: object) -> ObservedPair:
@@ -51,11 +51,6 @@ def observed_pair(causes: Causes, row: int, *axes: object) -> ObservedPair:
         inlier_rmse_n=causes.inlier_rmse_runs[row],
         axes=(*axes, registrations.split[row], registrations.sample[row]),
     )
-
-
-def clipped_cost(fitness_n: np.ndarray, inlier_rmse_n: np.ndarray, icp: ICPSettings) -> np.ndarray:
-    """Return the mean squared distance of runs (n,), cut off at the correspondence distance."""
-    return fitness_n * inlier_rmse_n**2 + (1 - fitness_n) * icp.correspondence_distance**2
 
 
 def displacements(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:

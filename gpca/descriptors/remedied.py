@@ -14,12 +14,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.icp import ICPSettings
-from gpca.alignment.rigid import inverse
+from gpca.alignment.icp import ICPSettings, clipped_cost
+from gpca.alignment.rigid import inverse, inverses
 from gpca.alignment.twist import exp
 from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
-from gpca.descriptors.pair import ObservedPair, clipped_cost, displacements
+from gpca.descriptors.pair import ObservedPair, displacements
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
@@ -113,12 +113,8 @@ def _register(
 ) -> _Results:
     """Align the model to the observed cloud, as the registration did, or the observed cloud to the model."""
     if onto_observed:
-        T_n, fitness_n, rmse_n = BatchedICP(observed, icp).register(model, _inverses(starts_n))
-        T_n = _inverses(T_n)
+        T_n, fitness_n, rmse_n = BatchedICP(observed, icp).register(model, inverses(starts_n))
+        T_n = inverses(T_n)
     else:
         T_n, fitness_n, rmse_n = BatchedICP(model, icp).register(observed, starts_n)
-    return _Results(T_n, clipped_cost(fitness_n, rmse_n, icp), fitness_n)
-
-
-def _inverses(T_n: np.ndarray) -> np.ndarray:
-    return np.stack([inverse(T) for T in T_n])
+    return _Results(T_n, clipped_cost(fitness_n, rmse_n, icp.correspondence_distance), fitness_n)
