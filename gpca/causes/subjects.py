@@ -15,7 +15,7 @@ from gpca.causes.shapley import NONE
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.symmetry import find_symmetries
-from gpca.objects.uw_rgbd import instance_of
+from gpca.objects.views import instance_of
 from gpca.pairs.dataset import SPLITS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress

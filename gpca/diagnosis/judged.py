@@ -14,7 +14,7 @@ from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, labels_of
 from gpca.causes.truth import NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.objects.uw_rgbd import instance_of
+from gpca.objects.views import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 
 CEILING = "ceiling"  # the truth, measured again from other starts: no explainer can be expected to do better

@@ -32,6 +32,9 @@ RECOVERY_FIGURES = jobs("recovery_rates", "fig6_mitigation", "fig1_recovery_exam
 RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 # GP-CA on the two reductions of Table VI, and what shows it.
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
+# What six explainers say of the causes: from the samples on, and what is made of it.
+CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
+CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=12) + CAUSES_SHOWN
 # Explainers times two sources: four with a GPC (classic features on the frames too), four on embeddings, 13 on
 # uncertainties.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 4 + 2, 2 * 4, 2 * 13))
@@ -90,7 +93,8 @@ def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
 
 EDITS = {
     "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
-    + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD,
+    + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD
+    + jobs(diagnose=6) + CAUSES_SHOWN,
     "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
@@ -99,8 +103,8 @@ EDITS = {
     "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
-        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + RUNTIME + RECOVERY,
-    "baselines/softmax_head.py": jobs(attribute=2) + COLLECTORS + RECOVERY,
+        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + RUNTIME + RECOVERY + CAUSES,
+    "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
     "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
     # Not the pictures: they show an encoder without reduction.
@@ -112,14 +116,18 @@ EDITS = {
         + BACKBONES + MODEL + RECOVERY,
     "gpca/recovery/policy.py": MODEL + RECOVERY,
     "gpca/reporting/tables/explainers.py": TABLES1,
-    "gpca/reporting/figures/confusions.py": jobs("fig_attribution_confusions", "confusion_real_world"),
+    "gpca/reporting/figures/confusions.py": jobs("fig_attribution_confusions", "confusion_real_world", "cause_confusions"),
     "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
-    + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD,
+    + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
+    + jobs(train_on_causes=4, diagnose=2) + CAUSES_SHOWN,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=6)
-    + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD,
+    + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
+    + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=6) + CAUSES_SHOWN,
+    "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=10) + CAUSES_SHOWN,
+    "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
 }  # fmt: skip
 
 
