@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -13,8 +12,6 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
 LABELS = (NOMINAL, *CONCEPTS)
-CAUSES = "causes"
-KINDS = ("concepts", CAUSES)  # what may be told apart: what was perturbed, or what is wrong
 
 
 def labels_of(truth: Truth) -> np.ndarray:
@@ -36,11 +33,7 @@ def labelled(causes: Causes) -> Registrations:
     return replace(own, concept=labels_of(causes.truth), attached={**own.attached, **truth})
 
 
-def read_training(path: str | Path) -> Registrations:
-    """Read what an encoder learns from: the registrations that have a label.
-
-    Raises:
-        InputError: the file is none of causes.
-    """
-    registrations = labelled(Causes.load(path))
+def with_label(causes: Causes) -> Registrations:
+    """Return those registrations that have a label, as :func:`labelled` does."""
+    registrations = labelled(causes)
     return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))

@@ -11,11 +11,9 @@ import torch
 from gpca.arguments import SEED
 from gpca.arrays import save_arrays
 from gpca.attribution.predictions import read_timings, write_timings
-from gpca.causes.labels import CAUSES, KINDS, LABELS
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
@@ -25,7 +23,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--registration-timings", required=True, type=Path)
     parser.add_argument("--encoder", required=True, type=Path, help="weights")
-    parser.add_argument("--labels", choices=KINDS, default=KINDS[0], help="what the encoder tells apart")
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
@@ -41,7 +38,7 @@ def run(options: Namespace) -> None:
     with record_provenance([options.out, options.timings], inputs, options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         seconds_S, icp_seconds_S = read_timings(options.registration_timings, registrations)
-        model = load_model(options.encoder, settings, LABELS if options.labels == CAUSES else CONCEPTS)
+        model = load_model(options.encoder, settings)
         started = perf_counter()
         h_S_d, logits_S_C = embed(model, registrations, options.source, options.seed, settings)
         seconds = (perf_counter() - started) / len(h_S_d)

@@ -9,12 +9,10 @@ import pandas as pd
 import torch
 
 from gpca.arguments import SEED
-from gpca.causes.labels import CAUSES, KINDS, LABELS, read_training
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import train_encoder
 from gpca.files import whole_file
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
@@ -22,7 +20,6 @@ from gpca.settings import check_settings
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the encoder's section of the config."""
     parser.add_argument("--registrations", required=True, type=Path)
-    parser.add_argument("--labels", choices=KINDS, default=KINDS[0], help="what is told apart")
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path, help="weights")
@@ -34,13 +31,11 @@ def run(options: Namespace) -> None:
     torch.set_num_threads(options.threads)
     check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
-    of_causes = options.labels == CAUSES
-    registrations = (read_training if of_causes else Registrations.load)(options.registrations)
-    classes = LABELS if of_causes else CONCEPTS
+    registrations = Registrations.load(options.registrations)
     # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = options.out.with_suffix(".checkpoint")
     with record_provenance([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
-        model, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint, classes)
+        model, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
         # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
         with whole_file(options.out) as partial, partial.open("wb") as file:
             torch.save(model.state_dict(), file)

@@ -48,6 +48,11 @@ STEP_OPTIONS = {
         "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--out": "descriptors.npz",
         "--timings": "descriptors.csv",
     },
+    "train_on_causes": COMMON | {
+        "--settings": ENCODER, "--seed": 100, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
+        "--weights": "cause_weights.pt", "--curve": "cause_curve.csv", "--out": "cause_embeddings.npz",
+        "--timings": "cause_embeddings.csv",
+    },
     "diagnose": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 100,
         "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",

@@ -1,4 +1,4 @@
-"""The steps ``describe`` and ``diagnose`` by hand: what they say of faulty files and settings."""
+"""The steps ``describe``, ``train_on_causes`` and ``diagnose`` by hand: what they say of faulty files and settings."""
 
 import pytest
 
@@ -15,6 +15,12 @@ FAULTS = {
         (arrays_changed("causes.npz", error=lambda v: v + 1), {}, "causes.npz: 'error' holds what cannot be"),
         (untouched, settings("describe", restarts=0), "setting restarts: 0 is less than the minimum of 1"),
         (untouched, settings("describe", restart=3), "setting restart: unknown; did you mean restarts?"),
+        (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not hold the seconds of these samples"),
+        (untouched, {"--out": "causes.npz"}, "causes.npz"),
+    ],
+    "train_on_causes": [
+        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: lacks array"),
+        (untouched, settings("train_on_causes", epochs=0), "setting epochs: 0 is less than the minimum of 1"),
         (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not hold the seconds of these samples"),
         (untouched, {"--out": "causes.npz"}, "causes.npz"),
     ],

@@ -116,7 +116,8 @@ EDITS = {
         + BACKBONES + MODEL + RECOVERY,
     "gpca/recovery/policy.py": MODEL + RECOVERY,
     "gpca/reporting/tables/explainers.py": TABLES1,
-    "gpca/reporting/figures/confusions.py": jobs("fig_attribution_confusions", "confusion_real_world", "cause_confusions"),
+    "gpca/reporting/figures/confusions.py":
+        jobs("fig_attribution_confusions", "confusion_real_world", "cause_confusions"),
     "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
     + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD

@@ -111,13 +111,10 @@ rule train_on_causes:
     params:
         settings=as_json(DIAGNOSIS["encoder"]),
     shell:
-        "python -m gpca train --threads {threads} --registrations {input.causes} --labels causes "
-        "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.weights} --curve {output.curve} 2> {log} && "
-        "python -m gpca embed --threads {threads} --registrations {input.causes} --labels causes "
-        "--registration-timings {input.timings} --encoder {output.weights} "
-        "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.embeddings} --timings {output.timings} 2>> {log}"
+        "python -m gpca train_on_causes --threads {threads} --causes {input.causes} "
+        "--causes-timings {input.timings} --source {wildcards.source} --seed {wildcards.seed} "
+        "--settings {params.settings:q} --weights {output.weights} --curve {output.curve} "
+        "--out {output.embeddings} --timings {output.timings} 2> {log}"
 
 
 rule diagnose:
