@@ -88,9 +88,7 @@ rule train_on_causes:
         causes="<results>/causes/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/causes/seed{seed}.csv",
         code=code_files(
-            "gpca.steps.train",
-            "gpca.steps.embed",
-            backbone_module(DIAGNOSIS["encoder"]),
+            "gpca.steps.train_on_causes", backbone_module(DIAGNOSIS["encoder"])
         ),
     output:
         weights="<results>/cause_encoders/{source}/seed{seed}.pt",
