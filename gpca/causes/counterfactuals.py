@@ -1,6 +1,7 @@
 """Counterfactuals of one candidate: it is registered again with every subset of its causes, from the same starts.
 
 ICP aligns the model to what was observed, so that missing surface hurts: every point of the model looks for a partner.
+It may be asked to run the other way (:attr:`gpca.causes.settings.CauseSettings.moved`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverses
 from gpca.alignment.twist import exp
 from gpca.causes.candidate import POSE, Candidate
+from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.shapley import NONE, SUBSETS
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.uncertainty.settings import UncertaintySettings
@@ -27,7 +29,7 @@ class Unmeasurable(Exception):
 class Registrar:
     """Registers one candidate from any starts; what several calls share is worked out once."""
 
-    def __init__(self, candidate: Candidate, settings: UncertaintySettings) -> None:
+    def __init__(self, candidate: Candidate, settings: CauseSettings) -> None:
         self.candidate = candidate
         self._settings = settings
         self._targets: dict[tuple[int, ...], BatchedICP] = {}
@@ -41,18 +43,26 @@ class Registrar:
         Raises:
             Unmeasurable: no run found a correspondence, or a pose is not finite.
         """
-        alike = tuple(cause for cause in causes if cause != POSE)  # a pose error changes no cloud
-        if alike not in self._targets:
-            self._targets[alike] = BatchedICP(self.candidate.observed(causes), self._settings.icp)
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
+        observed, model = self.candidate.observed(causes), self.candidate.model
         started = perf_counter()
-        poses_n, fitness_n, rmse_n = self._targets[alike].register(self.candidate.model, inverses(starts_n))
+        if self._settings.moved == OBSERVED:
+            poses_n, fitness_n, rmse_n = self._target((), model).register(observed, starts_n)
+        else:
+            alike = tuple(cause for cause in causes if cause != POSE)  # a pose error changes no cloud
+            poses_n, fitness_n, rmse_n = self._target(alike, observed).register(model, inverses(starts_n))
+            poses_n = inverses(poses_n)
         seconds = perf_counter() - started
         if not np.isfinite(poses_n).all():
             raise Unmeasurable("not finite")
         if not fitness_n.any():
             raise Unmeasurable("no correspondences")
-        return Runs(inverses(poses_n), fitness_n, rmse_n, len(poses_n), seconds)
+        return Runs(poses_n, fitness_n, rmse_n, len(poses_n), seconds)
+
+    def _target(self, causes: tuple[int, ...], points: np.ndarray) -> BatchedICP:
+        if causes not in self._targets:
+            self._targets[causes] = BatchedICP(points, self._settings.icp)
+        return self._targets[causes]
 
 
 class Counterfactuals:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
@@ -12,6 +12,8 @@ from gpca.settings import Bounds, OpenShare, Positive, Share
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 FEWEST_POINTS = 16  # that a crop leaves of a cloud, at least; as few as Monte-Carlo ICP takes anywhere
+MODEL, OBSERVED = "model", "observed"
+Moved = Literal["model", "observed"]  # the cloud that ICP moves onto the other
 CloudPoints = Annotated[int, Bounds(minimum=64, maximum=65536)]
 
 
@@ -83,6 +85,8 @@ class CauseSettings(UncertaintySettings):
         test_objects: share of the objects that only test samples show, at least one.
         points: range of the number of points of a cloud, drawn for the model and for what was observed apart.
         present: probability of each cause.
+        moved: the cloud that ICP moves onto the other: the ``model``, which has no partners where surface is missing,
+            or what was ``observed``, which has them everywhere.
         several: range of the share that has several causes, of the failed of each dominant cause.
         clean_pairs: on which the limit of the uncertainty is measured.
         candidates: drawn for each sample that is wanted, at most.
@@ -95,6 +99,7 @@ class CauseSettings(UncertaintySettings):
     test_objects: OpenShare = 0.3
     points: tuple[CloudPoints, CloudPoints] = (128, 1024)
     present: OpenShare = 0.5
+    moved: Moved = MODEL
     severities: CauseSeverities = field(default_factory=CauseSeverities)
     limits: Limits = field(default_factory=Limits)
     shares: Shares = field(default_factory=Shares)

@@ -43,6 +43,15 @@ def test_the_error_is_the_mean_over_the_starts_and_is_cut_off(drill, subset):
     assert counterfactuals(candidate, drill).error(subset) == pytest.approx(np.mean(errors), abs=1e-9)
 
 
+def test_missing_surface_hurts_the_model_on_its_way_and_hardly_what_was_observed(drill):
+    candidate = candidate_of(drill, False, False, True)
+    errors = {}
+    for moved in ("model", "observed"):
+        settings = replace(SETTINGS, moved=moved)
+        errors[moved] = Counterfactuals(Registrar(candidate, settings), drill.errors, XI, settings).error(7)
+    assert errors["observed"] < 0.5 * errors["model"]
+
+
 def test_an_absent_cause_cannot_be_removed(drill):
     measured = counterfactuals(candidate_of(drill, True, False, False), drill)
     assert {measured.error(subset) for subset in (0, 2, 4, 6)} == {measured.error(0)}
