@@ -99,7 +99,7 @@ EDITS = {
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
     "gpca/active_learning/acquisition.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + RUNTIME,
-    "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + RUNTIME,
+    "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED,
     "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
