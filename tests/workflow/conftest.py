@@ -181,17 +181,16 @@ def finished(smoke, tmp_path):
     return smoke.copy(tmp_path / "finished")
 
 
-# These run the function of another explainer, with other settings, on another design or on the descriptors of a pair.
-OTHER_SETTINGS = {
-    *("gpca_pair", "gate_rmse"),
-    *("analytical_gpc_no_counts", "gpca_paper", "sa_local_removal_residual", "shap_oracle", "shap_removal_residual"),
-}
+# Of explainers and designs one of each kind, with the designs that these read; and the stages that are timed.
+INTERRUPTED = {"gpca", "analytical_gpc", "residuals_forest", "shap_removal", "softmax_head", "causal", "removal"}
+INTERRUPTED |= {"icp", "dgcnn", "causes", "descriptors", "cause_embeddings"}
+OF_ONE_EACH = {"predictions", "diagnoses", "uncertainty", "timings"}
 
 
 def is_interrupted(path):
-    """Whether the run that is killed and continued makes the file: one explainer of each function."""
-    parts = set(Path(path).parts)
-    return "ycb" in path and ("learners" in parts or not parts & OTHER_SETTINGS)
+    """Whether the run that is killed and continued makes the file: those of one source."""
+    names = {part.removeprefix("uncertainty_").removeprefix("diagnoses_") for part in Path(path).parts}
+    return "ycb" in path and (not names & OF_ONE_EACH or bool(names & INTERRUPTED))
 
 
 @dataclass(frozen=True)
