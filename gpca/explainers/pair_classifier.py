@@ -67,7 +67,7 @@ class PairClassifier:
     """
 
     def __init__(self, settings: GPCSettings, *axes: object) -> None:
-        self._normalised = NormalisedDescriptors(*axes)
+        self.normalised = NormalisedDescriptors(*axes)
         self._failure = GPC((NOMINAL, FAILED), settings, *axes, FAILED)
         self._causes = [GPC((ABSENT, PRESENT), settings, *axes, concept) for concept in CONCEPTS]
 
@@ -79,7 +79,7 @@ class PairClassifier:
             failed_N: whether each failed.
             causes_N_3: whether each concept is one of its causes.
         """
-        inputs_N_F = self._normalised.fit(features_N_F)(features_N_F)
+        inputs_N_F = self.normalised.fit(features_N_F)(features_N_F)
         self._failure.fit(inputs_N_F, np.where(failed_N, FAILED, NOMINAL))
         for gpc, present_N in zip(self._causes, causes_N_3.T, strict=True):
             gpc.fit(inputs_N_F, np.where(present_N, PRESENT, ABSENT))
@@ -87,14 +87,14 @@ class PairClassifier:
 
     def probabilities(self, features_N_F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the probabilities of a failure (N,), and of each concept being one of the causes (N, 3)."""
-        inputs_N_F = self._normalised(features_N_F)
+        inputs_N_F = self.normalised(features_N_F)
         failed_N, *causes = (gpc.attribute(inputs_N_F)[0][:, 1] for gpc in (self._failure, *self._causes))
         return failed_N, np.column_stack(causes)
 
     def state(self) -> dict[str, object]:
         """Return all that was learnt, for :meth:`from_state`."""
         return {
-            "quantiles": self._normalised.state(),
+            "quantiles": self.normalised.state(),
             "failure": self._failure.state(),
             "causes": [gpc.state() for gpc in self._causes],
         }
@@ -103,7 +103,7 @@ class PairClassifier:
     def from_state(cls, state: dict) -> PairClassifier:
         """Return the classifier of a :meth:`state`."""
         made = cls.__new__(cls)
-        made._normalised = NormalisedDescriptors.from_state(state["quantiles"])
+        made.normalised = NormalisedDescriptors.from_state(state["quantiles"])
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
         return made
