@@ -47,6 +47,7 @@ CHAIN = (
 LEFT_OUT = {"label", "runtime", "explain"}  # they give seconds, or text
 # Files of seconds; and a model's and an explanation's provenance.
 SECONDS = {"icp.csv", "dgcnn.csv", "gpca.csv", "uncertainty_timings.csv", "other_icp.csv", "frame_icp.csv"}
+SECONDS |= {"causes_timings.csv", "descriptors.csv", "cause_embeddings.csv", "diagnosis_timings.csv"}
 
 needs_the_level = pytest.mark.skipif(
     not processor._flags() >= processor._REQUIRED_FLAGS, reason="needs a processor with AVX2 and FMA"

@@ -12,7 +12,7 @@ from baselines.causes.trees import boosted_trees, randomised_trees
 from gpca.attribution.scores import Attribution
 from gpca.causes.labels import LABELS
 from gpca.descriptors.groups import GROUPS
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ConceptExplainer, ExplainerEntry
 from gpca.pairs.dataset import Registrations
 
 
@@ -20,7 +20,7 @@ class Committee:
     """Three explainers of unlike kinds, whose errors are not the same."""
 
     def __init__(self, source: str, seed: int) -> None:
-        self._members = [
+        self._members: list[ConceptExplainer] = [
             DescribedPairs(randomised_trees(source, seed), GROUPS),
             DescribedPairs(boosted_trees(source, seed), GROUPS),
             PairGPCA(source, seed),

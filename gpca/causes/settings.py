@@ -12,8 +12,9 @@ from gpca.settings import Bounds, OpenShare, Positive, Share
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 FEWEST_POINTS = 16  # that a crop leaves of a cloud, at least; as few as Monte-Carlo ICP takes anywhere
-MODEL, OBSERVED = "model", "observed"
 Moved = Literal["model", "observed"]  # the cloud that ICP moves onto the other
+MODEL: Moved = "model"
+OBSERVED: Moved = "observed"
 CloudPoints = Annotated[int, Bounds(minimum=64, maximum=65536)]
 
 

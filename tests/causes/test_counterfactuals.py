@@ -44,10 +44,12 @@ def test_the_error_is_the_mean_over_the_starts_and_is_cut_off(drill, subset):
 
 
 def test_missing_surface_hurts_the_model_on_its_way_and_hardly_what_was_observed(drill):
-    candidate = candidate_of(drill, False, False, True)
+    dense = replace(SETTINGS, points=(512, 512), severities=replace(SETTINGS.severities, crop=(0.7, 0.7)))
+    applied = np.array([False, False, True])
+    candidate = draw_candidate(drill.surface, applied, dense, np.random.default_rng(7))
     errors = {}
     for moved in ("model", "observed"):
-        settings = replace(SETTINGS, moved=moved)
+        settings = replace(dense, moved=moved)
         errors[moved] = Counterfactuals(Registrar(candidate, settings), drill.errors, XI, settings).error(7)
     assert errors["observed"] < 0.5 * errors["model"]
 

@@ -10,7 +10,7 @@ from .command_lines import STEP_OPTIONS, arguments, arrays_changed, lines_kept, 
 
 FAULTS = {
     "describe": [
-        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: lacks array"),
+        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
         (truncated("causes.npz"), {}, "causes.npz: is not a readable npz archive"),
         (arrays_changed("causes.npz", error=lambda v: v + 1), {}, "causes.npz: 'error' holds what cannot be"),
         (untouched, settings("describe", restarts=0), "setting restarts: 0 is less than the minimum of 1"),
@@ -19,18 +19,18 @@ FAULTS = {
         (untouched, {"--out": "causes.npz"}, "causes.npz"),
     ],
     "train_on_causes": [
-        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: lacks array"),
+        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
         (untouched, settings("train_on_causes", epochs=0), "setting epochs: 0 is less than the minimum of 1"),
         (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not hold the seconds of these samples"),
         (untouched, {"--out": "causes.npz"}, "causes.npz"),
     ],
     "diagnose": [
         (untouched, {"--explainer": "shap_oracle"}, "explainer 'shap_oracle': unknown; known are"),
-        (untouched, settings("diagnose", iteration=3), "explainer 'gpca_pair'"),
-        (untouched, {"--read": "registrations.npz"}, "registrations.npz: lacks array"),
+        (untouched, settings("diagnose", iteration=3), "setting iteration: unknown; did you mean iterations?"),
+        (untouched, {"--read": "registrations.npz"}, "registrations.npz: array"),
         (arrays_changed("descriptors.npz", sample=lambda s: s[::-1]), {}, "descriptors.npz: holds other samples"),
         (arrays_changed("descriptors.npz", motion=lambda m: m * float("nan")), {}, "array 'motion' holds NaN"),
-        (untouched, {"--explainer": "gpca", "--read": "descriptors.npz"}, "descriptors.npz: lacks array 'h'"),
+        (untouched, {"--explainer": "gpca", "--read": "descriptors.npz"}, "descriptors.npz: array 'h' is missing"),
         (untouched, {"--predictions": "causes.npz"}, "causes.npz"),
     ],
 }

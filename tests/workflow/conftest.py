@@ -181,8 +181,9 @@ def finished(smoke, tmp_path):
     return smoke.copy(tmp_path / "finished")
 
 
-# These run the function of another explainer, with other settings or on another design.
+# These run the function of another explainer, with other settings, on another design or on the descriptors of a pair.
 OTHER_SETTINGS = {
+    *("gpca_pair", "gate_rmse"),
     *("analytical_gpc_no_counts", "gpca_paper", "sa_local_removal_residual", "shap_oracle", "shap_removal_residual"),
 }
 

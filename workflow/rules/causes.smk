@@ -3,20 +3,9 @@ DIAGNOSIS = config["diagnosis"]
 ICP = {"icp": config["registrations"]["icp"]}
 
 
-def of_every_sample(pattern):
-    """Return the files of all sources and seeds."""
-    return collect(pattern, source=SOURCES, seed=SEEDS)
-
-
-def read_by(cause_explainer):
-    """Return the folder of what an explainer of causes reads."""
-    entry = explainer_entry(cause_explainer, CAUSES)
-    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"
-
-
 rule causes:
     input:
-        of_every_sample("<results>/causes/{source}/seed{seed}.npz"),
+        collect("<results>/causes/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS),
 
 
 rule diagnoses:
@@ -168,7 +157,9 @@ rule cause_metrics:
             cause_explainer=DIAGNOSIS["explainers"],
             seed=SEEDS,
         ),
-        causes_files=of_every_sample("<results>/causes/{source}/seed{seed}.npz"),
+        causes_files=collect(
+            "<results>/causes/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS
+        ),
         code=collector_code("gpca.diagnosis.metrics:collect"),
     output:
         "<results>/causes.csv",

@@ -69,3 +69,9 @@ def shapes_code(families):
 
 def collector_code(function):
     return code_files(function.split(":")[0], "gpca.reporting.script")
+
+
+def read_by(cause_explainer):
+    """Return the folder of what an explainer of causes reads."""
+    entry = explainer_entry(cause_explainer, CAUSES)
+    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"

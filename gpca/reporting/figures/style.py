@@ -26,7 +26,7 @@ LIGHT_GREY = "#CCCCCC"  # What lies behind is light grey.
 # One thing has one colour in every figure. Concepts have a marker too, which survives a print in grey.
 TARGET_COLOUR = VERMILION
 SOURCE_COLOUR = BLUE
-CONCEPT_COLOURS = {"nominal": SKY_BLUE, "noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
+CONCEPT_COLOURS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
 CONCEPT_MARKERS = {"noise": "o", "pose": "s", "overlap": "^"}
 SMALL_PT = 7  # No letters are smaller.
 
