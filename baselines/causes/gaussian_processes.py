@@ -66,8 +66,8 @@ class MultiLabelGPCA:
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration by the probabilities."""
         started = perf_counter()
-        failed_N, causes_N_3 = self._classifier.probabilities(self._features(registrations))
-        scores_N_4 = np.column_stack([1 - failed_N, failed_N[:, None] * causes_N_3])
+        judged = self._classifier.judge(self._features(registrations))
+        scores_N_4 = np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
         return Attribution.of_scores(LABELS, scores_N_4, seconds=(perf_counter() - started) / len(registrations))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 
@@ -58,6 +60,23 @@ class NormalisedDescriptors:
         return made
 
 
+@dataclass(frozen=True)
+class Judgement:
+    """What the classifiers say of N pairs.
+
+    Attributes:
+        failure_N: probability that it failed.
+        causes_N_3: of each concept, that it is one of the causes.
+        causes_variances_N_3: over the posterior draws (Eq. 5).
+        bald_N: of the least certain of the four, nats (Eq. 7).
+    """
+
+    failure_N: np.ndarray
+    causes_N_3: np.ndarray
+    causes_variances_N_3: np.ndarray
+    bald_N: np.ndarray
+
+
 class PairClassifier:
     """Independent binary Gaussian processes: one for failure, and one for each cause.
 
@@ -85,11 +104,16 @@ class PairClassifier:
             gpc.fit(inputs_N_F, np.where(present_N, PRESENT, ABSENT))
         return self
 
-    def probabilities(self, features_N_F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the probabilities of a failure (N,), and of each concept being one of the causes (N, 3)."""
+    def judge(self, features_N_F: np.ndarray) -> Judgement:
+        """Return what the classifiers say."""
         inputs_N_F = self.normalised(features_N_F)
-        failed_N, *causes = (gpc.attribute(inputs_N_F)[0][:, 1] for gpc in (self._failure, *self._causes))
-        return failed_N, np.column_stack(causes)
+        (failed, _, bald), *causes = (gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes))
+        return Judgement(
+            failure_N=failed[:, 1],
+            causes_N_3=np.column_stack([scores[:, 1] for scores, _, _ in causes]),
+            causes_variances_N_3=np.column_stack([variances[:, 1] for _, variances, _ in causes]),
+            bald_N=np.max([bald, *(of_cause for _, _, of_cause in causes)], axis=0),
+        )
 
     def state(self) -> dict[str, object]:
         """Return all that was learnt, for :meth:`from_state`."""

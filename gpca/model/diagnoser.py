@@ -11,7 +11,7 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
-from gpca.causes.truth import LARGEST_ERROR
+from gpca.causes.truth import FAILED, LARGEST_ERROR, NOMINAL
 from gpca.descriptors.dataset import describe
 from gpca.descriptors.groups import GROUPS
 from gpca.descriptors.pair import ObservedPair
@@ -22,7 +22,7 @@ from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_ERROR = 1e-3  # diameters; below it lies the spacing of the points
-RIDGE = 10.0  # of the regression of the error, in samples
+LIKELY = 0.5  # probability from which a concept is called one of the causes
 
 
 @dataclass(frozen=True)
@@ -31,25 +31,46 @@ class Diagnosis:
 
     Attributes:
         failure: probability that it failed.
-        nominal: whether nothing is wrong: the probability is below the model's threshold.
-        causes: probability of each concept that it is one of the causes.
-        expected_error: of the pose, ADD in diameters.
+        threshold: of that probability, from which something is called wrong.
+        causes: probability of each concept that it is one of the causes, if there are any.
+        variances: of these over the posterior draws (Eq. 5).
+        bald: of the least certain of these probabilities, nats (Eq. 7).
+        expected_error: of the pose: ADD, or ADD-S of a symmetric object.
     """
 
     failure: float
-    nominal: bool
+    threshold: float
     causes: dict[str, float]
+    variances: dict[str, float]
+    bald: float
     expected_error: float
+
+    @property
+    def state(self) -> str:
+        """``nominal`` or ``failed``."""
+        return NOMINAL if self.failure < self.threshold else FAILED
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The causes that are more likely than not, the likeliest first, and at least that one; none if nominal."""
+        if self.state == NOMINAL:
+            return ()
+        first, *rest = sorted(self.causes, key=lambda cause: -self.causes[cause])
+        return first, *(cause for cause in rest if self.causes[cause] >= LIKELY)
+
+    def as_dict(self) -> dict[str, object]:
+        """Return it as numbers, lists and names, for JSON."""
+        return vars(self) | {"state": self.state, "named": list(self.named)}
 
 
 @dataclass(frozen=True)
 class Diagnoser:
-    """Classifiers on the descriptors of a pair, and what describes one as the training samples were.
+    """Classifiers on the descriptors of a pair, and what describes one as the training samples were described.
 
     Attributes:
         classifier: of failure and of the causes.
-        error_weights: (F + 1,) regression of the logarithm of the error on the normalised descriptors, constant last.
-        threshold: probability of failure from which something is wrong.
+        error_weights: (F + 1,) regression of ln error (diameters) on the normalised descriptors, the constant last.
+        threshold: probability of failure from which something is called wrong.
         points: of each cloud, at most.
         runs: how ICP runs from other starts.
         descriptors: what is measured.
@@ -63,7 +84,7 @@ class Diagnoser:
     descriptors: DescriptorSettings
 
     def diagnose(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> Diagnosis:
-        """Say what is wrong with a registration.
+        """Say what is wrong with a registration; the same clouds give the same numbers.
 
         Args:
             observed: (N, 3) where ICP started, in diameters and in the model's frame.
@@ -71,30 +92,32 @@ class Diagnoser:
             T_icp: 4×4, what ICP found: takes the observed cloud to the model.
         """
         features_1_F = self.features(observed, model, T_icp)[None]
-        failed_1, causes_1_3 = self.classifier.probabilities(features_1_F)
+        judged = self.classifier.judge(features_1_F)
         inputs_1_F = self.classifier.normalised(features_1_F)
         log_error = float(inputs_1_F[0] @ self.error_weights[:-1] + self.error_weights[-1])
         return Diagnosis(
-            failure=float(failed_1[0]),
-            nominal=bool(failed_1[0] < self.threshold),
-            causes=dict(zip(CONCEPTS, causes_1_3[0].tolist(), strict=True)),
+            failure=float(judged.failure_N[0]),
+            threshold=self.threshold,
+            causes=dict(zip(CONCEPTS, judged.causes_N_3[0].tolist(), strict=True)),
+            variances=dict(zip(CONCEPTS, judged.causes_variances_N_3[0].tolist(), strict=True)),
+            bald=float(judged.bald_N[0]),
             expected_error=float(np.clip(np.exp(log_error), SMALLEST_ERROR, LARGEST_ERROR)),
         )
 
     def features(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> np.ndarray:
-        """Return the descriptors (F,) of the pair; the same clouds give the same numbers."""
-        observed, model = (_drawn(cloud, self.points, role) for cloud, role in ((observed, "o"), (model, "m")))
-        xi_n_6 = generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6()
-        xi_n_6[0] = 0
-        icp = BatchedICP(model, self.runs.icp)
-        T_n, fitness_n, rmse_n = icp.register(observed, exp(xi_n_6))
-        back = inverse(T_icp)
-        T_n[0] = T_icp
+        """Return the descriptors (F,) of the pair."""
+        observed, model = (
+            _drawn(cloud, self.points, role) for cloud, role in ((observed, "observed"), (model, "model"))
+        )
+        starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
+        starts_n[0] = T_icp
+        T_n, fitness_n, rmse_n = BatchedICP(model, self.runs.icp).register(observed, starts_n)
+        T_back = inverse(T_n[0])
         pair = ObservedPair(
-            observed=transform(T_icp, observed),
+            observed=transform(T_n[0], observed),
             model=model,
-            T_init=back,
-            T_runs=T_n @ back,
+            T_init=T_back,
+            T_runs=T_n @ T_back,
             fitness_n=fitness_n,
             inlier_rmse_n=rmse_n,
             axes=("diagnosis",),
@@ -127,24 +150,5 @@ class Diagnoser:
         )
 
 
-def fit_error(inputs_N_F: np.ndarray, error_N: np.ndarray) -> np.ndarray:
-    """Return the weights (F + 1,) of a ridge regression of ln error on normalised descriptors, the constant last."""
-    from sklearn.linear_model import Ridge
-
-    fitted = Ridge(alpha=RIDGE).fit(inputs_N_F, np.log(np.maximum(error_N, SMALLEST_ERROR)))
-    return np.append(fitted.coef_, fitted.intercept_)
-
-
-def threshold_of(failure_N: np.ndarray, false_alarms: float) -> float:
-    """Return the probability of failure that at most so large a share of nominal samples reaches.
-
-    Args:
-        failure_N: probabilities of nominal samples that the classifier did not learn.
-        false_alarms: the share, in [0, 1).
-    """
-    return float(np.nextafter(np.quantile(failure_N, 1 - false_alarms, method="inverted_cdf"), 1))
-
-
 def _drawn(cloud: np.ndarray, most: int, role: str) -> np.ndarray:
-    order = generator("diagnosis", role).permutation(len(cloud))
-    return cloud[order[:most]]
+    return cloud[generator("diagnosis", role).permutation(len(cloud))[:most]]
