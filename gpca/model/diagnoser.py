@@ -106,9 +106,7 @@ class Diagnoser:
 
     def features(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> np.ndarray:
         """Return the descriptors (F,) of the pair."""
-        observed, model = (
-            _drawn(cloud, self.points, role) for cloud, role in ((observed, "observed"), (model, "model"))
-        )
+        observed, model = _drawn(observed, self.points, "observed"), _drawn(model, self.points, "model")
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
         starts_n[0] = T_icp
         T_n, fitness_n, rmse_n = BatchedICP(model, self.runs.icp).register(observed, starts_n)

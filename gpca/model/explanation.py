@@ -47,8 +47,8 @@ class Explanation:
         fitness, inlier_rmse: share of source points with a correspondence; RMSE over those, in the unit of the points.
         diagnosis: of the pair, learnt from measured causes, its expected error in the unit of the points; None where
             it was not asked for.
-        scores, variances: of GP-CA as in the paper, which sees the aligned source alone and always names a concept: mean
-            and variance over the posterior draws (Eqs. 4, 5).
+        scores, variances: of GP-CA as in the paper, which sees the aligned source alone and always names a concept:
+            mean and variance over the posterior draws (Eqs. 4, 5).
         bald, entropy: how uncertain these are, in nats: Eq. 7, and the entropy of the scores.
         concept: the one with the largest score (Eq. 6).
         action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`).

@@ -36,7 +36,7 @@ class Model:
     """What says whether a registration is right and why it is not; and the paper's GP-CA, which it learnt besides.
 
     Attributes:
-        diagnoser: of the pair after ICP, learnt from measured causes of all sources; None of a model that is GP-CA alone.
+        diagnoser: of the pair after ICP, learnt from measured causes of all sources; None where there is GP-CA alone.
         encoder: from clouds (B, N, 3) to embeddings (B, d), ready for inference.
         encoder_settings: also how many points it sees and how many draws make an embedding.
         gpc: the classifier; its classes are the concepts.
