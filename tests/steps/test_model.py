@@ -15,7 +15,7 @@ FAULTS = [
     (
         untouched,
         {"--causes": ["causes.npz", "causes.npz"]},
-        r"--descriptors: 1 file\(s\) for 2 of causes; give one for",
+        r"--descriptors: 1 file\(s\) for 2 of causes; give one",
     ),
     (untouched, {"--settings": {"model": {"false_alarms": 1.5}}}, r"setting false_alarms: 1.5 is"),
     (untouched, {"--settings": {"encoder": {"layers": 3}}}, r"setting layers: unknown; known are backbone"),
