@@ -154,7 +154,7 @@ CONTENTS = {
     "no settings": drop("encoder_settings"),
     "no thresholds": drop("thresholds"),
     "no title": drop("title"),
-    "another version": put("version", 3),
+    "another version": put("version", 4),
     "another format": put("format", "a model"),
 }  # fmt: skip
 
