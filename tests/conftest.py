@@ -49,7 +49,32 @@ def registrations(objects):
 
 
 @pytest.fixture(scope="session")
-def model(registrations):
+def diagnoser():
+    """A diagnoser of twelve pairs whose descriptors were drawn; two thirds failed, each for all causes."""
+    import numpy as np
+
+    from gpca.causes.settings import CauseSettings
+    from gpca.classifier.settings import GPCSettings
+    from gpca.descriptors.dataset import WIDTHS
+    from gpca.descriptors.settings import DescriptorSettings
+    from gpca.model.learning import Lessons, learn
+
+    random, label_N = np.random.default_rng(0), np.array(["nominal", "noise", "pose"] * 4)
+    failed_N = label_N != "nominal"
+    lessons = Lessons(
+        features_N_F=random.normal(size=(12, sum(WIDTHS.values()))) + 3 * failed_N[:, None],
+        label_N=label_N,
+        causes_N_3=np.repeat(failed_N[:, None], 3, axis=1),
+        error_N=np.where(failed_N, 0.2, 0.01),
+        unseen_N=np.arange(12) < 6,
+    )
+    gpc = GPCSettings(learning_rate=0.1, iterations=20, inducing=4, draws=50)
+    descriptors = DescriptorSettings(starts=1, restarts=2, icp_points=64)
+    return learn(lessons, gpc, CauseSettings(points=(64, 128)), descriptors, 0.05, "tiny", 0)[0]
+
+
+@pytest.fixture(scope="session")
+def model(registrations, diagnoser):
     """A model of an encoder that was not trained: its embeddings tell concepts apart well enough to be scored."""
     import torch
 
@@ -70,7 +95,7 @@ def model(registrations):
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, iterations=40, inducing=12, draws=200), "tiny", 0)
     gpc.fit(h_S_d, train.concept)
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
-    return Model(network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", stand_in=True)
+    return Model(diagnoser, network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", stand_in=True)
 
 
 @pytest.fixture(scope="session")

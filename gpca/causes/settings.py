@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Annotated, Any, Literal
 
 from gpca.alignment.icp import ICPSettings
@@ -119,6 +119,10 @@ class CauseSettings(UncertaintySettings):
             fault = f"of {low} points the largest crop leaves {left}"
             remedy = f"raise causes.points or lower causes.severities.crop until {FEWEST_POINTS} are left"
             raise InputError("causes points", fault, remedy)
+
+    def runs(self) -> UncertaintySettings:
+        """Return the part that says how ICP runs from other starts."""
+        return UncertaintySettings(**{part.name: getattr(self, part.name) for part in fields(UncertaintySettings)})
 
     @classmethod
     def from_dict(cls, settings: dict, icp: dict | None = None) -> CauseSettings:

@@ -13,17 +13,25 @@ from gpca.alignment.icp import ICPSettings
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.causes.dataset import Causes
 from gpca.descriptors.distances import describe_distances
-from gpca.descriptors.entropy import describe_entropy
-from gpca.descriptors.groups import GROUPS
-from gpca.descriptors.motion import describe_motion, describe_starts
+from gpca.descriptors.entropy import ENTROPY, describe_entropy
+from gpca.descriptors.groups import DENSITIES, GROUPS, MOTION, QUANTILES
+from gpca.descriptors.motion import STARTS, describe_motion, describe_starts
 from gpca.descriptors.pair import ObservedPair, observed_pair
-from gpca.descriptors.remedied import describe_remedied
+from gpca.descriptors.remedied import REMEDIED, describe_remedied
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.progress import progress
 
 MADE_BY = "python -m gpca describe"
+WIDTHS = {  # of the groups
+    "distances": 4 * QUANTILES,
+    "planes": 3 * QUANTILES + len(DENSITIES),
+    "motion": len(MOTION),
+    "starts": len(STARTS),
+    "remedied": len(REMEDIED),
+    "entropy": len(ENTROPY),
+}
 
 
 @dataclass(frozen=True)
@@ -50,7 +58,7 @@ class Descriptors:
         Raises:
             InputError: the file is missing, damaged, of other samples, or holds wrong shapes or NaN.
         """
-        shapes: dict[str, tuple[int | str, ...]] = {name: ("S", name) for name in GROUPS}
+        shapes: dict[str, tuple[int | str, ...]] = {name: ("S", WIDTHS[name]) for name in GROUPS}
         kinds = dict.fromkeys(GROUPS, REAL) | {"sample": WHOLE, "split": TEXT}
         arrays = load_arrays(path, shapes | {"sample": ("S",), "split": ("S",)}, MADE_BY, kinds)
         if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):

@@ -22,7 +22,8 @@ def check_registrations(config: dict) -> None:
     """Check that settings agree with each other, and that the samples of one file can be held in memory."""
     with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
-    with_key("causes", CauseSettings.from_dict, config["causes"], config["registrations"]["icp"])
+    for key, causes in {"causes": {}, "model.causes": config["model"]["causes"]}.items():
+        with_key(key, CauseSettings.from_dict, config["causes"] | causes, config["registrations"]["icp"])
     cloud_points = "registrations.cloud_points", config["registrations"]["cloud_points"]
     for section, (key, points) in {
         "registrations": cloud_points,
