@@ -23,7 +23,7 @@ class Committee:
         self._members: list[ConceptExplainer] = [
             DescribedPairs(randomised_trees(source, seed), GROUPS),
             DescribedPairs(boosted_trees(source, seed), GROUPS),
-            PairGPCA(source, seed),
+            PairGPCA(source, seed, learning_rate=0.1, iterations=200),
         ]
 
     def fit(self, registrations: Registrations) -> None:

@@ -68,7 +68,7 @@ def _require_diagnoser(state: Mapping) -> None:
     check_settings(state["descriptors"], "diagnosis", "descriptors")
     check_settings(state["runs"], "uncertainty", "causal")
     check_settings(state["icp"], "registrations", "icp")
-    gpcs = {"failure": state["classifier"]["failure"], **dict(enumerate(state["classifier"]["causes"]))}
+    causes = state["classifier"]["causes"]
     _require_counts(
         {
             "points of a description": (state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
@@ -76,7 +76,7 @@ def _require_diagnoser(state: Mapping) -> None:
             "starts with remedies": (state["descriptors"]["starts"], 1, MOST_RUNS),
             "restarts": (state["descriptors"]["restarts"], 1, MOST_RUNS),
             "iterations of ICP": (state["icp"]["max_iterations"], 1, MOST_ITERATIONS),
-            "classifiers of causes": (len(gpcs) - 1, len(CONCEPTS), len(CONCEPTS)),
+            "classifiers of causes": (len(causes), len(CONCEPTS), len(CONCEPTS)),
         }
     )
     quantiles, weights, threshold = state["classifier"]["quantiles"], state["error_weights"], state["threshold"]
@@ -89,7 +89,7 @@ def _require_diagnoser(state: Mapping) -> None:
         raise ValueError(f"'error_weights' is of shape {tuple(weights.shape)}, not {(features + 1,)}")
     if type(threshold) is not float or not 0 <= threshold <= 2:
         raise ValueError(f"threshold: {threshold!r} is no probability")
-    for gpc in gpcs.values():
+    for gpc in (state["classifier"]["failure"], *causes):
         _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
         check_settings(gpc["settings"], "explainers", "gpca")
         _require_classifier(gpc, features)

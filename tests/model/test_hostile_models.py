@@ -109,7 +109,7 @@ CONTENTS = {
     "draws of 1e9": put("gpc/settings/draws", HUGE),
     "no draws": put("gpc/settings/draws", 0),
     "draws of NaN": put("gpc/settings/draws", NAN),
-    "a threshold of NaN": put("diagnoser/threshold", NAN),
+    "a threshold of failure of NaN": put("diagnoser/threshold", NAN),
     "a threshold of text": put("diagnoser/threshold", "0.5"),
     "errors of other descriptors": put("diagnoser/error_weights", lambda w: w[:-1]),
     "quantiles of other descriptors": put("diagnoser/classifier/quantiles", lambda q: q[:, :-1]),

@@ -34,6 +34,7 @@ RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 # What four explainers say of the causes: from the samples on, and what is made of it.
 CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
+MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
 CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
 # Explainers times two sources: four with a GPC (classic features on the frames too), four on embeddings, 13 on
 # uncertainties.
@@ -84,6 +85,7 @@ def test_table6_needs_the_frames_alone(planned):
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
+        "sample_objects": 2, "sample_model_causes": 2, "describe_model_causes": 2,
         "time_stages": 1, "table7_runtime": 1,
     }  # fmt: skip
     assert planned.before("results/smoke/tables/table8_recovery.md") == {
@@ -103,7 +105,8 @@ EDITS = {
     "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
-        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + RUNTIME + RECOVERY + CAUSES,
+        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
+        + MODEL_CAUSES,
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
     "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
@@ -126,8 +129,9 @@ EDITS = {
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=6)
     + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
-    + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN,
-    "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=8) + CAUSES_SHOWN,
+    + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
+    + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL,
+    "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=8, describe_model_causes=2) + CAUSES_SHOWN + MODEL,
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
 }  # fmt: skip
 
