@@ -133,7 +133,7 @@ def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeyp
     [example] = re.findall(r"^```python\n(.*?)^```", (ROOT / f"docs/{page}.md").read_text(), re.MULTILINE | re.DOTALL)
     clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
     exec(example, clouds | {"T_target_source_init": np.eye(4)})
-    assert set(capsys.readouterr().out.split()) & {"noise", "pose", "overlap"}
+    assert set(capsys.readouterr().out.split()) & {"nominal", "failed", "noise", "pose", "overlap"}
 
 
 def test_every_page_of_the_docs_is_in_the_index():
