@@ -29,6 +29,7 @@ KINDS = (
 )
 
 COUNTS_OF_SAMPLES = ("test_samples", "episodes")  # metrics that say of how many samples the others are shares
+OF_RUNS = ("reached", "recognised")  # shares of the seeds' runs, whatever the test samples
 PARTS = ("predicted_as_*", "first_*", "acted_first")  # numbers of samples out of these
 
 
@@ -98,6 +99,7 @@ def _of_tidy(
         mean, low, _ = mean_interval(values_R)
         counts = [(table, source, method, name, of) for name in COUNTS_OF_SAMPLES for of in (concept, "all")]
         counted = next((sum(values[key]) for key in counts if key in values), samples_of_source.get(source, 0))
+        counted = len(values_R) if quantity in OF_RUNS else counted
         half_width = 0.0 if math.isnan(low) else mean - low
         unit = _unit(path.name, quantity, counted, len(values_R))
         yield (table, source, method, quantity, concept), Mean(mean, half_width, quantity, int(counted), unit)
@@ -113,6 +115,7 @@ def _of_table(path: Path, rows: list[dict], heads: list[str]) -> Iterator[tuple[
         )
         half_width = 0.0 if math.isnan(low) or math.isnan(high) else max(mean - low, high - mean)
         quantity, samples = row[labels[-1]], finite_number(path, "n_test", row.get("n_test") or "0")
+        samples = int(row.get("n_seeds") or 1) if quantity in OF_RUNS else samples
         unit = _unit(f"tables/{path.name}", quantity, samples, int(row.get("n_seeds") or 1))
         yield tuple(row[name] for name in labels), Mean(mean, half_width, quantity, int(samples), unit)
 

@@ -43,3 +43,14 @@ def test_the_kept_references_can_be_read(run):
         assert len(read_means(path)) > 5
     with pytest.raises(InputError, match="neither tidy"):
         read_means(ROOT / "gpca/comparison/reasons.csv")
+
+
+def test_a_share_of_the_runs_is_one_of_as_many_as_there_are_seeds(tmp_path):
+    head = "table,source,method,metric,concept,seed,value\n"
+    rows = [f"active_learning/pretrained,ycb,random,{name},noise,{seed},1.0\n" for name in ("reached", "accuracy")
+            for seed in (0, 1, 2)]  # fmt: skip
+    (tmp_path / "active_learning.csv").write_text(head + "".join(rows))
+    found = {mean.quantity: mean.samples for mean in read_means(tmp_path / "active_learning.csv", {"ycb": 90}).values()}
+    assert found == {"reached": 3, "accuracy": 90}
+    table = read_means(ROOT / "results/reference/real/tables/table3_extended.csv")
+    assert {mean.samples for mean in table.values() if mean.quantity == "reached"} == {5}
