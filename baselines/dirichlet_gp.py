@@ -14,6 +14,7 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
+from gpca.adam import Adam
 from gpca.attribution.scores import Attribution, summarise_marginals
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
@@ -71,7 +72,7 @@ class DirichletGP:
         self._log_scale_C = values_C_N.var(dim=1).log()
         self._mean_C = values_C_N.mean(dim=1)
         parameters = [self._log_lengthscale_C, self._log_scale_C, self._mean_C]
-        optimiser = torch.optim.Adam([each.requires_grad_() for each in parameters], lr=self._learning_rate)
+        optimiser = Adam([each.requires_grad_() for each in parameters], self._learning_rate)
         for _ in range(self._iterations):
             cholesky_C_N_N, whitened_C_N_1 = self._factor(squared_N_N, values_C_N, noise_C_N)
             log_determinants = cholesky_C_N_N.diagonal(dim1=1, dim2=2).log().sum()
