@@ -32,7 +32,7 @@ class Adam:
         """Move every parameter by its gradient, which each must have."""
         adam(
             self._parameters,
-            [parameter.grad for parameter in self._parameters],
+            [parameter.grad for parameter in self._parameters if parameter.grad is not None],
             self._means,
             self._squares,
             [],
