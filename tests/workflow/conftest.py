@@ -181,16 +181,17 @@ def finished(smoke, tmp_path):
     return smoke.copy(tmp_path / "finished")
 
 
-# Of explainers and designs one of each kind, with the designs that these read; and the stages that are timed.
+# What leads to predictions; of explainers and designs one of each kind, with the designs that these read.
+STAGES = {"objects", "registrations", "encoders", "embeddings", "causes", "descriptors", "cause_embeddings"}
 INTERRUPTED = {"gpca", "analytical_gpc", "residuals_forest", "shap_removal", "softmax_head", "causal", "removal"}
-INTERRUPTED |= {"icp", "dgcnn", "causes", "descriptors", "cause_embeddings"}
+INTERRUPTED |= {"icp", "dgcnn", "causes", "descriptors", "cause_embeddings"}  # as timings name them
 OF_ONE_EACH = {"predictions", "diagnoses", "uncertainty", "timings"}
 
 
 def is_interrupted(path):
     """Whether the run that is killed and continued makes the file: those of one source."""
     names = {part.removeprefix("uncertainty_").removeprefix("diagnoses_") for part in Path(path).parts}
-    return "ycb" in path and (not names & OF_ONE_EACH or bool(names & INTERRUPTED))
+    return "ycb" in path and bool(names & INTERRUPTED if names & OF_ONE_EACH else names & STAGES)
 
 
 @dataclass(frozen=True)

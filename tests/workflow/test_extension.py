@@ -11,7 +11,7 @@ from ..documents import block, blocks_of
 from .conftest import without_ends
 
 SMOKE = ("--configfile", "config/smoke.yaml")
-ROW = {"sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "run_icp": 6, "attribute": 19}
+ROW = {"sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "run_icp": 5, "attribute": 16}
 ROW |= {"sample_causes": 2, "describe": 2, "train_on_causes": 2, "diagnose": 4}
 ROW |= {"sample_model_causes": 1, "describe_model_causes": 1}
 ROW |= {"shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}

@@ -36,9 +36,9 @@ BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
 MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
 CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
-# Explainers times two sources: four with a GPC (classic features on the frames too), four on embeddings, 13 on
+# Explainers times two sources: three with a GPC (classic features on the frames too), four on embeddings, 11 on
 # uncertainties.
-WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 4 + 2, 2 * 4, 2 * 13))
+WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 1, 2 * 4, 2 * 11))
 
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
@@ -78,7 +78,7 @@ def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
 def test_table6_needs_the_frames_alone(planned):
     assert planned.before("results/smoke/tables/table6_backbones.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 2, "train_encoder": 2, "embed": 2,
-        "reduce_embeddings": 1, "attribute": 4, "real_world": 1, "table6_backbones": 1,
+        "reduce_embeddings": 1, "attribute": 3, "real_world": 1, "table6_backbones": 1,
     }  # fmt: skip
 
 
@@ -105,17 +105,17 @@ EDITS = {
     "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
-        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
+        jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
         + MODEL_CAUSES,
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
     "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
     # Not the pictures: they show an encoder without reduction.
     "gpca/encoders/reduction.py": jobs("reduce_embeddings", "attribute") + FRAMES,
-    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_encoder=2, embed=2, attribute=2)
+    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_encoder=2, embed=2, attribute=1)
     + BACKBONES + MODEL,
     "gpca/frames/bop.py":
-        jobs("reduce_embeddings", "instances", register_frames=2, train_encoder=2, embed=2, attribute=2)
+        jobs("reduce_embeddings", "instances", register_frames=2, train_encoder=2, embed=2, attribute=1)
         + BACKBONES + MODEL + RECOVERY,
     "gpca/recovery/policy.py": MODEL + RECOVERY,
     "gpca/reporting/tables/explainers.py": TABLES1,
@@ -127,8 +127,8 @@ EDITS = {
     + jobs(train_on_causes=4, diagnose=2) + CAUSES_SHOWN,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
-    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=6)
-    + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
+    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=5)
+    + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
     + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL,
     "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=8, describe_model_causes=2) + CAUSES_SHOWN + MODEL,
