@@ -14,7 +14,6 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
-from gpca.adam import Adam
 from gpca.attribution.scores import Attribution, summarise_marginals
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
@@ -54,6 +53,7 @@ class DirichletGP:
         from gpytorch.likelihoods import DirichletClassificationLikelihood
         from sklearn.preprocessing import StandardScaler
 
+        from gpca.adam import Adam
         from gpca.classifier.covariances import squared_distances
 
         known_concepts(registrations.concept)

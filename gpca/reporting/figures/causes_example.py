@@ -69,7 +69,7 @@ def draw_causes_example(
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
     view = widest_views(shown.model)[0]
     everything = np.concatenate([shown.model @ view.T, *(cloud @ view.T for cloud in shown.observed)])
-    corners = np.quantile(everything, (0.005, 0.995), axis=0)
+    corners = np.quantile(everything, (0.001, 0.999), axis=0)
     line_in = (height_in - HEAD_IN) / 2
     for place, subset in enumerate(sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset))):
         line, column = divmod(place, 4)
