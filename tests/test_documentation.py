@@ -18,7 +18,7 @@ from gpca.reporting.registry import registered
 
 from .documents import PAGES, ROOT, commands, our_files, relative
 
-# Hosts that our own files may name; those of data sets stand in the config alone.
+# Hosts that our own files may name; those of datasets stand in the config alone.
 LITERATURE = {"arxiv.org", "github.com", "pointclouds.org", "json-schema.org"}
 DATA = {"rgbd-dataset.cs.washington.edu", "huggingface.co"}
 
