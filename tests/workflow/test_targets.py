@@ -34,6 +34,7 @@ RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 # What four explainers say of the causes: from the samples on, and what is made of it.
 CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
+CAUSES_SHOWN += jobs("nominal_reliability")
 MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
 CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
 # Explainers times two sources: three with a GPC (classic features on the frames too), four on embeddings, 11 on

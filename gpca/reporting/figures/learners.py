@@ -17,12 +17,13 @@ import numpy as np
 
 from gpca.attribution.diagnostics import BINS, rank_correlation, risk_coverage
 from gpca.errors import InputError
+from gpca.reporting.figures.panels import finish_panels, small_panels
+from gpca.reporting.figures.reliability import draw_reliability_panel
 from gpca.reporting.figures.style import (
     BLACK,
     BLUE,
     GREEN,
     GREY,
-    LIGHT_GREY,
     ORANGE,
     PURPLE,
     SKY_BLUE,
@@ -31,7 +32,6 @@ from gpca.reporting.figures.style import (
     VERMILION,
     save_figure,
     use_style,
-    write_title,
 )
 from gpca.shift.metrics import sets_of, wrong
 from gpca.shift.sets import DISTANCES
@@ -58,8 +58,6 @@ SET_STYLES = {  # A set has a title and a colour.
     "objects": ("unseen objects", GREEN),
 }
 Titles = Mapping[str, str]
-PANELS_PER_ROW = 4
-FEWEST = 5  # A bin with fewer samples has no point.
 COVERAGES = np.linspace(0.02, 1, 99)
 
 
@@ -102,32 +100,22 @@ def draw_reliability(
 ) -> None:
     """Draw accuracy over confidence, in the bins of the calibration error, and the share of samples in each bin.
 
-    The samples are those like the training's, of all sources and seeds together. Bins of fewer than `FEWEST` of them
-    have no point. The number in a title is the calibration error of them all.
+    The samples are those like the training's, of all sources and seeds together. Bins of very few samples have no
+    point. The number in a title is the calibration error of them all.
     """
     shown, columns = _known(learned, sources, learners)
-    figure, panels = _panels(len(shown), panel_height_in=1.55)
+    figure, panels = small_panels(len(shown), panel_height_in=1.55)
     for panel, learner in zip(panels, shown, strict=False):
         parts = [rows for source in columns for rows in _of(learned, source, learner, "in_distribution")]
         confidence_S = np.concatenate([1 - rows["max_score"].to_numpy() for rows in parts])
         hit_S = np.concatenate([~wrong(rows) for rows in parts])
-        bin_S = np.minimum((confidence_S * BINS).astype(int), BINS - 1)
-        counts_B = np.bincount(bin_S, minlength=BINS)
-        drawn = counts_B >= FEWEST
-        accuracy_B = np.bincount(bin_S, weights=hit_S, minlength=BINS)[drawn] / counts_B[drawn]
-        mean_B = np.bincount(bin_S, weights=confidence_S, minlength=BINS)[drawn] / counts_B[drawn]
-        centres_B = (np.arange(BINS) + 0.5) / BINS
-        panel.bar(centres_B, counts_B / counts_B.sum(), width=1 / BINS, color=LIGHT_GREY, label="share of samples")
-        panel.plot([0, 1], [0, 1], color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
-        panel.plot(mean_B, accuracy_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, label="accuracy")
-        gap = np.abs(np.bincount(bin_S, weights=confidence_S - hit_S, minlength=BINS)).sum() / len(hit_S)
+        gap = draw_reliability_panel(panel, confidence_S, hit_S, BINS)
         panel.set_title(f"{learners[learner]}\nECE {gap:.3f}", fontsize=SMALL_PT)
         panel.set_xlim(1 / 3 - 0.03, 1.02)
-        panel.set_ylim(0, 1.02)
         panel.set_xticks([0.4, 0.6, 0.8, 1.0])
     handles, labels = panels[0].get_legend_handles_labels()
     title = ", ".join(sources[name] for name in columns)
-    _finish(figure, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
+    finish_panels(figure, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
 
 
 def draw_uncertainty_vs_distance(
@@ -141,7 +129,7 @@ def draw_uncertainty_vs_distance(
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     shown, columns = _known(learned, sources, learners)
-    figure, panels = _panels(len(shown), panel_height_in=1.4)
+    figure, panels = small_panels(len(shown), panel_height_in=1.4)
     distance = DISTANCES[0]
     first_seed = min(seed for _, _, seed in learned)
     for panel, learner in zip(panels, shown, strict=False):
@@ -168,7 +156,7 @@ def draw_uncertainty_vs_distance(
     handles = [Line2D([], [], color=c, marker="o", linestyle="") for _, c in SET_STYLES.values()]
     labels = [title for title, _ in SET_STYLES.values()]
     title = ", ".join(sources[name] for name in columns)
-    _finish(figure, title, handles, labels, "distance", "1 - largest score", pdf_path, png_path)
+    finish_panels(figure, title, handles, labels, "distance", "1 - largest score", pdf_path, png_path)
 
 
 def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[str], list[str]]:
@@ -183,32 +171,3 @@ def _of(learned: Mapping, source: str, learner: str, of_set: str) -> list:
     """Return the rows of a set, seed by seed."""
     found = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
     return [rows for rows in found if len(rows)]
-
-
-def _panels(count: int, panel_height_in: float):
-    """Return a figure with that many panels, their axes shared, and the panels."""
-    use_style()
-    import matplotlib.pyplot as plt
-
-    lines = -(-count // PANELS_PER_ROW)
-    size = (TEXT_WIDTH_IN, 0.75 + panel_height_in * lines)
-    figure, axes = plt.subplots(lines, PANELS_PER_ROW, figsize=size, sharex=True, sharey=True, squeeze=False)
-    for spare in axes.flat[count:]:
-        spare.set_visible(False)
-    return figure, list(axes.flat[:count])
-
-
-def _finish(figure, title: str, handles: list, labels: list[str], across: str, up: str, pdf_path, png_path) -> None:
-    """Label the outer panels, set a title above all and a legend below, and write the figure."""
-    height_in = figure.get_size_inches()[1]
-    shown = [panel for panel in figure.axes if panel.get_visible()]
-    for i, panel in enumerate(shown):
-        if i % PANELS_PER_ROW == 0:
-            panel.set_ylabel(up)
-        if i + PANELS_PER_ROW >= len(shown):
-            panel.set_xlabel(across)
-            panel.tick_params(labelbottom=True)
-    figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
-    write_title(figure, title)
-    figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
-    save_figure(figure, pdf_path, png_path)

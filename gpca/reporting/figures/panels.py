@@ -1,0 +1,47 @@
+"""Figures of many small panels with shared axes, one legend and one title."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
+
+PANELS_PER_ROW = 4
+
+
+def small_panels(count: int, panel_height_in: float):
+    """Return a figure with that many panels, their axes shared, and the panels."""
+    use_style()
+    import matplotlib.pyplot as plt
+
+    lines = -(-count // PANELS_PER_ROW)
+    size = (TEXT_WIDTH_IN, 0.75 + panel_height_in * lines)
+    figure, axes = plt.subplots(lines, PANELS_PER_ROW, figsize=size, sharex=True, sharey=True, squeeze=False)
+    for spare in axes.flat[count:]:
+        spare.set_visible(False)
+    return figure, list(axes.flat[:count])
+
+
+def finish_panels(
+    figure,
+    title: str,
+    handles: list,
+    labels: list[str],
+    across: str,
+    up: str,
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Label the outer panels, set a title above all and a legend below, and write the figure."""
+    height_in = figure.get_size_inches()[1]
+    shown = [panel for panel in figure.axes if panel.get_visible()]
+    for i, panel in enumerate(shown):
+        if i % PANELS_PER_ROW == 0:
+            panel.set_ylabel(up)
+        if i + PANELS_PER_ROW >= len(shown):
+            panel.set_xlabel(across)
+            panel.tick_params(labelbottom=True)
+    figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
+    write_title(figure, title)
+    figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
+    save_figure(figure, pdf_path, png_path)
