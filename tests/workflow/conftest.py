@@ -16,6 +16,8 @@ import pytest
 
 from benchmarks.kills import results, temporary_folders
 
+from .planning import plan
+
 ROOT = Path(__file__).resolve().parents[2]
 NEEDED = ("Snakefile", "config", "gpca", "baselines", "workflow", "profiles", "environment.lock")
 
@@ -70,11 +72,17 @@ class Project:
     def snakemake(self, *arguments, check=True):
         return self._python("-m", "snakemake", *arguments, check=check)
 
+    def plan(self, *arguments, check=True):
+        """Run Snakemake dry."""
+        done = plan(["-n", *map(str, arguments)], self.folder, _environment())
+        assert not check or done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+        return done
+
     def gpca(self, *arguments, check=True):
         return self._python("-m", "gpca", *arguments, check=check)
 
     def dry_run(self, *arguments):
-        done = self.snakemake("-n", *arguments)
+        done = self.plan(*arguments)
         counts = re.findall(r"^(\w+) +(\d+)$", done.stdout, flags=re.MULTILINE)
         jobs = Counter({rule: int(count) for rule, count in counts if rule not in ("all", "total")})
         plan = []

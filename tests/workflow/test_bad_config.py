@@ -46,7 +46,7 @@ BAD = {
 @pytest.mark.parametrize("fault", BAD)
 def test_a_bad_config_stops_at_load_with_one_line(project, fault):
     arguments, message = BAD[fault]
-    done = project.snakemake("-n", "all", *arguments(project), check=False)
+    done = project.plan("all", *arguments(project), check=False)
     assert done.returncode != 0
     lines = [line for line in done.stderr.splitlines() if line.startswith("gpca: ")]
     assert len(lines) == 1

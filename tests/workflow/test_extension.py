@@ -145,6 +145,6 @@ def test_an_explainer_dropped_into_baselines_becomes_a_row(finished):
 def test_a_wrong_setting_of_an_own_explainer_stops_at_load(project):
     (project.folder / "baselines/fitness_only.py").write_text(EXPLAINER)
     project.append("config/smoke.yaml", "  fitness_only: {sharpnes: 50.0}\n")
-    done = project.snakemake("-n", "all", *SMOKE, check=False)
+    done = project.plan("all", *SMOKE, check=False)
     assert done.returncode != 0
     assert "gpca: config key explainers.fitness_only: explainer 'fitness_only': got an unexpected" in done.stderr

@@ -87,7 +87,7 @@ def test_a_collector_takes_what_its_rule_gives(function, names):
 
 def test_the_slurm_profile_plans_everything_with_what_the_rules_declare(project):
     pytest.importorskip("snakemake_executor_plugin_slurm")
-    done = project.snakemake("-n", "all", "--profile", "workflow/profiles/slurm")
+    done = project.plan("all", "--profile", "workflow/profiles/slurm")
     assert "profiles/slurm and workflow specific profile profiles/default" in done.stderr
     encoder = re.search(r"^rule train_encoder:\n(?:    .*\n)+", done.stdout, re.MULTILINE)[0]
     assert "mem_mb=3000" in encoder
@@ -102,7 +102,7 @@ def test_common_rules_are_short_and_no_rule_repeats_a_wildcard_of_the_run():
 def test_a_snakefile_elsewhere_plans_into_the_working_directory(project, tmp_path):
     here = tmp_path / "here"
     here.mkdir()
-    done = project.snakemake("--snakefile", project.folder / "Snakefile", "--directory", here, "-n", "table2")
+    done = project.plan("--snakefile", project.folder / "Snakefile", "--directory", here, "table2")
     assert "results/embedded/tables/table2_per_concept.md" in done.stdout
 
 
@@ -113,7 +113,7 @@ def test_a_module_may_have_a_config_of_its_own_over_the_defaults(project, tmp_pa
         f"module bench:\n    snakefile: '{project.folder}/Snakefile'\n    config: {{'run': 'mine', 'seeds': [7]}}\n\n"
         "use rule * from bench as bench_*\n"
     )
-    done = project.snakemake("--snakefile", here / "Snakefile", "--directory", here, "-n", "bench_table2")
+    done = project.plan("--snakefile", here / "Snakefile", "--directory", here, "bench_table2")
     assert "results/mine/predictions/ycb/gpca/seed7.csv" in done.stdout
     assert "seed0" not in done.stdout
 
@@ -124,5 +124,5 @@ def test_another_workflow_takes_the_suite_as_a_module(project, tmp_path):
     (here / "Snakefile").write_text(
         f"module bench:\n    snakefile: '{project.folder}/Snakefile'\n\nuse rule * from bench as bench_*\n"
     )
-    done = project.snakemake("--snakefile", here / "Snakefile", "--directory", here, "-n", "bench_table2")
+    done = project.plan("--snakefile", here / "Snakefile", "--directory", here, "bench_table2")
     assert "rule bench_table2_per_concept" in done.stdout

@@ -206,7 +206,7 @@ def test_every_table_figure_and_stage_is_a_target_by_name(project):
 
 
 def test_a_misspelt_target_is_answered_by_the_nearest_names(project):
-    done = project.snakemake("-n", "tabel2", "--configfile", "config/smoke.yaml", check=False)
+    done = project.plan("tabel2", "--configfile", "config/smoke.yaml", check=False)
     assert done.returncode != 0
     assert "gpca: target 'tabel2': there is no such table, figure or stage; did you mean table2 or" in done.stderr
     assert "Traceback" not in done.stderr
