@@ -1,5 +1,6 @@
 """The documentation does what it says: links, commands, examples and numbers are checked against the project."""
 
+import csv
 import re
 import shlex
 import subprocess
@@ -250,3 +251,21 @@ def test_no_file_names_a_machines_path_a_registry_or_an_unknown_host():
         hosts = set() if name.startswith("tests/") else set(re.findall(r"https?://([\w.-]+)", text))
         found += [(name, host) for host in sorted(hosts - allowed)]
     assert found == []
+
+
+FOUND = {"GP-CA on the pair": "gpca_pair", "GP-CA as the paper has it": "gpca", "inlier RMSE (gate)": "gate_rmse"}
+FOUND |= {"forest on distances and motion": "pair_forest", "truth from other starts (ceiling)": "ceiling"}
+
+
+@pytest.mark.parametrize("title", FOUND)
+def test_what_was_found_about_causes_stands_in_the_reference(title):
+    with (ROOT / "results/reference/real/tables/table9_causes.csv").open() as file:
+        of = {
+            row["metric"]: row
+            for row in csv.DictReader(file)
+            if (row["source"], row["explainer"]) == ("pooled", FOUND[title])
+        }
+    [line] = re.findall(rf"^\| {re.escape(title)} \|(.*)\|$", (ROOT / "docs/causes.md").read_text(), re.MULTILINE)
+    metrics = {"balanced_accuracy": 1, "dominant_accuracy": 1, "false_alarm_rate": 1, "auroc_failed": 3}
+    expected = [f"{float(of[name]['mean']):.{digits}f}" if name in of else "–" for name, digits in metrics.items()]
+    assert [cell.split(" ± ")[0].strip() for cell in line.split("|")] == expected
