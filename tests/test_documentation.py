@@ -123,6 +123,14 @@ def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeyp
     assert set(capsys.readouterr().out.split()) & {"noise", "pose", "overlap"}
 
 
+def test_the_python_of_the_page_of_registration_methods_runs(registrations, capsys):
+    page = (ROOT / "docs/registration.md").read_text()
+    [example] = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
+    exec(example, clouds | {"T_target_source_init": np.eye(4)})
+    assert capsys.readouterr().out.startswith("True ")
+
+
 def test_every_page_of_the_docs_is_in_the_index():
     index = (ROOT / "docs/README.md").read_text()
     pages = {path.name for path in (ROOT / "docs").glob("*.md")} - {"README.md"}

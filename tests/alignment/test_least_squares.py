@@ -45,15 +45,14 @@ def test_steps_to_planes_reach_a_known_motion():
     motion = exp(np.array([[0.1, -0.2, 0.1, 0.3, 0.1, -0.2]]))[0]
     target = transform(motion, SOURCE)
     target += np.cross(normals, RANDOM.normal(size=(30, 3)))  # anywhere on the plane
-    normals_at_target = normals
     T = np.eye(4)
     for _ in range(20):
-        T = plane_step(transform(T, SOURCE), target, normals_at_target, WEIGHTS) @ T
+        T = plane_step(transform(T, SOURCE), target, normals, WEIGHTS) @ T
     np.testing.assert_allclose(T, motion, atol=1e-9)
 
 
 def test_what_one_plane_leaves_open_does_not_move():
     points = SOURCE * [1, 1, 0]
-    T = plane_step(points, points + [0.7, -0.4, 0.1], np.tile([0.0, 0.0, 1.0], (30, 1)), np.ones(30))
+    T = plane_step(points, points + np.array([0.7, -0.4, 0.1]), np.tile([0.0, 0.0, 1.0], (30, 1)), np.ones(30))
     np.testing.assert_allclose(T[:3, 3], [0, 0, 0.1], atol=1e-9)
     np.testing.assert_allclose(rotate(T, np.array([0.0, 0.0, 1.0])), [0, 0, 1], atol=1e-9)
