@@ -14,6 +14,8 @@ from gpca.alignment.methods.interface import (
     still_moving,
 )
 
+LAST_STEP = 1e-4  # radians and diameters
+
 
 def align(
     pair: Pair,
@@ -24,7 +26,7 @@ def align(
     """Minimise the distances between small planes, each of so many neighbours.
 
     Clouds and tree are made here: given plain arrays, small_gicp thins them to cells of 0.25 units, a quarter of an
-    object. Its limits on the last step are those of scans in metres, 1e-3 and 0.1 degrees; here it steps on.
+    object. Its limits on the last step are those of scans in metres, 1e-3 and 0.1 degrees; here they are smaller.
     """
     package = import_module("small_gicp")
     source, target = package.PointCloud(pair.source), package.PointCloud(pair.target)
@@ -39,8 +41,8 @@ def align(
         max_correspondence_distance=correspondence_distance,
         num_threads=1,
         max_iterations=max_iterations,
-        rotation_epsilon=1e-5,
-        translation_epsilon=1e-6,
+        rotation_epsilon=LAST_STEP,
+        translation_epsilon=LAST_STEP,
     )
     failure = "" if found.converged else still_moving(max_iterations)
     return Outcome.at(pair, as_array(found.T_target_source), correspondence_distance, failure)

@@ -19,8 +19,11 @@ from gpca.alignment.methods.interface import (
 def align(pair: Pair, voxel: float = 0.04, correspondence_distance: float = CORRESPONDENCE_DISTANCE) -> Outcome:
     """Match both clouds, thinned to voxels of an edge in diameters, from which all of its radii follow."""
     package = import_module("kiss_matcher")
-    matcher = package.KISSMatcher(package.KISSMatcherConfig(voxel))
-    found = matcher.estimate(pair.source.astype(np.float32), pair.target.astype(np.float32))
+    try:  # it does not take voxels below 0.005, nor clouds of which too little is left
+        matcher = package.KISSMatcher(package.KISSMatcherConfig(voxel))
+        found = matcher.estimate(pair.source.astype(np.float32), pair.target.astype(np.float32))
+    except RuntimeError as fault:
+        raise FailedRegistration(f"KISS-Matcher: {fault}") from fault
     if not found.valid or matcher.get_num_final_inliers() < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
     T_target_source = np.eye(4)

@@ -48,8 +48,8 @@ def require_settings(name: str, settings: Mapping[str, object]) -> None:
     require_arguments(subject, align, 1, settings)
     hints = get_type_hints(getattr(align, "func", align))  # a partial has those of its function
     for key, value in settings.items():
-        choices = get_args(hints[key]) if get_origin(hints[key]) is Literal else [value]
-        if value not in choices:
+        choices = get_args(hints[key])
+        if get_origin(hints[key]) is Literal and value not in choices:
             raise InputError(f"{subject}: setting {key}", f"{value!r} is none of {', '.join(choices)}")
 
 

@@ -194,6 +194,58 @@ def test_an_optional_package_aligns_what_lies_close(objects, name):
     assert error(pair, make_method(name)(pair), T_true) < 0.05
 
 
+class StandIn:
+    """What the two packages offer, as far as it is called, for where they are not installed."""
+
+    PointCloud = KISSMatcherConfig = staticmethod(lambda given: given)
+
+    def __init__(self, T, good):
+        self.T_target_source, self.rotation, self.translation = T, T[:3, :3], T[:3, 3:]
+        self.converged = self.valid = good
+
+    def KdTree(self, cloud, num_threads):
+        return cloud
+
+    def estimate_covariances(self, cloud, tree=None, num_neighbors=20, num_threads=1):
+        assert num_threads == 1
+
+    def align(self, target, source, target_tree, init_T_target_source, max_correspondence_distance, **others):
+        assert target_tree is target and len(source) > 3 and max_correspondence_distance == 0.1
+        assert others.keys() == {"num_threads", "max_iterations", "rotation_epsilon", "translation_epsilon"}
+        return self
+
+    def KISSMatcher(self, voxel):
+        if voxel < 0.005:
+            raise RuntimeError("Too small voxel size")
+        return self
+
+    def estimate(self, source, target):
+        assert source.dtype == target.dtype == np.float32
+        return self
+
+    def get_num_final_inliers(self):
+        return 5
+
+
+@pytest.mark.parametrize("good", [True, False])
+@pytest.mark.parametrize("name", OPTIONAL)
+def test_what_an_optional_package_finds_becomes_an_outcome(objects, monkeypatch, name, good):
+    pair, T_true = small_motion(objects)
+    monkeypatch.setitem(sys.modules, OPTIONAL[name], StandIn(T_true, good))
+    monkeypatch.setattr(registry, "find_spec", lambda name: True)
+    outcome = make_method(name)(pair)
+    assert outcome.converged == good
+    assert np.array_equal(outcome.T_target_source, T_true if good or name == "gicp_small" else np.eye(4))
+
+
+def test_what_kiss_matcher_refuses_is_a_failed_registration(objects, monkeypatch):
+    pair, T_true = small_motion(objects)
+    monkeypatch.setitem(sys.modules, "kiss_matcher", StandIn(T_true, True))
+    monkeypatch.setattr(registry, "find_spec", lambda name: True)
+    outcome = make_method("kiss_matcher", {"voxel": 0.001})(pair)
+    assert outcome.failure == "KISS-Matcher: Too small voxel size"
+
+
 def main():
     """Print the outcome of every method on one pair of points on an ellipsoid."""
     random = np.random.default_rng(0)
