@@ -19,10 +19,10 @@ REFERENCES = {
     "point_to_point_open3d": (TO_POINTS, None),
     "point_to_plane": (TO_PLANES, None),
     "gicp": (REGISTRATION.TransformationEstimationForGeneralizedICP, None),
-    "huber": (TO_PLANES, REGISTRATION.HuberLoss(0.02)),
-    "cauchy": (TO_PLANES, REGISTRATION.CauchyLoss(0.02)),
-    "geman_mcclure": (TO_PLANES, REGISTRATION.GMLoss(0.02**2)),
-    "tukey": (TO_PLANES, REGISTRATION.TukeyLoss(0.02)),
+    "huber": (TO_PLANES, REGISTRATION.HuberLoss(0.05)),
+    "cauchy": (TO_PLANES, REGISTRATION.CauchyLoss(0.05)),
+    "geman_mcclure": (TO_PLANES, REGISTRATION.GMLoss(0.05**2)),
+    "tukey": (TO_PLANES, REGISTRATION.TukeyLoss(0.05)),
 }
 
 

@@ -18,7 +18,7 @@ def test_with_everything_switched_off_it_is_plain_icp(objects, metric, concept, 
     np.testing.assert_allclose(T, make_method(metric)(pair).T_target_source, rtol=0, atol=1e-6)
 
 
-K = 0.02
+K = 0.05
 WEIGHTS = {  # of a residual r, as the literature has them
     "huber": lambda r: np.where(r <= K, 1.0, K / np.maximum(r, 1e-300)),
     "cauchy": lambda r: 1 / (1 + (r / K) ** 2),
