@@ -21,8 +21,10 @@ configfile: DEFAULTS[1]
 with one_line():
     config, SOURCES = read(config, given.config, module.skip_configfile)
 export_to_jobs(config)
-temporary = workflow.snakemake_tmp_dir, workflow.sourcecache.runtime_cache_path
-clear_leftovers(temporary, workflow.is_main_process)
+clear_leftovers(
+    [workflow.snakemake_tmp_dir, workflow.sourcecache.runtime_cache_path],
+    workflow.is_main_process,
+)
 
 
 pathvars:
@@ -56,8 +58,3 @@ rule all:
         "<results>/model.pt",
         "<results>/comparison.md",
         "<results>/index.html",
-
-
-rule paper:
-    input:
-        [f"<results>/{result.main_file}" for result in RESULTS if result.paper],

@@ -21,7 +21,7 @@ from gpca.files import require_outputs, sha256_of_file, whole_file
 from gpca.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
-CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # set by the Snakefile for its jobs
+CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # JSON, the hash of each section: set by the Snakefile for its jobs
 _ROOT = Path(__file__).resolve().parent.parent  # of the checkout, or the site-packages that gpca is installed in
 
 
@@ -56,7 +56,7 @@ def record_provenance(
         "seed": seed,
         "settings": settings,
         "settings_sha256": sha256_of_settings(settings),
-        "config_sha256": os.environ.get(CONFIG_VARIABLE),
+        "config_sha256": json.loads(os.environ.get(CONFIG_VARIABLE, "null")),
         "inputs_sha256": {str(path): sha256_of_file(path) for path in inputs},
         "code": _code_version(),
         "environment_lock_sha256": sha256_of_file(lock) if (lock := _ROOT / "environment.lock").is_file() else None,
@@ -69,7 +69,7 @@ def record_provenance(
             partial.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n", encoding="utf-8")
 
 
-def sha256_of_settings(settings: Mapping) -> str:
+def sha256_of_settings(settings: object) -> str:
     """Return the SHA-256 of settings as JSON with sorted keys."""
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 

@@ -158,7 +158,8 @@ def isotropic(registrations, variance_S_K):
     """The outcomes of conditions whose poses scatter alike in all six directions."""
     covariance = variance_S_K[..., None, None] * np.eye(6)
     rest = np.zeros(variance_S_K.shape)
-    return Outcomes(registrations.sample, registrations.split, covariance, rest, rest, rest.astype(bool), rest)
+    no, none = rest.astype(bool), rest.astype(int)
+    return Outcomes(registrations.sample, registrations.split, covariance, rest, rest, no, none)
 
 
 def isotropic_divergence(clean, other):

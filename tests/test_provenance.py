@@ -15,7 +15,7 @@ from gpca.provenance import record_provenance, sha256_of_settings
 @pytest.fixture
 def record(tmp_path, monkeypatch):
     """The sidecar of a block that took 20 ms and had one input."""
-    monkeypatch.setenv("GPCA_CONFIG_SHA256", "c0ffee")
+    monkeypatch.setenv("GPCA_CONFIG_SHA256", '{"seeds": "c0ffee"}')
     source, outputs = tmp_path / "in.npz", [tmp_path / "out.npz", tmp_path / "out.csv"]
     source.write_bytes(b"data")
     clock = iter([100.0, 100.02])
@@ -31,7 +31,7 @@ def test_the_sidecar_says_where_a_result_comes_from(record, tmp_path):
     assert record["inputs_sha256"] == {str(tmp_path / "in.npz"): hashlib.sha256(b"data").hexdigest()}
     assert record["settings"] == {"points": 5, "options": {"k": 3}}
     assert record["settings_sha256"] == sha256_of_settings({"options": {"k": 3}, "points": 5})
-    assert (record["seed"], record["config_sha256"]) == (4, "c0ffee")
+    assert (record["seed"], record["config_sha256"]) == (4, {"seeds": "c0ffee"})
     lock = (provenance._ROOT / "environment.lock").read_bytes()
     assert record["environment_lock_sha256"] == hashlib.sha256(lock).hexdigest()
     assert record["python"] == platform.python_version()

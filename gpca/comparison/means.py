@@ -104,7 +104,8 @@ def _of_tidy(
 
 
 def _of_table(path: Path, rows: list[dict], heads: list[str]) -> Iterator[tuple[tuple[str, ...], Mean]]:
-    labels = heads[: heads.index("mean")]
+    # What says yes or no is a result, and follows from the means.
+    labels = [name for name in heads[: heads.index("mean")] if not {row[name] for row in rows} <= {"yes", "no"}]
     for row in rows:
         mean, low, high = (
             _finite(path, row[name]) if row.get(name) else math.nan for name in ("mean", "ci_low", "ci_high")

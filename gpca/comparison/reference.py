@@ -29,13 +29,17 @@ class Allowance:
         tolerances: the largest difference, for each kind in `KINDS`.
         half_widths: or so many half-widths of the reference's 95 % interval.
         flipped: or what follows from the share of samples that another rounding may decide otherwise,
-        deviations: and so many standard deviations of their balance.
+        deviations: and so many standard deviations of their balance;
+        ratio: or so much of a number of labels or epochs, which a target reached one step later changes.
+        beyond: the share of a file's values that may differ by more, as a learning curve that reaches its target does.
     """
 
     tolerances: Mapping[str, float]
     half_widths: float
     flipped: float
     deviations: float
+    ratio: float
+    beyond: float
 
     def of(self, file: str, mean: Mean) -> float:
         """Return the largest difference from a mean of the reference's file that rounding explains."""
@@ -43,6 +47,8 @@ class Allowance:
         if kind not in self.tolerances:
             raise InputError("config key reference.tolerances", f"no kind '{kind}'", "give its tolerance")
         allowed = max(self.tolerances[kind], self.half_widths * mean.half_width)
+        if kind == "count" and not mean.unit:
+            allowed = max(allowed, self.ratio * abs(mean.value))
         if mean.samples and mean.unit:
             allowed = max(allowed, mean.unit * self.deviations * math.sqrt(self.flipped / mean.samples))
         return allowed
@@ -84,11 +90,15 @@ def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[Fi
 
 
 def require_same_config(run: Path, reference: Path, files: list[str]) -> None:
-    """Raise an InputError for the first file whose provenance names another config than the reference's."""
+    """Raise an InputError for the first file whose provenance names other settings than the reference's.
+
+    A section of the config that the reference's record does not name is newer than the reference, whose results cannot
+    depend on it.
+    """
     for file in files:
         here, there = (_config_of(folder / f"{file}.provenance.json") for folder in (run, reference))
-        if here and there and here != there:
-            fault = f"{file} was made by another config than {run / file}"
+        if here and (other := sorted(section for section in there if here.get(section) != there[section])):
+            fault = f"{file} was made with another section '{other[0]}' of the config than {run / file}"
             raise InputError(reference, fault, "compare a run of that config, or make the reference anew")
 
 
@@ -105,8 +115,9 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     largest = _difference(here[worst].value - there[worst].value, allowance.of(file, there[worst]), there[worst])
     told = f"{len(differing)} of {len(there)} values differ"
     if beyond:
-        told = f"{told}, {len(beyond)} by more than rounding does"
-    return FileCheck(file, DIFFERENT if beyond else ROUNDING, f"{told}; at most, {_named(worst)}: {largest}")
+        told = f"{told}, {len(beyond)} by more than rounding usually does"
+    too_many = len(beyond) > allowance.beyond * len(there)
+    return FileCheck(file, DIFFERENT if too_many else ROUNDING, f"{told}; at most, {_named(worst)}: {largest}")
 
 
 def _excess(difference: float, allowed: float) -> float:
@@ -124,13 +135,17 @@ def _difference(difference: float, allowed: float, mean: Mean) -> str:
 
 def device_of(folder: Path, file: str) -> str:
     """Return the processor that a file was made on, and the level of instructions that its libraries were held to."""
-    device = _record(folder / f"{file}.provenance.json").get("device", {})
+    device = _record(folder / f"{file}.provenance.json").get("device") or {}
+    if isinstance(device, str):  # records of earlier versions have no more than the name
+        return device
     known = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
     return ", ".join(filter(None, [*known, device.get("instructions")])) or "on a processor that is not recorded"
 
 
-def _config_of(path: Path) -> str | None:
-    return _record(path).get("config_sha256")
+def _config_of(path: Path) -> dict[str, str]:
+    """The hash of each section of the config, where the record has them: those of earlier versions have one for all."""
+    sections = _record(path).get("config_sha256")
+    return sections if isinstance(sections, dict) else {}
 
 
 def _record(path: Path) -> dict:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import sysconfig
@@ -21,15 +22,16 @@ def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
 
     PATH begins with this Python's folder: jobs call ``python``, which need not be the one that plans the run where its
     environment is not activated. PYTHONPATH begins with `source_folder`, unless Python looks there anyway; and with
-    PYTHONSAFEPATH a ``gpca`` in the working directory, such as that of another checkout, is not taken for it. The hash
-    of the config, without what no result depends on, is for the provenance. Libraries may use no instructions but those
-    of the common level (:mod:`gpca.processor`).
+    PYTHONSAFEPATH a ``gpca`` in the working directory, such as that of another checkout, is not taken for it. The
+    hashes of the config's sections, but those that no result depends on, are for the provenance. Libraries may use no
+    instructions but those of the common level (:mod:`gpca.processor`).
 
     Args:
         config: the whole configuration of the run.
         source_folder: the folder that holds ``gpca`` and ``baselines``, by default that of the package itself.
     """
-    os.environ[CONFIG_VARIABLE] = sha256_of_settings({k: v for k, v in config.items() if k not in OF_NO_RESULT})
+    sections = {name: sha256_of_settings(value) for name, value in config.items() if name not in OF_NO_RESULT}
+    os.environ[CONFIG_VARIABLE] = json.dumps(sections, sort_keys=True)
     _put_first("PATH", Path(sys.executable).parent)
     source_folder = Path(source_folder).resolve()
     if source_folder not in {Path(sysconfig.get_path(name)).resolve() for name in ("purelib", "platlib")}:

@@ -123,4 +123,6 @@ class Reference:
     half_widths: NotNegative
     flipped: Annotated[float, Bounds(minimum=0, maximum=1)]
     deviations: NotNegative
+    ratio: Annotated[float, Bounds(minimum=0, maximum=1)]
+    beyond: Annotated[float, Bounds(minimum=0, maximum=1)]
     tolerances: ReferenceTolerances

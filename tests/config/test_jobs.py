@@ -1,5 +1,6 @@
 """What jobs inherit: tested by a job, a Python in another folder."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -67,11 +68,13 @@ def test_jobs_that_start_jobs_do_not_make_the_paths_longer(monkeypatch):
     assert Path(shutil.which("python")).parent == Path(sys.executable).parent
 
 
-def test_the_hash_is_that_of_what_results_depend_on():
+def test_the_hashes_are_those_of_the_sections_that_results_depend_on():
     whole = yaml.safe_load((ROOT / "config/config.yaml").read_text())
     hashes = []
     for changed in ({}, {"data_dir": "/data"}, {"comparison": {"tolerances": {}}}, {"reference": {}}, {"seeds": [7]}):
         export_to_jobs(dict(reversed((whole | changed).items())))
         hashes.append(os.environ["GPCA_CONFIG_SHA256"])
     assert len(set(hashes[:4])) == 1
-    assert hashes[4] != hashes[0]
+    usual, other = json.loads(hashes[0]), json.loads(hashes[4])
+    assert {section for section in usual if usual[section] != other[section]} == {"seeds"}
+    assert {"registrations", "encoders"} <= set(usual)

@@ -33,8 +33,8 @@ def test_scenes_replace_nothing_but_scenes(tmp_path):
     (tmp_path / "home").mkdir()
     (tmp_path / "home/thesis.tex").write_text("five years")
     (tmp_path / "file").write_text("x")
-    for out, words in (("home", "holds something other than scenes"), (".", "holds something"), ("file", "no folder")):
-        refusal(["scenes", "--source", "tiny", "--out", out], tmp_path, words, "give another")
+    for out, words in (("home", "did not make"), (".", "did not make"), ("file", "no folder")):
+        refusal(["scenes", "--source", "tiny", "--out", out], tmp_path, out, words, "another")
 
 
 def test_scenes_replace_scenes(scenes, tmp_path):

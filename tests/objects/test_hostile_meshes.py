@@ -175,7 +175,7 @@ def test_a_file_too_large_to_be_parsed_is_not_opened(tmp_path):
 @pytest.mark.parametrize("points", [0, 63, -5])
 def test_too_few_points_of_a_surface(points, tmp_path):
     (tmp_path / "ball.ply").write_text(ply())
-    refusal([*arguments("mesh_folder"), "--surface-points", points], tmp_path, "ball", "64 or more")
+    refusal([*arguments("mesh_folder"), "--surface-points", points], tmp_path, "--surface-points", "from 256")
 
 
 def test_the_same_files_unspoilt_are_read(tmp_path):

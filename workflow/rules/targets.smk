@@ -1,9 +1,14 @@
-# What else can be asked for by name: numbers of the paper's (table2, fig5), the smoke run.
+# What else can be asked for by name: what the paper shows, its numbers (table2, fig5), the smoke run.
 import os
 
 from gpca.reporting.registry import targets, unknown_target
 
 SHORT = targets(RESULTS)
+
+
+rule paper:
+    input:
+        [f"<results>/{result.main_file}" for result in RESULTS if result.paper],
 
 
 for short, result in SHORT.items():

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from gpca.errors import InputError
 from gpca.files import whole_file
+from gpca.provenance import sha256_of_settings
 from gpca.reporting.page.comparison import page_comparison
 from gpca.reporting.page.markdown_table import read_markdown_table
 from gpca.reporting.page.samples import POINTS, RULE, page_samples
@@ -128,7 +129,7 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
             commit = code["commit"] or "outside a git checkout"
             values = {
                 "Code": f"{commit} with uncommitted changes" if code["dirty"] else commit,
-                "Config (SHA-256)": record["config_sha256"] or "none",
+                "Config (SHA-256)": _config(record["config_sha256"]),
                 "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],
                 "Device": _device(record["device"]),
                 "Python": record["python"],
@@ -140,6 +141,11 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
         for fact, value in values.items():
             facts.setdefault(fact, Counter())[value] += 1
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
+
+
+def _config(sections: dict | None) -> str:
+    """One hash for those of all sections, or "none" where the step was run by hand."""
+    return sha256_of_settings(sections) if sections else "none"
 
 
 def _device(device: dict) -> str:
