@@ -25,3 +25,29 @@ def adds_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarr
 def pose_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarray, symmetric: bool) -> float:
     """Return ADD-S where the object is symmetric and ADD elsewhere."""
     return (adds_error if symmetric else add_error)(points_N_3, T_estimated, T_true)
+
+
+class PoseErrors:
+    """Errors of many estimates of one object's pose, where the truth is the identity.
+
+    ADD-S is the mean distance to the nearest point, so it is not below the spacing of the points: judged is by some of
+    them, but the nearest is sought among all.
+
+    Args:
+        points_N_3: of the object, in any unit; errors come in the same.
+        judged: how many of the points, the first ones, the mean is over.
+        symmetric: whether ADD-S counts.
+    """
+
+    def __init__(self, points_N_3: np.ndarray, judged: int, symmetric: bool) -> None:
+        from scipy.spatial import cKDTree
+
+        self._points_P_3 = np.asarray(points_N_3[:judged], np.float64)
+        self._tree = cKDTree(points_N_3) if symmetric else None
+
+    def __call__(self, T_estimated_n: np.ndarray) -> np.ndarray:
+        """Return the errors (n,) of the estimates (n, 4, 4)."""
+        moved_n_P_3 = np.stack([transform(T, self._points_P_3) for T in T_estimated_n])
+        if self._tree is None:
+            return np.linalg.norm(moved_n_P_3 - self._points_P_3, axis=2).mean(axis=1)
+        return self._tree.query(moved_n_P_3)[0].mean(axis=1)

@@ -53,6 +53,13 @@ def require_settings(name: str, settings: Mapping[str, object]) -> None:
             raise InputError(f"{subject}: setting {key}", f"{value!r} is none of {', '.join(choices)}")
 
 
+def require_global(name: str) -> None:
+    """Raise an InputError unless the method is known and needs no initial pose."""
+    if not method_entry(name).is_global:
+        known = ", ".join(other for other, entry in methods().items() if entry.is_global)
+        raise InputError(f"registration method '{name}'", "needs an initial pose itself", f"global ones are {known}")
+
+
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
     """Return a method as a function from pairs to outcomes.
 

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from gpca.alignment.icp_kernels import CONVERGED
 from gpca.alignment.least_squares import best_motion, plane_step
 from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair
 from gpca.alignment.methods.local import failure_of_a_step
@@ -100,6 +99,8 @@ def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndar
     Returns:
         the pose, the matches there, and why it is none to stop at, if so.
     """
+    from gpca.alignment.icp_kernels import CONVERGED
+
     T = np.array(pair.T_target_source_init, np.float64)
     matches = stages.match(pair, T)
     for _ in range(max_iterations):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
 from gpca.alignment.methods.stages import Stages, run_stages
@@ -25,6 +24,8 @@ def align(
     correspondence; `correspondence_distance` only measures the outcome.
     """
     if not overlap:
+        from scipy.optimize import minimize_scalar
+
         found = minimize_scalar(
             lambda share: _objective(pair, share, max_iterations),
             bounds=(LEAST_OVERLAP, 1.0),
