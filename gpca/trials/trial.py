@@ -19,13 +19,12 @@ from gpca.pairs.dataset import Registrations
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.trials.judge import Judge
+from gpca.trials.rows import INITIAL, NO_START, SEVERITIES
 from gpca.trials.settings import PairSettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
-INITIAL, NO_START = "initial", "none"  # where a registration starts, or the name of a global method
-SEVERITIES = ("severity_noise", "severity_rotation_rad", "severity_translation", "severity_crop")
 Method = Callable[[Pair], Outcome]
 
 
