@@ -145,6 +145,7 @@ def test_every_page_of_the_docs_is_in_the_index():
         ("diagnostics", 7),
         ("explain", 3),
         ("comparison", 14),
+        ("registration", 4),
         ("active_learning", 15),
         ("real_world", 5),
     ],
@@ -165,6 +166,12 @@ def test_every_configured_rival_is_described():
     page = (ROOT / "docs/baselines.md").read_text()
     for name in set(explainers) - {"gpca", "gpca_paper"}:
         assert f"`{name}`" in page or f"`…{name.removeprefix('shap_removal').removeprefix('sa_local_removal')}`" in page
+
+
+def test_every_configured_registration_method_is_described():
+    methods = yaml.safe_load((ROOT / "config/config.yaml").read_text())["methods"]
+    page = (ROOT / "docs/registration.md").read_text()
+    assert [name for name in methods if f"`{name}`" not in page] == []
 
 
 def test_every_configured_learner_is_described():

@@ -41,8 +41,9 @@ class Explanation:
     """One registration, how uncertain it is, and why.
 
     Attributes:
-        T_target_source: the pose (4, 4) by ICP, in the unit of the points.
+        T_target_source: the pose (4, 4) that was found, in the unit of the points.
         fitness, inlier_rmse: share of source points with a correspondence; RMSE over those, in the unit of the points.
+        method: that found it: the model's kind of ICP, or a registration method by its name.
         scores, variances: mean and variance over the posterior draws for each concept (Eqs. 4, 5).
         bald, entropy: how uncertain the attribution is, in nats: Eq. 7, and the entropy of the scores.
         concept: the one with the largest score (Eq. 6).
@@ -57,6 +58,7 @@ class Explanation:
     T_target_source: np.ndarray
     fitness: float
     inlier_rmse: float
+    method: str
     scores: dict[str, float]
     variances: dict[str, float]
     bald: float
@@ -93,7 +95,7 @@ class Explanation:
             *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
             "",
             f"attribution    entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
-            f"registration   fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}",
+            f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}",
         ]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"

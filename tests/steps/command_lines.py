@@ -34,6 +34,12 @@ STEP_OPTIONS = {
         "--settings": {"train": 18, "test": 6, "cloud_points": 128}, "--seed": 0, "--objects": "objects.npz",
         "--out": "registrations.npz", "--timings": "icp.csv",
     },
+    "register_methods": COMMON | {
+        "--settings": {"method_pairs": {"samples": 3, "points": 64}, "methods": {"point_to_point": {}, "fgr": {}}},
+        "--seeds": 0, "--methods": ["point_to_point", "fgr"], "--objects": "objects.npz",
+        "--registrations": "registrations.npz", "--out": ["point_trials.csv", "fgr_trials.csv"],
+        "--timings": ["point_seconds.csv", "fgr_seconds.csv"],
+    },
     "train": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--out": "weights.pt",
         "--curve": "curve.csv",

@@ -33,6 +33,7 @@ def test_every_step_runs_by_hand(made):
 def test_a_step_made_anew_gives_the_same_bytes(folder, made):
     for step in (
         "registrations",
+        "register_methods",
         "train",
         "embed",
         "reduce",
@@ -47,6 +48,8 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
         assert main(arguments(step)) == 0
     for name in (
         "registrations.npz",
+        "point_trials.csv",
+        "fgr_trials.csv",
         "weights.pt",
         "curve.csv",
         "embeddings.npz",

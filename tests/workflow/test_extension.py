@@ -12,12 +12,13 @@ from .conftest import without_ends
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 ROW = {"sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "run_icp": 6, "attribute": 19}
-ROW |= {"shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
+ROW |= {"register_methods": 1, "shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
 COLLECTORS = {"metrics": 1, "timings": 1, "fig_attribution_confusions": 1, "table1_extended": 1}
 TABLES = dict.fromkeys(("table1_single_baselines", "table2_per_concept"), 1)
 TABLES |= dict.fromkeys(("active_learning", "active_learning_curves", "diagnostics"), 1)
 TABLES |= dict.fromkeys(("table3_active_learning", "table3_extended", "table3_stream"), 1)
 TABLES |= dict.fromkeys(("table5_learners", "table5_shift", "table5_claims"), 1)
+TABLES |= dict.fromkeys(("registration_methods", "table11_registration", "table11_severity"), 1)
 TABLES |= dict.fromkeys(("coverage_risk", "reliability", "uncertainty_vs_distance"), 1)
 
 

@@ -30,6 +30,7 @@ RUNTIME = jobs("time_stages", "table7_runtime", "runtime")
 MODEL = jobs("model") + RUNTIME
 RECOVERY_FIGURES = jobs("recovery_rates", "fig6_mitigation", "fig1_recovery_example")
 RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
+METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
 # GP-CA on the two reductions of Table VI, and what shows it.
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 # Explainers times two sources: four with a GPC (classic features on the frames too), four on embeddings, 13 on
@@ -78,6 +79,12 @@ def test_table6_needs_the_frames_alone(planned):
     }  # fmt: skip
 
 
+def test_table11_needs_the_registrations_alone(planned):
+    assert planned.before("results/smoke/tables/table11_registration.md") == {
+        "sample_objects": 2, "register": 4, "register_methods": 2, "registration_methods": 1, "table11_registration": 1,
+    }  # fmt: skip
+
+
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
@@ -99,7 +106,10 @@ EDITS = {
     "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
-        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + RUNTIME + RECOVERY,
+        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + RUNTIME + RECOVERY
+        + jobs(register_methods=2) + METHODS,
+    "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
+    "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
     "baselines/softmax_head.py": jobs(attribute=2) + COLLECTORS + RECOVERY,
     "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
@@ -119,7 +129,8 @@ EDITS = {
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=6)
-    + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD,
+    + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
+    + jobs("register_methods") + METHODS,
 }  # fmt: skip
 
 
