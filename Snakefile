@@ -34,8 +34,8 @@ pathvars:
 
 
 STAGES = (
-    "common objects registrations methods frames encoders uncertainty explainers active_learning kernel_grid "
-    "learners model recovery results comparison targets"
+    "common objects registrations methods causes frames encoders uncertainty explainers active_learning diagnostics "
+    "model recovery results comparison targets"
 )
 for stage in STAGES.split():
 

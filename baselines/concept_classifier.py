@@ -9,32 +9,34 @@ from gpca.pairs.perturbation import CONCEPTS
 
 
 class ConceptClassifier:
-    """A classifier whose score columns are always `CONCEPTS`, whatever concepts its training rows hold.
+    """A classifier whose score columns are always the same labels, whichever of them its training rows hold.
 
     Args:
         classifier: an unfitted scikit-learn classifier or pipeline with ``predict_proba``.
+        labels: (C,) those of the columns.
     """
 
-    def __init__(self, classifier) -> None:
+    def __init__(self, classifier, labels: tuple[str, ...] = CONCEPTS) -> None:
         self._classifier = classifier
+        self._labels = labels
 
     def fit(self, features_N_F: np.ndarray, concept_N: np.ndarray) -> ConceptClassifier:
         """Learn from labelled features; fewer than two concepts among the labels raise an InputError."""
-        known_concepts(concept_N)
+        known_concepts(concept_N, self._labels)
         self._classifier.fit(features_N_F, concept_N)
         return self
 
     def scores(self, features_N_F: np.ndarray) -> np.ndarray:
-        """Return probabilities (N, C) in the order of `CONCEPTS`; a concept absent from training has 0."""
-        scores_N_C = np.zeros((len(features_N_F), len(CONCEPTS)))
-        columns = [CONCEPTS.index(concept) for concept in self._classifier.classes_]
+        """Return probabilities (N, C) in the order of the labels; one absent from training has 0."""
+        scores_N_C = np.zeros((len(features_N_F), len(self._labels)))
+        columns = [self._labels.index(concept) for concept in self._classifier.classes_]
         scores_N_C[:, columns] = self._classifier.predict_proba(features_N_F)
         return scores_N_C
 
 
-def known_concepts(concept_N: np.ndarray) -> list[str]:
-    """Return the concepts among training labels, in the order of `CONCEPTS`; fewer than two raise an InputError."""
-    known = [concept for concept in CONCEPTS if (concept_N == concept).any()]
+def known_concepts(concept_N: np.ndarray, labels: tuple[str, ...] = CONCEPTS) -> list[str]:
+    """Return the labels among those of training samples, in their order; fewer than two raise an InputError."""
+    known = [label for label in labels if (concept_N == label).any()]
     if len(known) < 2:
         raise InputError("training registrations", "fewer than two concepts", "give samples of at least two")
     return known

@@ -1,6 +1,6 @@
 """Concept activation vectors (Kim et al. 2018, TCAV), read per sample.
 
-TCAV's score tells how often a whole data set moves along a concept; it says nothing of one sample. What it rests on
+TCAV's score tells how often a whole dataset moves along a concept; it says nothing of one sample. What it rests on
 does: the concept activation vector (CAV), the normal of a linear probe that parts one concept from the others
 (TCAV's relative CAV) in the encoder's embedding. A sample is scored by how far it lies along each.
 """
@@ -30,7 +30,12 @@ class ConceptVectors:
     Args:
         source, seed: not used; the probes are a convex problem and nothing is drawn.
         inverse_regularisation: scikit-learn's C, of the L2 penalty of the probes.
+
+    Attributes:
+        labels: what it names.
     """
+
+    labels: tuple[str, ...] = CONCEPTS
 
     def __init__(self, source: str, seed: int, inverse_regularisation: float = 1.0) -> None:
         self._inverse_regularisation = inverse_regularisation
@@ -45,7 +50,7 @@ class ConceptVectors:
         from sklearn.preprocessing import StandardScaler
 
         embedding_N_d = attached(registrations, "embedding", None)
-        self._known = known_concepts(registrations.concept)
+        self._known = known_concepts(registrations.concept, self.labels)
         if (embedding_N_d == embedding_N_d[0]).all():
             raise InputError("array 'embedding'", "is the same for all training registrations", "train the encoder")
         self._embedding_scaler = StandardScaler().fit(embedding_N_d)
@@ -61,11 +66,11 @@ class ConceptVectors:
 
         started = perf_counter()
         scaled_N_d = self._embedding_scaler.transform(attached(registrations, "embedding", None))
-        positions_N_C = np.full((len(registrations), len(CONCEPTS)), -np.inf)
-        columns = [CONCEPTS.index(concept) for concept in self._known]
+        positions_N_C = np.full((len(registrations), len(self.labels)), -np.inf)
+        columns = [self.labels.index(concept) for concept in self._known]
         positions_N_C[:, columns] = self._projection_scaler.transform(scaled_N_d @ self.vectors_K_d.T)
         scores_N_C = softmax(positions_N_C, axis=1)
-        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+        return Attribution.of_scores(self.labels, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
 
 
 EXPLAINERS = {"concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, reads="embeddings")}

@@ -53,6 +53,7 @@ class DirichletGP:
         from gpytorch.likelihoods import DirichletClassificationLikelihood
         from sklearn.preprocessing import StandardScaler
 
+        from gpca.adam import Adam
         from gpca.classifier.covariances import squared_distances
 
         known_concepts(registrations.concept)
@@ -71,7 +72,7 @@ class DirichletGP:
         self._log_scale_C = values_C_N.var(dim=1).log()
         self._mean_C = values_C_N.mean(dim=1)
         parameters = [self._log_lengthscale_C, self._log_scale_C, self._mean_C]
-        optimiser = torch.optim.Adam([each.requires_grad_() for each in parameters], lr=self._learning_rate)
+        optimiser = Adam([each.requires_grad_() for each in parameters], self._learning_rate)
         for _ in range(self._iterations):
             cholesky_C_N_N, whitened_C_N_1 = self._factor(squared_N_N, values_C_N, noise_C_N)
             log_determinants = cholesky_C_N_N.diagonal(dim1=1, dim2=2).log().sum()

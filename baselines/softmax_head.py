@@ -12,7 +12,13 @@ from gpca.pairs.perturbation import CONCEPTS
 
 
 class SoftmaxHead:
-    """Scores are the softmax of the head's logits, averaged over the draws from a cloud as the embedding is."""
+    """Scores are the softmax of the head's logits, averaged over the draws from a cloud as the embedding is.
+
+    Attributes:
+        labels: what it names.
+    """
+
+    labels: tuple[str, ...] = CONCEPTS
 
     def __init__(self, source: str, seed: int) -> None:
         pass
@@ -25,8 +31,8 @@ class SoftmaxHead:
         from scipy.special import softmax
 
         started = perf_counter()
-        scores_N_C = softmax(attached(registrations, "head_logits", len(CONCEPTS)), axis=1)
-        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+        scores_N_C = softmax(attached(registrations, "head_logits", len(self.labels)), axis=1)
+        return Attribution.of_scores(self.labels, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
 
 
 EXPLAINERS = {"softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, reads="embeddings")}

@@ -121,7 +121,8 @@ def make_explainer(options: argparse.Namespace):
         h_N_d = encoder.eval()(torch.from_numpy(np.stack(clouds))).numpy()
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, draws=options.draws), "benchmark", 0)
     gpc.fit(h_N_d, np.array([CONCEPTS[n % 3] for n in range(TRAINING)]))
-    model = Model(encoder, settings, gpc, ICPSettings(), options.points, RecoveryPolicy(), "ellipsoids", stand_in=True)
+    parts = (None, encoder, settings, gpc, ICPSettings(), options.points, RecoveryPolicy())
+    model = Model(*parts, "ellipsoids", stand_in=True)
     return Explainer(model, device="cpu")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,6 +61,21 @@ def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, leas
     if (values < least).any():
         raise InputError(path, f"column '{column}' holds numbers below {least:g}", "make it anew")
     return values
+
+
+def finite_number(subject: object, name: str, text: str, remedy: str = "make it anew") -> float:
+    """Return the number that one field holds; `subject` and `name` say where it stands.
+
+    Raises:
+        InputError: no number, NaN or infinity.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(subject, f"'{name}' is '{text}' and not a finite number", remedy)
+    return value
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame) -> None:

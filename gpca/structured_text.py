@@ -17,6 +17,12 @@ MOST_ENTRIES = 100_000  # with every alias unfolded; the configs of the suite ha
 _MERGE = "tag:yaml.org,2002:merge"
 
 
+def load_own_yaml(path: Path) -> Any:
+    """Return what a YAML file of the package holds; libyaml takes a fifth of the time, where PyYAML has it."""
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    return yaml.load(path.read_text(encoding="utf-8"), Loader=loader)
+
+
 def read_mapping(path: str | Path) -> dict[str, Any]:
     """Return the mapping that a YAML or JSON file holds.
 

@@ -49,7 +49,32 @@ def registrations(objects):
 
 
 @pytest.fixture(scope="session")
-def model(registrations):
+def diagnoser():
+    """A diagnoser of twelve pairs whose descriptors were drawn; two thirds failed, each for all causes."""
+    import numpy as np
+
+    from gpca.causes.settings import CauseSettings
+    from gpca.classifier.settings import GPCSettings
+    from gpca.descriptors.dataset import WIDTHS
+    from gpca.descriptors.settings import DescriptorSettings
+    from gpca.model.learning import Lessons, learn
+
+    random, label_N = np.random.default_rng(0), np.array(["nominal", "noise", "pose"] * 4)
+    failed_N = label_N != "nominal"
+    lessons = Lessons(
+        features_N_F=random.normal(size=(12, sum(WIDTHS.values()))) + 3 * failed_N[:, None],
+        label_N=label_N,
+        causes_N_3=np.repeat(failed_N[:, None], 3, axis=1),
+        error_N=np.where(failed_N, 0.2, 0.01),
+        unseen_N=np.arange(12) < 6,
+    )
+    gpc = GPCSettings(learning_rate=0.1, iterations=20, inducing=4, draws=50)
+    descriptors = DescriptorSettings(starts=1, restarts=2, icp_points=64)
+    return learn(lessons, gpc, CauseSettings(points=(64, 128)), descriptors, 0.05, "tiny", 0)[0]
+
+
+@pytest.fixture(scope="session")
+def model(registrations, diagnoser):
     """A model of an encoder that was not trained: its embeddings tell concepts apart well enough to be scored."""
     import torch
 
@@ -70,7 +95,7 @@ def model(registrations):
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, iterations=40, inducing=12, draws=200), "tiny", 0)
     gpc.fit(h_S_d, train.concept)
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
-    return Model(network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", stand_in=True)
+    return Model(diagnoser, network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", stand_in=True)
 
 
 @pytest.fixture(scope="session")
@@ -91,3 +116,32 @@ def tiny(scenes, tmp_path_factory):
     from .frames.tiny import read
 
     return read(scenes, tmp_path_factory.mktemp("objects") / "tiny.npz")
+
+
+FOUR = ("002_master_chef_can", "019_pitcher_base", "035_power_drill", "037_scissors")
+FEW_CAUSES = {"train": 12, "test": 8, "points": (128, 256), "clean_pairs": 20}
+
+
+@pytest.fixture(scope="session")
+def four(tmp_path_factory):
+    """Four procedural objects, one of them symmetric."""
+    from gpca.objects.canonical import ObjectClouds, write_objects
+    from gpca.objects.procedural import surfaces
+
+    path = tmp_path_factory.mktemp("objects") / "four.npz"
+    write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", path, n_points=6000)
+    return ObjectClouds.load(path)
+
+
+@pytest.fixture(scope="session")
+def drawn(four):
+    """Registrations with measured causes, the tally of their candidates, and seconds."""
+    from gpca.causes.drawing import draw_causes
+    from gpca.causes.settings import CauseSettings
+
+    return draw_causes(four, "four", 100, CauseSettings(**FEW_CAUSES))
+
+
+@pytest.fixture(scope="session")
+def causes(drawn):
+    return drawn[0]

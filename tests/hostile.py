@@ -17,15 +17,11 @@ from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from gpca.__main__ import STEPS
-
 CPU_SECONDS = 10  # of the processor, so that a busy machine fails no test
 WALL_SECONDS = 120  # a hang, on the busiest machine
 GROWTH_BYTES = 2**30
-_LIBRARIES = ("open3d", "pandas", "sklearn", "trimesh", "jsonschema", "gpca.config.check", "gpca.classifier.gpc")
-_STEPS = [f"gpca.steps.{name.replace('-', '_')}" for name in STEPS]
 _SERVER = multiprocessing.get_context("forkserver")
-_SERVER.set_forkserver_preload(["tests.hostile", *_STEPS, *_LIBRARIES])
+_SERVER.set_forkserver_preload(["tests.hostile", "tests.preloaded"])
 
 
 def refusal(arguments: Sequence[str | Path], folder: Path, *words: str) -> str:

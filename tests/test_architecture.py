@@ -13,6 +13,7 @@ PAGE = (ROOT / "docs/architecture.md").read_text()
 LONGEST = {"gpca/alignment/icp_kernels.py": 450}  # the compiled loop of ICP, which is one function for its speed
 TOP = {
     *(
+        "adam",
         "arguments",
         "arrays",
         "code_files",

@@ -263,3 +263,16 @@ def test_gpc_compares_equal_fits_and_ends_with_its_numbers(capsys):
     assert list(result) == ["fit_s", "fit_speedup", "one_sample_ms", "ms_200_samples", "max_abs_error"]
     assert result["max_abs_error"] < 1e-3
     assert result["fit_s"] > 0
+
+
+def test_causes_end_with_the_seconds_of_a_truth_and_the_shares_of_the_states(capsys):
+    from benchmarks import causes
+
+    causes.main(["--candidates", "8", "--family", "linemod"])
+    result = last_line(capsys.readouterr().out)
+    assert list(result)[:3] == ["truth_s", "speedup", "max_error_difference"]
+    assert min(result["truth_s"], result["speedup"]) > 0
+    assert result["max_error_difference"] < 1e-6
+    for shares in (("nominal", "borderline", "failed"), ("failed_by_noise", "failed_by_pose", "failed_by_overlap")):
+        assert sum(result[name] for name in shares) == pytest.approx(1)
+    assert 0 <= result["ceiling"] <= 1

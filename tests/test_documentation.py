@@ -18,7 +18,7 @@ from gpca.reporting.registry import registered
 
 from .documents import PAGES, ROOT, commands, our_files, relative
 
-# Hosts that our own files may name; those of data sets stand in the config alone.
+# Hosts that our own files may name; those of datasets stand in the config alone.
 LITERATURE = {"arxiv.org", "github.com", "pointclouds.org", "json-schema.org"}
 DATA = {"rgbd-dataset.cs.washington.edu", "huggingface.co"}
 
@@ -82,30 +82,43 @@ def test_every_python_command_names_something_that_is_there(command):
         assert find_spec(words[1]) is not None
 
 
-def snakemake_targets():
-    """The targets of every `snakemake` command by its other options, so that one plan covers all of them."""
+def snakemake_plans():
+    """Options and targets of as few plans as cover every `snakemake` command.
+
+    Commands of one config share a plan, with the options of all of them, unless they give an option two values. That
+    each config can be planned without any option is for tests/workflow/test_load.py.
+    """
     parser = ArgumentParser()
     for option in ("--profile", "--configfile", "--config"):
         parser.add_argument(option)
-    parser.add_argument("-j")
-    parser.add_argument("-n", action="store_true")
+    for option in ("-j", "--report"):  # a report is not made in a dry run
+        parser.add_argument(option, dest="unplanned")
+    parser.add_argument("-n", "--report-after-run", action="store_true", dest="unplanned")
     parser.add_argument("targets", nargs="*")
-    by_options = {}
+    plans = []
     for command in commands("snakemake "):
-        given, others = parser.parse_known_args(shlex.split(command)[1:])
-        named = [(f"--{name}", getattr(given, name)) for name in ("profile", "configfile", "config")]
-        options = (*(word for option in named if option[1] for word in option), *others)
-        if given.targets:  # without one, an option is spoken of
-            by_options.setdefault(options, set()).update(given.targets)
-    return by_options
+        given = vars(parser.parse_intermixed_args(shlex.split(command)[1:]))
+        named = {name: given[name] for name in ("profile", "configfile", "config") if given[name]}
+        if not given["targets"]:  # an option is spoken of
+            continue
+        for plan in plans:
+            same = plan[0].get("configfile") == named.get("configfile")
+            if same and all(plan[0].get(name, value) == value for name, value in named.items()):
+                break
+        else:
+            plan = ({}, set())
+            plans.append(plan)
+        plan[0].update(named)
+        plan[1].update(given["targets"])
+    return plans
 
 
-@pytest.mark.parametrize(("options", "targets"), snakemake_targets().items(), ids=" ".join)
+@pytest.mark.parametrize(("options", "targets"), snakemake_plans(), ids=lambda part: " ".join(sorted(part)))
 def test_every_snakemake_command_can_be_planned(options, targets, tmp_path):
-    if "--profile" in options:
+    if "profile" in options:
         pytest.importorskip("snakemake_executor_plugin_slurm")
-    planned = [option for option in options if "report" not in option]  # a report is not made in a dry run
-    words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in (*planned, "--", *sorted(targets))]
+    words = [word for name, value in options.items() for word in (f"--{name}", value)]
+    words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in (*words, "--", *sorted(targets))]
     plan = subprocess.run(
         [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", *words], cwd=ROOT, capture_output=True, text=True
     )
@@ -120,7 +133,7 @@ def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeyp
     [example] = re.findall(r"^```python\n(.*?)^```", (ROOT / f"docs/{page}.md").read_text(), re.MULTILINE | re.DOTALL)
     clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
     exec(example, clouds | {"T_target_source_init": np.eye(4)})
-    assert set(capsys.readouterr().out.split()) & {"noise", "pose", "overlap"}
+    assert set(capsys.readouterr().out.split()) & {"nominal", "failed", "noise", "pose", "overlap"}
 
 
 def test_the_python_of_the_page_of_registration_methods_runs(registrations, capsys):
@@ -148,6 +161,7 @@ def test_every_page_of_the_docs_is_in_the_index():
         ("registration", 4),
         ("active_learning", 15),
         ("real_world", 5),
+        ("causes", 20),
     ],
 )
 def test_every_number_of_a_page_is_that_of_the_config(page, fewest):
@@ -166,6 +180,12 @@ def test_every_configured_rival_is_described():
     page = (ROOT / "docs/baselines.md").read_text()
     for name in set(explainers) - {"gpca", "gpca_paper"}:
         assert f"`{name}`" in page or f"`…{name.removeprefix('shap_removal').removeprefix('sa_local_removal')}`" in page
+
+
+def test_every_configured_explainer_of_causes_is_described():
+    explainers = yaml.safe_load((ROOT / "config/config.yaml").read_text())["diagnosis"]["explainers"]
+    page = (ROOT / "docs/causes.md").read_text()
+    assert [name for name in explainers if f"`{name}`" not in page] == []
 
 
 def test_every_configured_registration_method_is_described():

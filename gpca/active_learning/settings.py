@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Annotated
 
 from gpca.classifier.settings import GPCSettings
@@ -27,6 +27,12 @@ class ActiveLearningSettings:
     iterations: Count = 100
     tolerance: PositiveShare = 1e-3
     gpc: GPCSettings = field(default_factory=lambda: GPCSettings(learning_rate=0.1))
+
+    @classmethod
+    def from_dict(cls, section: dict) -> ActiveLearningSettings:
+        """Build from the config's section ``active_learning``, of which other parts read the rest."""
+        own = {field.name: section[field.name] for field in fields(cls) if field.name in section}
+        return cls(**own | ({"gpc": GPCSettings(**own["gpc"])} if "gpc" in own else {}))
 
 
 @dataclass(frozen=True)

@@ -102,3 +102,8 @@ def require_cloud(name: str, points: np.ndarray) -> None:
     """Raise an InputError unless there are at least three points (N, 3), all of them finite."""
     if len(points) < 3 or not np.isfinite(points).all():
         raise InputError(name, f"{len(points)} points, or NaN among them", "give at least 3 finite points")
+
+
+def clipped_cost(fitness_n: np.ndarray, inlier_rmse_n: np.ndarray, distance: float) -> np.ndarray:
+    """Return the mean squared distance (n,) of the source's points, cut off at the correspondence distance."""
+    return fitness_n * inlier_rmse_n**2 + (1 - fitness_n) * distance**2

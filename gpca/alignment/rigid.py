@@ -29,6 +29,11 @@ def inverse(T_b_a: np.ndarray) -> np.ndarray:
     return T_a_b
 
 
+def inverses(T_b_a_n: np.ndarray) -> np.ndarray:
+    """Return the inverse of each transform (n, 4, 4)."""
+    return np.stack([inverse(T_b_a) for T_b_a in T_b_a_n])
+
+
 def scale_translation(T_b_a: np.ndarray, factor: float) -> np.ndarray:
     """Return the transform in another unit of length: rotation kept, translation times `factor`."""
     scaled = T_b_a.copy()

@@ -16,6 +16,7 @@ import torch
 from sklearn.cluster import KMeans
 from sklearn.preprocessing import StandardScaler
 
+from gpca.adam import Adam
 from gpca.attribution.scores import summarise_marginals
 from gpca.classifier.covariances import make_covariance
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
@@ -69,7 +70,7 @@ class GPC:
         random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
         covariance = make_covariance(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
         model = SparseGPs(covariance, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
-        optimiser = torch.optim.Adam(model.parameters(), lr=self.settings.learning_rate)
+        optimiser = Adam(model.parameters(), self.settings.learning_rate)
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
             optimiser.zero_grad()

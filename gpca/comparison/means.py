@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.attribution.metrics import mean_interval
-from gpca.csv_file import read_csv
+from gpca.csv_file import finite_number, read_csv
 from gpca.errors import InputError
 
 TIMES = "*seconds*"
@@ -30,6 +30,7 @@ KINDS = (
 )
 
 COUNTS_OF_SAMPLES = ("test_samples", "episodes")  # metrics that say of how many samples the others are shares
+OF_RUNS = ("reached", "recognised")  # shares of the seeds' runs, whatever the test samples
 PARTS = ("predicted_as_*", "first_*", "acted_first")  # numbers of samples out of these
 
 
@@ -94,11 +95,12 @@ def _of_tidy(
     values: dict[tuple[str, ...], list[float]] = defaultdict(list)
     for row in rows:
         key = tuple(row[name] for name in ("table", "source", "method", "metric", "concept"))
-        values[key].append(_finite(path, row["value"]))
+        values[key].append(finite_number(path, "value", row["value"]))
     for (table, source, method, quantity, concept), values_R in values.items():
         mean, low, _ = mean_interval(values_R)
         counts = [(table, source, method, name, of) for name in COUNTS_OF_SAMPLES for of in (concept, "all")]
         counted = next((sum(values[key]) for key in counts if key in values), samples_of_source.get(source, 0))
+        counted = len(values_R) if quantity in OF_RUNS else counted
         half_width = 0.0 if math.isnan(low) else mean - low
         unit = _unit(path.name, quantity, counted, len(values_R))
         yield (table, source, method, quantity, concept), Mean(mean, half_width, quantity, int(counted), unit)
@@ -109,10 +111,12 @@ def _of_table(path: Path, rows: list[dict], heads: list[str]) -> Iterator[tuple[
     labels = [name for name in heads[: heads.index("mean")] if not {row[name] for row in rows} <= {"yes", "no"}]
     for row in rows:
         mean, low, high = (
-            _finite(path, row[name]) if row.get(name) else math.nan for name in ("mean", "ci_low", "ci_high")
+            finite_number(path, name, row[name]) if row.get(name) else math.nan
+            for name in ("mean", "ci_low", "ci_high")
         )
         half_width = 0.0 if math.isnan(low) or math.isnan(high) else max(mean - low, high - mean)
-        quantity, samples = row[labels[-1]], _finite(path, row.get("n_test") or "0")
+        quantity, samples = row[labels[-1]], finite_number(path, "n_test", row.get("n_test") or "0")
+        samples = int(row.get("n_seeds") or 1) if quantity in OF_RUNS else samples
         unit = _unit(f"tables/{path.name}", quantity, samples, int(row.get("n_seeds") or 1))
         yield tuple(row[name] for name in labels), Mean(mean, half_width, quantity, int(samples), unit)
 
@@ -122,13 +126,3 @@ def _unit(file: str, quantity: str, samples: float, seeds: int) -> float:
     if any(fnmatchcase(quantity, pattern) for pattern in PARTS):
         return samples / seeds
     return {"share": 1.0, "percent": 100.0}.get(kind_of(file, quantity), 0.0)
-
-
-def _finite(path: Path, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(path, f"holds '{text}' in place of a number", "make it anew")
-    return value

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gpca.csv_file import finite_number
 from gpca.errors import InputError
 
 PUBLISHED = Path(__file__).with_name("published.csv")
@@ -224,8 +225,9 @@ def _number(where: str, fields: dict[str, str]) -> Number:
         if not fields[name]:
             raise InputError(where, f"'{name}' is empty", "fill it in")
     require_known(where, "unit", fields["unit"], UNITS)
-    value = _finite(where, "value", fields["value"])
-    upper = _finite(where, "upper", fields["upper"]) if fields["upper"] else value
+    remedy = "give one"
+    value = finite_number(where, "value", fields["value"], remedy)
+    upper = finite_number(where, "upper", fields["upper"], remedy) if fields["upper"] else value
     try:
         decimals = int(fields["decimals"])
     except ValueError:
@@ -273,16 +275,6 @@ def require_known(where: str, name: str, given: str, known: Iterable[str]) -> st
     if given not in known:
         raise InputError(where, f"unknown {name} '{given}'", f"known are {', '.join(known)}")
     return given
-
-
-def _finite(where: str, name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(where, f"'{name}' is '{text}'", "give a finite number")
-    return value
 
 
 def _named(key: tuple[str, str, str]) -> str:

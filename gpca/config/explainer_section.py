@@ -1,11 +1,11 @@
-"""The section ``explainers`` of the config; an explainer without an entry here checks its settings itself."""
+"""The sections of explainers in the config; an explainer without an entry here checks its settings itself."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from gpca.classifier.settings import GPCSettings
+from gpca.classifier.settings import GPCSettings, LearningRate
 from gpca.settings import Bounds, Count, Positive
 
 
@@ -46,6 +46,33 @@ class ForestOfResiduals:
     floor: Positive = 1e-4
 
 
+@dataclass(frozen=True)
+class Boosting:
+    """Gradient boosting on the descriptors of a pair."""
+
+    iterations: Count = 150
+    learning_rate: LearningRate = 0.06
+
+
+@dataclass(frozen=True)
+class Forest:
+    """A forest on the descriptors of a pair."""
+
+    trees: Count = 300
+    smallest_leaf: Count = 2
+
+
+CAUSE_EXPLAINERS = {
+    "gpca": GPCSettings | None,
+    "gpca_pair": GPCSettings | None,
+    "gpca_multilabel": GPCSettings | None,
+    "concept_vectors": Probes | None,
+    "residuals": Probes | None,
+    "density": Probes | None,
+    "entropies": Probes | None,
+    "pair_forest": Forest | None,
+    "pair_boosting": Boosting | None,
+}
 EXPLAINERS = {
     "gpca": GPCSettings | None,
     "gpca_paper": GPCSettings | None,

@@ -13,13 +13,15 @@ from typing import Annotated, Any
 
 import yaml
 
+from gpca.causes.settings import CauseSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.verdicts import Tolerance
 from gpca.config import sections
-from gpca.config.explainer_section import EXPLAINERS
-from gpca.config.json_schema import COMPLETE, Keys, Named, schema_of
+from gpca.config.explainer_section import CAUSE_EXPLAINERS, EXPLAINERS
+from gpca.config.json_schema import COMPLETE, EVERY, Keys, Named, schema_of
 from gpca.config.robot_sections import RealWorld, Recovery
 from gpca.config.source_section import NAME, Place, Source
+from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
@@ -58,6 +60,7 @@ BY_NAME = Bounds(minProperties=1, propertyNames=NAME)
 SHIFT = Keys(
     required=("samples", "severities", "held_out_share", "encoder", "neighbours", "shape_points"), without=("beyond",)
 )
+COMPLETE_CAUSES = Keys(required=EVERY, without=("icp", "icp_points"))
 GRID = Keys(required=("sources", "kernels", "learning_rates", "iterations"))
 LEARNING = Keys(
     required=(
@@ -72,6 +75,15 @@ class Comparison:
     """Verdicts on the numbers that the paper prints, by unit."""
 
     tolerances: Tolerances
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What says why the registrations of ``causes`` failed."""
+
+    descriptors: Annotated[DescriptorSettings, COMPLETE]
+    encoder: Encoder
+    explainers: Annotated[dict[str, Settings], BY_NAME, Named(CAUSE_EXPLAINERS)]
 
 
 @dataclass(frozen=True)
@@ -93,6 +105,8 @@ class Config:
     ]
     method_pairs: Annotated[PairSettings, COMPLETE]
     methods: Annotated[dict[str, Settings], BY_NAME]
+    causes: Annotated[CauseSettings, COMPLETE_CAUSES]
+    diagnosis: Diagnosis
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
     active_learning: Annotated[sections.ActiveLearning, LEARNING]
     kernel_grid: Annotated[sections.Grid, GRID]

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.causes.settings import CauseSettings
 from gpca.classifier.kernel_grid import KernelGrid
+from gpca.classifier.settings import GPCSettings
 from gpca.config.json_schema import COMPLETE, Keys
 from gpca.encoders.reduction import PCA, UMAP, Autoencoder
 from gpca.encoders.settings import EncoderSettings
@@ -89,6 +91,9 @@ class ExplainedModel:
 
     source: str
     encoder: str
+    causes: Annotated[CauseSettings, Keys(required=(), without=("icp", "icp_points"))]
+    classifier: GPCSettings
+    false_alarms: OpenShare
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,8 @@ class Autoencoder:
         import torch
         from torch import nn
 
+        from gpca.adam import Adam
+
         d = z_train_N_d.shape[1]
         hidden = 256
         batch_size = 32
@@ -96,7 +98,7 @@ class Autoencoder:
             torch.manual_seed(seed_of(*axes, "autoencoder"))
             encoder = nn.Sequential(nn.Linear(d, hidden), nn.GELU(), nn.Linear(hidden, self.components))
             decoder = nn.Sequential(nn.Linear(self.components, hidden), nn.GELU(), nn.Linear(hidden, d))
-            optimiser = torch.optim.Adam([*encoder.parameters(), *decoder.parameters()], lr=1e-3)
+            optimiser = Adam([*encoder.parameters(), *decoder.parameters()], 1e-3)
             for epoch in range(self.epochs):
                 order = generator(*axes, "autoencoder", epoch).permutation(len(z_N_d))
                 for rows in np.array_split(order, -(-len(order) // batch_size)):

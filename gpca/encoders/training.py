@@ -40,11 +40,17 @@ def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *
 
 
 def train_encoder(
-    registrations: Registrations, source: str, seed: int, settings: EncoderSettings, checkpoint: Path | None = None
+    registrations: Registrations,
+    source: str,
+    seed: int,
+    settings: EncoderSettings,
+    checkpoint: Path | None = None,
+    classes: tuple[str, ...] = CONCEPTS,
 ) -> tuple[Classifier, list[dict[str, float]]]:
     """Train on the rows of split ``train``.
 
     Args:
+        classes: what ``concept`` names.
         checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
             continues from it and ends with the same weights as an unbroken run.
 
@@ -53,12 +59,12 @@ def train_encoder(
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     device = best_device()
-    model = make_model(settings).to(device)
+    model = make_model(settings, classes).to(device)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     rows = registrations.rows("train")
     if len(rows) < 2:
         raise InputError(f"registrations of {source}, seed {seed}", "hold no training samples", "raise their number")
-    labels_S = torch.from_numpy(np.array([CONCEPTS.index(concept) for concept in registrations.concept]))
+    labels_S = torch.from_numpy(np.array([classes.index(concept) for concept in registrations.concept]))
     batches = -(-len(rows) // settings.batch_size)
     # At least 5 steps long: of a length of 4, a quarter of which rises, torch divides by zero.
     schedule = torch.optim.lr_scheduler.OneCycleLR(
@@ -127,13 +133,13 @@ def embed(
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
 
 
-def load_model(weights: Path, settings: EncoderSettings) -> Classifier:
+def load_model(weights: Path, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
     """Load encoder and head as the step ``train`` wrote them, ready for inference.
 
     Raises:
         InputError: missing, damaged, pickled or another encoder's weights.
     """
-    model = make_model(settings)
+    model = make_model(settings, classes)
     remedy = "make them anew with 'python -m gpca train'"
     if not Path(weights).is_file():
         raise InputError(weights, "no such weights", remedy)
@@ -150,19 +156,19 @@ def load_model(weights: Path, settings: EncoderSettings) -> Classifier:
 
 
 class Classifier(nn.Sequential):
-    """An encoder and a linear head over the concepts."""
+    """An encoder and a linear head over the classes."""
 
     encoder: nn.Module
     head: nn.Linear
 
-    def __init__(self, encoder: nn.Module, embedding_size: int) -> None:
-        super().__init__(OrderedDict(encoder=encoder, head=nn.Linear(embedding_size, len(CONCEPTS))))
+    def __init__(self, encoder: nn.Module, embedding_size: int, classes: int) -> None:
+        super().__init__(OrderedDict(encoder=encoder, head=nn.Linear(embedding_size, classes)))
 
 
-def make_model(settings: EncoderSettings) -> Classifier:
-    """Return a new encoder with a head over the concepts."""
+def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
+    """Return a new encoder with a head over the classes."""
     encoder = make_encoder(settings.backbone, settings.options)
-    return Classifier(encoder, encoder.embedding_size)
+    return Classifier(encoder, encoder.embedding_size, len(classes))
 
 
 def _fingerprint(registrations: Registrations) -> str:

@@ -13,7 +13,13 @@ from gpca.pairs.perturbation import CONCEPTS
 
 
 class GPCA:
-    """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds."""
+    """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds.
+
+    Attributes:
+        labels: what it names.
+    """
+
+    labels: tuple[str, ...] = CONCEPTS
 
     def __init__(self, source: str, seed: int, **settings) -> None:
         from gpca.classifier.gpc import (  # here, because the workflow imports this file only to know its entries
@@ -21,20 +27,20 @@ class GPCA:
             GPCSettings,
         )
 
-        self._gpc = GPC(CONCEPTS, GPCSettings(**settings), source, seed)
+        self._gpc = GPC(self.labels, GPCSettings(**settings), source, seed)
 
     def fit(self, registrations: Registrations) -> None:
         """Fit the GPC to the labelled embeddings."""
-        self._gpc.fit(registrations.embedding, registrations.concept)
+        self._gpc.fit(self._inputs(registrations), registrations.concept)
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Draw from the posterior at every embedding and summarise (Eqs. 4 to 7)."""
         started = perf_counter()
-        scores_N_C, variances_N_C, bald_N = self._gpc.attribute(registrations.embedding)
+        scores_N_C, variances_N_C, bald_N = self._gpc.attribute(self._inputs(registrations))
         seconds = (perf_counter() - started) / len(registrations)
         zeros_N = np.zeros(len(registrations))
         return Attribution(
-            concepts=CONCEPTS,
+            concepts=self.labels,
             scores_N_C=scores_N_C,
             variances_N_C=variances_N_C,
             bald_N=bald_N,
@@ -43,6 +49,9 @@ class GPCA:
             seconds_N=zeros_N + seconds,
             icp_seconds_N=zeros_N,
         )
+
+    def _inputs(self, registrations: Registrations) -> np.ndarray:
+        return registrations.embedding
 
 
 EXPLAINERS = {

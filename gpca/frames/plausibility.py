@@ -13,7 +13,7 @@ from gpca.errors import InputError
 from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
 
-# Diameters, from the median measured point to the model. Of 223 annotated objects of five data sets the worst lies at
+# Diameters, from the median measured point to the model. Of 223 annotated objects of five datasets the worst lies at
 # 0.034; turned at random in its place, the worst lies at 0.298. What is farther is not where its pose says.
 FARTHEST = 0.3
 JUDGED_POINTS = 200  # of each object, enough for a median

@@ -10,11 +10,14 @@ from collections.abc import Mapping
 import torch
 
 from gpca.classifier.covariances import make_covariance
+from gpca.descriptors.dataset import WIDTHS
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import require_like
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import check_settings
+from gpca.uncertainty.settings import FEWEST_STARTS
 
 # The most that one explanation can be asked for: above it takes minutes, or all memory, and gains nothing. A score is
 # the mean over the draws of the classifier, so a million of them leave an error of 0.0005 at most.
@@ -22,6 +25,7 @@ MOST_DRAWS = 10**6
 MOST_ENCODED_POINTS = 10**6  # in all draws of the encoder together
 MOST_CLOUD_POINTS = 10**6
 MOST_ITERATIONS = 10**5  # of ICP
+MOST_RUNS = 10**4  # of ICP, to describe a pair
 MOST_NEIGHBOURS = 10**4  # or whatever else a backbone's options count
 
 
@@ -30,6 +34,8 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     check_settings(vars(settings), "encoders", "*")
     check_settings(content["gpc"]["settings"], "explainers", "gpca")
     check_settings(content["icp"], "registrations", "icp")
+    if content["diagnoser"] is not None:
+        _require_diagnoser(content["diagnoser"])
     counts = {
         "draws of the classifier": (content["gpc"]["settings"]["draws"], 2, MOST_DRAWS),
         "points": (content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
@@ -37,9 +43,7 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
         "draws of the encoder": (settings.draws, 1, MOST_ENCODED_POINTS // settings.draw_points),
         "attempts": (content["thresholds"]["attempts"], 1, MOST_ITERATIONS),
     }
-    for name, (count, least, most) in counts.items():
-        if type(count) is not int or not least <= count <= most:
-            raise ValueError(f"{name}: {count!r} is no number from {least} to {most}")
+    _require_counts(counts)
     for name, value in settings.options.items():  # a backbone of a user's own has options of its own
         if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBOURS:
             raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBOURS}")
@@ -52,6 +56,45 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
         encoder = make_encoder(settings.backbone, settings.options)
     require_like(content["encoder"], encoder.state_dict(), "encoder")
     _require_classifier(content["gpc"], encoder.embedding_size)
+
+
+def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
+    for name, (count, least, most) in counts.items():
+        if type(count) is not int or not least <= count <= most:
+            raise ValueError(f"{name}: {count!r} is no number from {least} to {most}")
+
+
+def _require_diagnoser(state: Mapping) -> None:
+    check_settings(state["descriptors"], "diagnosis", "descriptors")
+    check_settings(state["runs"], "uncertainty", "causal")
+    check_settings(state["icp"], "registrations", "icp")
+    causes = state["classifier"]["causes"]
+    _require_counts(
+        {
+            "points of a description": (state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
+            "starts": (state["runs"]["starts"], FEWEST_STARTS, MOST_RUNS),
+            "starts with remedies": (state["descriptors"]["starts"], 1, MOST_RUNS),
+            "restarts": (state["descriptors"]["restarts"], 1, MOST_RUNS),
+            "iterations of ICP": (state["icp"]["max_iterations"], 1, MOST_ITERATIONS),
+            "classifiers of causes": (len(causes), len(CONCEPTS), len(CONCEPTS)),
+        }
+    )
+    quantiles, weights, threshold = state["classifier"]["quantiles"], state["error_weights"], state["threshold"]
+    features = sum(WIDTHS.values())
+    if quantiles.ndim != 2 or len(quantiles) < 2 or quantiles.shape[1] != features:
+        raise ValueError(f"'quantiles' is of shape {tuple(quantiles.shape)}, not of {features} descriptors")
+    if (quantiles.diff(dim=0) < 0).any():
+        raise ValueError("'quantiles' fall")
+    if tuple(weights.shape) != (features + 1,):
+        raise ValueError(f"'error_weights' is of shape {tuple(weights.shape)}, not {(features + 1,)}")
+    if type(threshold) is not float or not 0 <= threshold <= 2:
+        raise ValueError(f"threshold: {threshold!r} is no probability")
+    for gpc in (state["classifier"]["failure"], *causes):
+        _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
+        check_settings(gpc["settings"], "explainers", "gpca")
+        _require_classifier(gpc, features)
+        if len(gpc["classes"]) != 2:
+            raise ValueError("a classifier of the pair has not two classes")
 
 
 def _require_classifier(state: Mapping, d: int) -> None:

@@ -1,4 +1,4 @@
-"""GP-CA for one registration of a user's own, with a trained model: align, embed, attribute.
+"""One registration of a user's own, with a trained model: align, say whether it is right, and why it is not.
 
 What the workflow does with its samples is done here to two clouds, from the same functions: the target's canonical
 frame, ICP, the mean embedding of random draws, posterior draws.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
@@ -20,12 +21,13 @@ from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.attribution.scores import entropy
+from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
 from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.file import Model, model_path
 from gpca.objects.canonical import estimate_normals
-from gpca.recovery.policy import RecoveryPolicy
+from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
@@ -34,7 +36,7 @@ LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in t
 
 
 class Explainer:
-    """GP-CA with a trained model.
+    """Explains registrations with a trained model.
 
     Args:
         model: by default the one that :func:`gpca.model.file.model_path` finds.
@@ -63,6 +65,7 @@ class Explainer:
         unit: str = "m",
         frame: CanonicalFrame | None = None,
         uncertainty: UncertaintySettings | None = None,
+        diagnose: bool = True,
         method: str | None = None,
     ) -> Explanation:
         """Register the source to the target, and say why that is uncertain. The same clouds give the same numbers.
@@ -73,6 +76,8 @@ class Explainer:
             unit: that of points and pose: ``m``, ``cm`` or ``mm``.
             frame: the target's, where it is known already; by default it is measured on its points.
             uncertainty: how the spread of the pose is measured; by default it is not.
+            diagnose: whether the registration is diagnosed, if the model can do it: GP-CA alone takes a fifth of the
+                time, cannot say that nothing is wrong, and then decides about the action.
             method: the registration method (docs/registration.md) that aligns the clouds, with its default settings; by
                 default the model's own ICP, with which the classifier has learnt.
 
@@ -105,11 +110,17 @@ class Explainer:
                 outcome = register(Pair(source, target, seed=seed_of("explanation", method)).with_normals())
                 T_icp, fitness, rmse = outcome.T_target_source, outcome.fitness, outcome.inlier_rmse
                 notes += [] if outcome.converged else [f"{method} failed: {outcome.failure}"]
+        found = None
+        if diagnose and self.model.diagnoser is not None:
+            with _timed(seconds, "diagnosis"):
+                found = self.model.diagnoser.diagnose(source, target, T_icp)
+            found = replace(found, expected_error=found.expected_error * frame.diameter)
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(T_icp, source))
         with _timed(seconds, "attribution"):
             (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
-        if not np.isfinite(h_1_d).all() or not np.isfinite(scores_C).all():
+        told = [*scores_C, *((found.failure, *found.causes.values()) if found else ())]
+        if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
             raise InputError("model", "it gives no finite numbers for these clouds", "make another one")
         spread = None
         if uncertainty is not None:
@@ -117,11 +128,17 @@ class Explainer:
                 spread = _spread(icp, source, T_icp, uncertainty, frame.diameter)
         if fitness == 0:
             notes.append("no source point is near the target, so the scores mean nothing")
-        decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
+        if found is None:
+            decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
+        elif found.state == NOMINAL:
+            decision = Decision(NOTHING, "", "nothing is wrong")
+        else:
+            decision = self.policy.decide(np.array([*found.causes.values()]), found.bald, concepts=(*found.causes,))
         return Explanation(
             T_target_source=frame.pose_outside(T_icp) @ T_init,
             fitness=float(fitness),
             inlier_rmse=float(rmse) * frame.diameter,
+            diagnosis=found,
             method=method or self.model.icp.method,
             scores=dict(zip(self.model.concepts, scores_C.tolist(), strict=True)),
             variances=dict(zip(self.model.concepts, variances_C.tolist(), strict=True)),

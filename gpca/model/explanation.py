@@ -1,4 +1,4 @@
-"""What is said of one registration: pose, uncertainty, causes with their scores, and what to do."""
+"""What is said of one registration: pose, whether it is right, the causes where it is not, and what to do."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.recovery.policy import QUEUE
+from gpca.model.diagnoser import Diagnosis
+from gpca.recovery.policy import NOTHING, QUEUE
 
 WORDS = {  # what a reader is told of each branch
+    NOTHING: "none",
     "reinitialise": "reinitialise ICP with a broader search",
     "new_view": "change the viewpoint",
     "denoise": "filter and check the sensor",
@@ -38,14 +40,17 @@ class PoseSpread:
 
 @dataclass(frozen=True)
 class Explanation:
-    """One registration, how uncertain it is, and why.
+    """One registration, whether it is right, and why it is not.
 
     Attributes:
         T_target_source: the pose (4, 4) that was found, in the unit of the points.
         fitness, inlier_rmse: share of source points with a correspondence; RMSE over those, in the unit of the points.
         method: that found it: the model's kind of ICP, or a registration method by its name.
-        scores, variances: mean and variance over the posterior draws for each concept (Eqs. 4, 5).
-        bald, entropy: how uncertain the attribution is, in nats: Eq. 7, and the entropy of the scores.
+        diagnosis: of the pair, learnt from measured causes, its expected error in the unit of the points; None where
+            it was not asked for.
+        scores, variances: of GP-CA as in the paper, which sees the aligned source alone and always names a concept:
+            mean and variance over the posterior draws (Eqs. 4, 5).
+        bald, entropy: how uncertain these are, in nats: Eq. 7, and the entropy of the scores.
         concept: the one with the largest score (Eq. 6).
         action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`).
         reason: why this action, in words.
@@ -59,6 +64,7 @@ class Explanation:
     fitness: float
     inlier_rmse: float
     method: str
+    diagnosis: Diagnosis | None
     scores: dict[str, float]
     variances: dict[str, float]
     bald: float
@@ -81,22 +87,18 @@ class Explanation:
         }
         return vars(self) | {
             "T_target_source": self.T_target_source.tolist(),
+            "diagnosis": self.diagnosis and self.diagnosis.as_dict(),
             "spread": spread,
             "notes": list(self.notes),
         }
 
     def text(self) -> str:
         """Return it for a reader."""
-        lines = [
-            f"concept   {self.concept}",
-            f"action    {WORDS.get(self.action, self.action)} ({self.reason})",
-            "",
-            f"{'':10}{'score':>8}{'variance':>10}",
-            *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
-            "",
-            f"attribution    entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
-            f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}",
-        ]
+        action = f"action    {WORDS.get(self.action, self.action)} ({self.reason})"
+        registered = (
+            f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
+        )
+        lines = [*self._diagnosed(), action, "", *self._attributed(), "", registered]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
             lines.append(f"pose spread    {scatter} (root mean square over {self.spread.starts} starts)")
@@ -104,3 +106,23 @@ class Explanation:
         lines += [" ".join(f"{number:12.6g}" for number in row) for row in self.T_target_source]
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
         return "\n".join([*lines, "", f"milliseconds   {stages}", ""])
+
+    def _diagnosed(self) -> list[str]:
+        if self.diagnosis is None:
+            return []
+        found = self.diagnosis
+        named = " and ".join(found.named) or "nothing is wrong"
+        return [
+            f"state     {found.state}: {named}",
+            f"failure   probability {found.failure:.3f}, called one from {found.threshold:.3f}",
+            f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in found.causes.items())}, if it failed",
+            f"error     about {found.expected_error:.2g} {self.unit}",
+        ]
+
+    def _attributed(self) -> list[str]:
+        return [
+            "GP-CA as in the paper: the aligned source alone, and a concept whether or not anything is wrong",
+            f"{'':10}{'score':>8}{'variance':>10}",
+            *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
+            f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
+        ]

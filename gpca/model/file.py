@@ -21,9 +21,10 @@ from gpca.encoders.tensor_file import read_tensors
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.model.contents import require_possible
+from gpca.model.diagnoser import Diagnoser
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
-FORMAT, VERSION = "GP-CA model", 2
+FORMAT, VERSION = "GP-CA model", 3
 VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to take where no other is named
 RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
 BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
@@ -32,18 +33,20 @@ REMEDY = "make one with 'make results', or alone with 'snakemake -j2 results/emb
 
 @dataclass(frozen=True)
 class Model:
-    """An encoder, a classifier on its embeddings, and how registrations were made for them.
+    """What says whether a registration is right and why it is not; and the paper's GP-CA, which it learnt besides.
 
     Attributes:
+        diagnoser: of the pair after ICP, learnt from measured causes of all sources; None where there is GP-CA alone.
         encoder: from clouds (B, N, 3) to embeddings (B, d), ready for inference.
         encoder_settings: also how many points it sees and how many draws make an embedding.
         gpc: the classifier; its classes are the concepts.
         icp: how ICP ran.
         cloud_points: of source and of target, at most.
-        policy: what to do about which scores.
-        title, stand_in: of the objects of the training, and whether they were drawn by the package.
+        policy: what to do about which causes.
+        title, stand_in: of the objects that GP-CA learnt, and whether they were drawn by the package.
     """
 
+    diagnoser: Diagnoser | None
     encoder: nn.Module
     encoder_settings: EncoderSettings
     gpc: GPC
@@ -63,6 +66,7 @@ class Model:
         content = {
             "format": FORMAT,
             "version": VERSION,
+            "diagnoser": self.diagnoser and self.diagnoser.state(),
             "encoder": self.encoder.state_dict(),
             "encoder_settings": _renamed(asdict(self.encoder_settings), "draw_points", "points"),
             "gpc": self.gpc.state(),
@@ -102,6 +106,7 @@ class Model:
             encoder = make_encoder(settings.backbone, settings.options)
             encoder.load_state_dict(content["encoder"])
             return cls(
+                diagnoser=content["diagnoser"] and Diagnoser.from_state(content["diagnoser"]),
                 encoder=encoder.eval(),
                 encoder_settings=settings,
                 gpc=GPC.from_state(content["gpc"]),

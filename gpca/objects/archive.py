@@ -21,6 +21,7 @@ from typing import IO
 
 from gpca.errors import InputError
 from gpca.files import sha256_of_file, whole_file
+from gpca.json_file import read_json
 from gpca.limits import LARGEST_FILE_BYTES, is_bounded
 
 LARGEST_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
@@ -134,10 +135,7 @@ def _write_list(path: Path, sha256_of: dict[str, str]) -> None:
 
 def _require_listed(folder: Path, listed: Path) -> None:
     remedy = f"remove {folder} and {listed.name} beside it, and the archive is unpacked anew"
-    try:
-        expected = dict(json.loads(listed.read_text(encoding="utf-8")))
-    except (ValueError, TypeError) as fault:
-        raise InputError(listed, "is no list of files", remedy) from fault
+    expected = read_json(listed, "a list of files", remedy)
     # What a desktop leaves in a folder that somebody looked at begins with a dot; no reader takes it for data.
     found = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file() or file.is_symlink()}
     for name in sorted({*expected, *(name for name in found if not Path(name).name.startswith("."))}):

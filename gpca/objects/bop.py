@@ -28,7 +28,7 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
     """Yield the models `objects` (all when None) in the order of their ids, named ``obj_000001``.
 
     Args:
-        folder: holds obj_*.ply itself, or models/ with them, as the data sets and their archives do.
+        folder: holds obj_*.ply itself, or models/ with them, as the datasets and their archives do.
         unit: that of the vertices; the format says mm.
         objects: ids.
 

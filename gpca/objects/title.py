@@ -21,4 +21,4 @@ def stand_in_clause(entries: Iterable[Mapping], partly: bool = True) -> str:
     if not any(stand_ins):
         return ""
     share = "partly " if partly and not all(stand_ins) else ""
-    return f", {share}on {STAND_IN}s of the datasets' objects"
+    return f", measured {share}on {STAND_IN}s for the datasets' objects"

@@ -1,4 +1,4 @@
-"""UW RGB-D Object Dataset: single views of objects, already cut out, as PCD files or in the data set's tars.
+"""UW RGB-D Object Dataset: single views of objects, already cut out, as PCD files or in the dataset's tars.
 
 Lai, Bo, Ren, Fox: A Large-Scale Hierarchical Multi-View RGB-D Object Dataset, ICRA 2011. A view is named
 <class>_<instance>_<sequence>_<frame>, e.g. coffee_mug_1_1_1; points are in metres in the camera's frame.
@@ -6,7 +6,6 @@ Lai, Bo, Ren, Fox: A Large-Scale Hierarchical Multi-View RGB-D Object Dataset, I
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby
 from pathlib import Path, PurePosixPath
@@ -18,6 +17,7 @@ from gpca.limits import require_file
 from gpca.objects import archive, pcd
 from gpca.objects.mesh_folder import files_in, metres_per
 from gpca.objects.surface import Surface
+from gpca.objects.views import instance_of, view_order
 
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
 READS_ARCHIVES = True  # only a few of the 600 views in a tar are wanted, so nothing is unpacked
@@ -61,17 +61,11 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
 
 
 def _chosen(views: list[_View], scale: float, views_per_instance: int) -> Iterator[Surface]:
-    views = sorted(views, key=lambda view: _order(view[0]))
-    for _, group in groupby(views, key=lambda view: _order(view[0])[0]):
+    views = sorted(views, key=lambda view: view_order(view[0]))
+    for _, group in groupby(views, key=lambda view: instance_of(view[0])):
         of_instance = list(group)
         # The end is left out: the turntable's last frame is the neighbour of its first.
         steps = np.linspace(0, len(of_instance), min(views_per_instance, len(of_instance)), endpoint=False)
         for step in steps.astype(int):
             name, read, subject = of_instance[step]
             yield Surface(name, pcd.parse(read(), subject) * scale, None)
-
-
-def _order(name: str) -> tuple[str, int, int]:
-    """Instance, sequence, frame; a name of another form is an instance of its own."""
-    match = re.fullmatch(r"(.+)_(\d+)_(\d+)", name)
-    return (match[1], int(match[2]), int(match[3])) if match else (name, 0, 0)

@@ -108,8 +108,11 @@ class Registrations:
         save_arrays(path, {name: getattr(self, name) for name in (*REGISTRATION_COLUMNS, *CLOUDS)})
 
     @classmethod
-    def load(cls, path: str | Path) -> Registrations:
+    def load(cls, path: str | Path, made_by: str = "python -m gpca registrations") -> Registrations:
         """Read the npz.
+
+        Args:
+            made_by: the command that writes it, where that is another.
 
         Raises:
             InputError: the file is missing, damaged, holds pickled objects, wrong shapes, NaN or unknown labels.
@@ -119,8 +122,8 @@ class Registrations:
         shapes |= {"points": ("P", 3), "offsets": ("O",), "target_points": ("Q", 3), "target_offsets": ("R",)}
         kinds = dict.fromkeys(shapes, REAL) | dict.fromkeys(("split", "concept", "object_name"), TEXT)
         kinds |= dict.fromkeys(("sample", "object_index", "offsets", "target_offsets"), WHOLE)
-        arrays = load_arrays(path, shapes, "python -m gpca registrations", kinds)
-        remedy = "make it anew with 'python -m gpca registrations'"
+        arrays = load_arrays(path, shapes, made_by, kinds)
+        remedy = f"make it anew with '{made_by}'"
         for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):
             offsets = arrays[ends]
             if len(offsets) != len(arrays["sample"]) + 1 or offsets[0] != 0 or offsets[-1] != len(arrays[points]):

@@ -50,7 +50,7 @@ class RegistrationSettings:
 def make_registrations(
     objects: ObjectClouds, source: str, seed: int, settings: RegistrationSettings
 ) -> tuple[Registrations, np.ndarray]:
-    """Perturb, align by ICP and label: the data set of one source and seed.
+    """Perturb, align by ICP and label: the dataset of one source and seed.
 
     Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order. Everything
     random in a sample comes from generators named by source, seed, split and number, so that it does not depend on

@@ -17,6 +17,7 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import NotNegative, Share
 
+NOTHING = "nothing"  # the branch of a registration that is fine
 QUEUE = "queue"  # the branch that acts no more: a person labels the case, and the classifier learns it
 TREATMENTS = {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"}  # the paper maps them so
 

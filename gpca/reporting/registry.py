@@ -12,7 +12,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-import yaml
+from gpca.structured_text import load_own_yaml
 
 REGISTRY = Path(__file__).with_name("results.yaml")
 SUFFIXES = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}  # the files of each kind
@@ -152,7 +152,7 @@ InSection = TypeVar("InSection", bound=HasSection)
 @cache
 def registered() -> tuple[Result, ...]:
     """Return every entry of the registry, in order."""
-    sections = yaml.safe_load(REGISTRY.read_text(encoding="utf-8"))
+    sections = load_own_yaml(REGISTRY)
     return tuple(_result(section["section"], entry) for section in sections for entry in section["results"])
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import explainer_entry
+from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.alignment.methods.registry import left_out, method_entry
 from gpca.explainers.gpca import GPCA_FORMS
@@ -35,6 +35,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "first_seed": str(config["seeds"][0]),
         "method": installed_methods(config),
         "explainer": list(config["explainers"]),
+        "cause_explainer": list(config["diagnosis"]["explainers"]),
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
         "strategy": strategies,
@@ -76,6 +77,8 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "global_start": config["method_pairs"]["global_start"],
         "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
         "explainer_titles": {name: entry.title for name, entry in entries.items()},
+        "cause_explainers": {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]},
+        "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": {
             name: explainer_entry(name).title.removesuffix(" on the embedding") for name in config["learners"]
         },

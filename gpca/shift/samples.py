@@ -12,7 +12,7 @@ from gpca.encoders.training import Classifier, embed, train_encoder
 from gpca.explainers.analytical_features import analytical_features
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.synthesis import RegistrationSettings, make_registrations
+from gpca.pairs.synthesis import make_registrations
 from gpca.seeds import generator
 from gpca.shift.distance import knn_distance, mahalanobis_distance, principal_components
 from gpca.shift.sets import SPACES, ShiftedSets
@@ -106,13 +106,3 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
         named = np.full(len(part), name)
         joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
     return ShiftedSets.join(joined)
-
-
-def settings_from(shift: dict, registrations: dict, encoder: dict) -> ShiftSettings:
-    """Build from the config's section ``shift``, and what it shares with the registrations and the encoder."""
-    shift = dict(shift)
-    samples = shift.get("samples", ShiftSettings.samples)
-    severities = shift.pop("severities", {})
-    beyond = RegistrationSettings.from_dict(registrations | {"severities": severities, "train": 0, "test": samples})
-    trained = EncoderSettings(**encoder | shift.pop("encoder", {}))
-    return ShiftSettings(beyond=beyond, encoder=trained, **shift)

@@ -31,3 +31,13 @@ class ShiftSettings:
     train: Annotated[int, Bounds(minimum=3)] = 300
     neighbours: Count = 10
     shape_points: Annotated[int, Bounds(minimum=4)] = 128
+
+    @classmethod
+    def from_dicts(cls, shift: dict, registrations: dict, encoder: dict) -> ShiftSettings:
+        """Build from the config's section ``shift``, and what it shares with the registrations and the encoder."""
+        shift = dict(shift)
+        samples = shift.get("samples", cls.samples)
+        severities = shift.pop("severities", {})
+        beyond = RegistrationSettings.from_dict(registrations | {"severities": severities, "train": 0, "test": samples})
+        trained = EncoderSettings(**encoder | shift.pop("encoder", {}))
+        return cls(beyond=beyond, encoder=trained, **shift)

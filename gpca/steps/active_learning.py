@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -17,7 +17,6 @@ from gpca.active_learning.stream import run_stream
 from gpca.arguments import SEED
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
-from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
@@ -53,7 +52,7 @@ def run(options: Namespace) -> None:
     inputs = [options.registrations, options.embeddings, options.embeddings_without]
     axes = (options.source, options.seed)
     with record_provenance(options.out, inputs, options.settings, seed=options.seed):
-        settings = settings_from(options.settings)
+        settings = ActiveLearningSettings.from_dict(options.settings)
         stream = StreamSettings(**options.settings.get("stream", {}))
         curves: dict[str, dict] = {strategy: {} for strategy in options.strategies}
         for setting, task, gpc in progress(_tasks(options, settings), f"active learning on {options.source}"):
@@ -70,12 +69,6 @@ def run(options: Namespace) -> None:
                 curves[strategy][setting, task.held_out] = curve
         for strategy, path in zip(options.strategies, options.out, strict=True):
             write_curves(path, curves[strategy], STREAM_COLUMNS if strategy in STREAMS else POOL_COLUMNS)
-
-
-def settings_from(given: dict) -> ActiveLearningSettings:
-    """Build from the config's section ``active_learning``, of which other parts read the rest."""
-    own = {field.name: given[field.name] for field in fields(ActiveLearningSettings) if field.name in given}
-    return ActiveLearningSettings(**own | ({"gpc": GPCSettings(**own["gpc"])} if "gpc" in own else {}))
 
 
 def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, Task[Projection], GPC]]:

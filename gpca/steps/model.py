@@ -1,20 +1,25 @@
-"""Step ``model``: encoder and embeddings of one source and seed -> ``model.pt``, for ``python -m gpca explain``."""
+"""Step ``model``: what all sources say of causes, and GP-CA of one -> ``model.pt``, for ``python -m gpca explain``."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-import numpy as np
 import torch
 
 from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
+from gpca.causes.dataset import Causes
+from gpca.causes.settings import CauseSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.descriptors.dataset import Descriptors
+from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import load_model
+from gpca.errors import InputError
 from gpca.model.file import Model
+from gpca.model.learning import Lessons, joined, learn
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
@@ -26,8 +31,10 @@ SECTIONS = {
     "gpc": ("explainers", "gpca"),
     "registrations": ("registrations",),
     "recovery": ("recovery",),
+    "causes": ("causes",),
+    "descriptors": ("diagnosis", "descriptors"),
+    "model": ("model",),
 }
-CALIBRATION = 5  # one training sample of so many is kept from a first classifier, which the threshold is chosen with
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -39,44 +46,59 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--encoder", required=True, type=Path, help="weights")
     parser.add_argument("--embeddings", required=True, type=Path, help="of that encoder")
+    parser.add_argument(
+        "--causes", required=True, type=Path, nargs="+", help="of every source, what is observed moving"
+    )
+    parser.add_argument("--descriptors", required=True, type=Path, nargs="+", help="of these, in the same order")
     parser.add_argument("--out", required=True, type=Path)
 
 
 def run(options: Namespace) -> None:
-    """Fit the classifier to the training samples and write it with the encoder and the policy."""
+    """Fit both classifiers and write them with the encoder and the policy."""
     torch.set_num_threads(options.threads)
     given = {name: options.settings.get(name) or {} for name in SECTIONS}
     for name, section in SECTIONS.items():
         check_settings(given[name], *section)
-    inputs = [options.registrations, options.encoder, options.embeddings]
+    if len(options.causes) != len(options.descriptors):
+        found = f"{len(options.descriptors)} file(s) for {len(options.causes)} of causes"
+        raise InputError("--descriptors", found, "give one for each, in the same order")
+    inputs = [options.registrations, options.encoder, options.embeddings, *options.causes, *options.descriptors]
     with record_provenance([options.out], inputs, options.settings, seed=options.seed):
-        registrations = Registrations.load(options.registrations)
-        h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
-        train = registrations.rows("train")
-
-        def fit_gpc(rows: np.ndarray) -> GPC:
-            gpc = GPC(CONCEPTS, GPCSettings(**given["gpc"]), options.source, options.seed)
-            return gpc.fit(h_S_d[rows], registrations.concept[rows])
-
+        icp, own = given["registrations"].get("icp", {}), given["model"]
+        diagnoser, bald_N = learn(
+            joined([_lessons(*files) for files in zip(options.causes, options.descriptors, strict=True)]),
+            GPCSettings(**own.get("classifier", {})),
+            CauseSettings.from_dict(given["causes"] | own.get("causes", {}), icp),
+            DescriptorSettings(**given["descriptors"]),
+            own.get("false_alarms", 0.05),
+            *("model", options.seed),
+        )
         settings = EncoderSettings(**given["encoder"])
+        recovery = given["recovery"]
         Model(
+            diagnoser=diagnoser,
             encoder=load_model(options.encoder, settings).encoder,
             encoder_settings=settings,
-            gpc=fit_gpc(train),
-            icp=ICPSettings(**given["registrations"].get("icp", {})),
+            gpc=_gpc(options, GPCSettings(**given["gpc"])),
+            icp=ICPSettings(**icp),
             cloud_points=given["registrations"].get("cloud_points", 2048),
-            policy=_policy(given["recovery"], train, fit_gpc, h_S_d),
+            policy=RecoveryPolicy.of_settings(
+                recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"], bald_N
+            )
+            if recovery
+            else RecoveryPolicy(),
             title=options.title,
             stand_in=options.stand_in,
         ).save(options.out)
 
 
-def _policy(recovery: dict, train: np.ndarray, fit_gpc, h_S_d: np.ndarray) -> RecoveryPolicy:
-    """Return the config's policy; its threshold is chosen on training samples that a classifier did not learn."""
-    if not recovery:
-        return RecoveryPolicy()
-    kept = np.arange(len(train)) % CALIBRATION == CALIBRATION - 1
-    _, _, bald_N = fit_gpc(train[~kept]).attribute(h_S_d[train[kept]])
-    return RecoveryPolicy.of_settings(
-        recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"], bald_N
-    )
+def _lessons(causes_file: Path, descriptors_file: Path) -> Lessons:
+    causes = Causes.load(causes_file)
+    return Lessons.of(causes, Descriptors.load(descriptors_file, causes.registrations))
+
+
+def _gpc(options: Namespace, settings: GPCSettings) -> GPC:
+    registrations = Registrations.load(options.registrations)
+    h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
+    train = registrations.rows("train")
+    return GPC(CONCEPTS, settings, options.source, options.seed).fit(h_S_d[train], registrations.concept[train])

@@ -9,6 +9,7 @@ from pathlib import Path
 import torch
 
 from gpca.active_learning.rounds import make_task
+from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.arguments import SEED
 from gpca.csv_file import write_csv
 from gpca.model.file import Model
@@ -16,7 +17,6 @@ from gpca.model.runtime import measure
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.steps.active_learning import settings_from
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -41,7 +41,7 @@ def run(options: Namespace) -> None:
         model = Model.load(options.model)
         registrations = Registrations.load(options.registrations)
         h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
-        settings = settings_from(learning)
+        settings = ActiveLearningSettings.from_dict(learning)
         task = make_task(replace(registrations, attached={"embedding": h_S_d}), "overlap", settings, *axes)
         repeats = runtime.get("repeats", 100)
         write_csv(options.out, measure(model, registrations, task, settings, repeats, options.threads, *axes))

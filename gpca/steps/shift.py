@@ -16,7 +16,8 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.shift.samples import make_sets, settings_from
+from gpca.shift.samples import make_sets
+from gpca.shift.settings import ShiftSettings
 from gpca.steps import per_seed
 
 SECTIONS = {"shift": ("shift",), "registrations": ("registrations",), "encoder": ("encoders", "*")}
@@ -42,7 +43,7 @@ def run(options: Namespace) -> None:
         raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"known are {', '.join(SECTIONS)}")
     for name, section in SECTIONS.items():
         check_settings(given[name], *section)
-    settings = settings_from(**given)
+    settings = ShiftSettings.from_dicts(**given)
     encoder_settings = EncoderSettings(**given["encoder"])
     options.other_registrations = options.other_registrations or [None] * len(options.seeds)
     objects = ObjectClouds.load(options.objects)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import clipped_cost
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp, log
 from gpca.uncertainty.settings import UncertaintySettings
@@ -39,7 +40,7 @@ class Runs:
 
     def cost_n(self, distance: float) -> np.ndarray:
         """Return the source's mean squared distance to the target, cut off at the correspondence distance."""
-        return self.fitness_n * self.inlier_rmse_n**2 + (1 - self.fitness_n) * distance**2
+        return clipped_cost(self.fitness_n, self.inlier_rmse_n, distance)
 
     def chosen(self, rows_n: np.ndarray) -> Runs:
         """Return these runs' results at the given rows, which may repeat."""

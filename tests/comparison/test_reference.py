@@ -1,6 +1,5 @@
 """A run against its reference: what agrees, what differs, what is missing, and which reference is of no use."""
 
-import csv
 import json
 import shutil
 
@@ -10,50 +9,10 @@ import yaml
 from gpca.__main__ import main
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.code_files import ROOT
-from gpca.comparison import reference
-from gpca.comparison.means import KINDS, kind_of, read_means
 from gpca.comparison.reference import Allowance, check_reference
-from gpca.errors import InputError
 from gpca.processor import describe
 
-SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["reference"]
-HEADS = ("source", "explainer", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
-
-
-def write(path, heads, rows):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([heads, *rows])
-
-
-def tidy_rows(metric, *values, method="gpca"):
-    return [("attribution", "ycb", method, metric, "all", seed, value) for seed, value in enumerate(values)]
-
-
-@pytest.fixture
-def folders(tmp_path):
-    """A run `tiny` and its reference, which are the same: metrics, one table, and times."""
-    there = tmp_path / "results/reference/tiny"
-    rows = (
-        tidy_rows("accuracy", 0.90, 0.90)
-        + tidy_rows("test_samples", 100, 100)
-        + tidy_rows("predicted_as_noise", 50, 50)
-        + tidy_rows("accuracy", 0.8, 0.9, method="b")
-    )
-    write(there / "metrics.csv", TIDY, rows)
-    write(there / "timings.csv", TIDY, tidy_rows("seconds_per_sample", 1.0))
-    write(
-        there / "tables/table1.csv",
-        HEADS,
-        [("ycb", "gpca", 90.0, 88.0, 92.0, 5, 100, False), ("ycb", "b", 50.0, "", "", 1, 100, False)],
-    )
-    write(there / "comparison.csv", ("table", "row"), [("I", "YCB")])
-    for file in ("metrics.csv", "tables/table1.csv"):
-        record = {"config_sha256": {"seeds": "c0ffee"}, "device": describe() | {"name": "A processor"}}
-        (there / f"{file}.provenance.json").write_text(json.dumps(record))
-    here = tmp_path / "results/tiny"
-    shutil.copytree(there, here)
-    return here, there
+from .conftest import HEADS, SETTINGS, write
 
 
 def change(path, old, new):
@@ -247,17 +206,21 @@ def test_a_section_that_is_newer_than_the_reference_is_no_other_config(folders):
         ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; make it anew"),
         ("metrics.csv", "attribution\n", "holds no rows; make it anew"),
         ("metrics.csv", "", "is empty; make it anew"),
-        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n", "holds 'nan' in place of a number"),
+        (
+            "metrics.csv",
+            ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n",
+            "'value' is 'nan' and not a finite number; make it anew",
+        ),
         (
             "metrics.csv",
             ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,0.9,0.8\n",
             "has rows with more entries than columns",
         ),
-        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "holds '' in place of a number"),
+        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "'value' is '' and not a finite number"),
         (
             "tables/table1.csv",
             ",".join(HEADS) + "\nycb,gpca,many,1,2,5,100,False\n",
-            "holds 'many' in place of a number",
+            "'mean' is 'many' and not a finite number",
         ),
         ("metrics.csv.provenance.json", "{", "is no provenance record; make its result anew"),
         ("metrics.csv.provenance.json", "[]", "is no provenance record; make its result anew"),
@@ -315,42 +278,3 @@ def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_pa
     line = one_line(capsys)
     assert f"{tmp_path}/own.yaml: " in line
     assert message in line
-
-
-@pytest.mark.parametrize(
-    ("file", "quantity", "kind"),
-    [
-        ("metrics.csv", "accuracy", "share"),
-        ("metrics.csv", "predicted_as_pose", "count"),
-        ("active_learning.csv", "labels_to_target", "count"),
-        ("diagnostics.csv", "rho_max_score_knn_analytical_low", "correlation"),
-        ("diagnostics.csv", "nll", "nats"),
-        ("kernels.csv", "elbo", "nats"),
-        ("recovery.csv", "recovered_within_3", "share"),
-        ("recovery.csv", "first_queue", "count"),
-        ("tables/table8_recovery.csv", "actions", "count"),
-        ("registration_methods.csv", "add", "share"),
-        ("registration_methods.csv", "rotation_deg", "degrees"),
-        ("tables/table11_registration.csv", "rotation_deg", "degrees"),
-        ("tables/table11_severity.csv", "pose_low", "percent"),
-        ("tables/table4_grid.csv", "ece", "percent"),
-        ("tables/table5_learners.csv", "ece", "share"),
-        ("tables/table5_shift.csv", "ece_severity", "share"),
-        ("tables/table5_learners.csv", "rho", "correlation"),
-        ("tables/table1_single_baselines.csv", "gpca_paper", "percent"),
-    ],
-)
-def test_every_quantity_is_of_a_kind(file, quantity, kind):
-    assert kind_of(file, quantity) == kind
-    assert {of for *_, of in KINDS} == set(SETTINGS["tolerances"])
-
-
-@pytest.mark.parametrize("run", ["real", "embedded"])
-def test_the_kept_references_can_be_read(run):
-    folder = ROOT / "results/reference" / run
-    files = [path for path in folder.rglob("*.csv") if str(path.relative_to(folder)) not in reference.NOT_COMPARED]
-    assert len(files) >= 8
-    for path in files:
-        assert len(read_means(path)) > 5
-    with pytest.raises(InputError, match="neither tidy"):
-        read_means(ROOT / "gpca/comparison/reasons.csv")

@@ -32,8 +32,8 @@ def postscript(path):
     path.write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 160 120\n%%EndComments\nshowpage\n%%EOF\n")
 
 
-def bomb(side):
-    return lambda path: Image.new("L" if side > 2**14 else "I;16", (side, side)).save(path)
+def bomb(side, mode="I;16"):
+    return lambda path: Image.new(mode, (side, side)).save(path, compress_level=1)
 
 
 def flipped(path):
@@ -60,11 +60,11 @@ IMAGES = {
     "depth a flipped byte": (DEPTH, flipped, "is truncated or no readable image"),
     "depth a script": (DEPTH, postscript, "is truncated or no readable image"),
     "depth a GIF": (DEPTH, lambda p: Image.fromarray(COLOURS).save(p, "GIF"), "is truncated or no readable image"),
-    "depth a bomb": (DEPTH, bomb(9000), "too many for a frame"),
+    "depth a bomb": (DEPTH, bomb(8500), "too many for a frame"),
     "depth turned": (DEPTH, lambda p: save(p, FLAT.T), "is 160×120 but depth is 120×160"),
     "mask small": (MASK, lambda p: save(p, np.full((60, 80), 255, np.uint8)), "is 80×60 but depth is 160×120"),
-    "depth a larger bomb": (DEPTH, bomb(11_000), "too many for a frame"),
-    "mask a bomb": (MASK, bomb(20_000), "too many for a frame"),
+    "depth a larger bomb": (DEPTH, bomb(9500), "too many for a frame"),
+    "mask a bomb": (MASK, bomb(13_500, "L"), "too many for a frame"),
     "mask cut": (MASK, halves, "is truncated or no readable image"),
     "mask of text": (MASK, lambda p: p.write_text("255"), "is truncated or no readable image"),
     "mask a picture": (MASK, lambda p: save(p, COLOURS), "is no mask: most of its pixels differ"),

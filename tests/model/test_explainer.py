@@ -15,7 +15,7 @@ from gpca.alignment.twist import exp
 from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.model.explanation import WORDS
-from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds
+from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.uncertainty.settings import UncertaintySettings
 
 
@@ -178,15 +178,42 @@ def test_an_explanation_is_json_and_text(explainer, pair):
     assert np.array(plain["T_target_source"]).shape == (4, 4)
     assert plain["spread"]["starts"] == 13
     text = explanation.text()
-    for word in (explanation.concept, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
+    for word in (explanation.diagnosis.state, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
         assert word in text
-    stages = ["preparation", "icp", "embedding", "attribution", "uncertainty"]
+    assert plain["diagnosis"]["state"] == explanation.diagnosis.state
+    stages = ["preparation", "icp", "diagnosis", "embedding", "attribution", "uncertainty"]
     assert list(plain["seconds"]) == [*stages, "total"]
     assert plain["seconds"]["total"] >= sum(plain["seconds"][stage] for stage in stages)
 
 
-def test_the_action_is_that_of_the_models_policy(explainer, model, pair):
-    said = explainer.explain(*pair)
+def with_threshold(model, threshold, policy=None):
+    return Explainer(replace(model, diagnoser=replace(model.diagnoser, threshold=threshold)), policy, device="cpu")
+
+
+def test_nothing_is_done_about_what_is_fine(model, pair):
+    said = with_threshold(model, 2.0).explain(*pair)
+    assert (said.diagnosis.state, said.diagnosis.named) == ("nominal", ())
+    assert (said.action, said.reason) == (NOTHING, "nothing is wrong")
+    assert "state     nominal: nothing is wrong" in said.text()
+    assert "action    none (nothing is wrong)" in said.text()
+
+
+def test_what_failed_is_treated_by_its_causes(model, pair):
+    said = with_threshold(model, 0.0).explain(*pair)
+    found = said.diagnosis
+    assert found.state == "failed"
+    decision = model.policy.decide(np.array(list(found.causes.values())), found.bald)
+    assert (said.action, said.reason) == (decision.action, decision.reason)
+    assert f"state     failed: {' and '.join(found.named)}" in said.text()
+    in_mm = with_threshold(model, 0.0).explain(*(1e3 * cloud for cloud in pair), unit="mm")
+    assert in_mm.diagnosis.expected_error == pytest.approx(1e3 * found.expected_error, rel=0.1)
+
+
+def test_gpca_alone_decides_where_nothing_is_diagnosed(explainer, model, pair):
+    said = explainer.explain(*pair, diagnose=False)
+    assert said.diagnosis is None
+    assert "state" not in said.text()
+    assert said.as_dict()["diagnosis"] is None
     decision = model.policy.decide(scores(said), said.bald)
     assert (said.action, said.reason) == (decision.action, decision.reason)
     assert said.action == model.policy.treatments[said.concept]
@@ -195,7 +222,7 @@ def test_the_action_is_that_of_the_models_policy(explainer, model, pair):
 
 @pytest.mark.parametrize("thresholds", [Thresholds(uncertain=0.0), Thresholds(dominant=0.999)])
 def test_a_policy_of_ones_own_queues_what_it_finds_uncertain(model, pair, thresholds):
-    said = Explainer(model, RecoveryPolicy(thresholds), device="cpu").explain(*pair)
+    said = with_threshold(model, 0.0, RecoveryPolicy(thresholds)).explain(*pair)
     assert said.action == QUEUE
     assert WORDS[QUEUE] in said.text()
 

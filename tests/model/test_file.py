@@ -61,7 +61,7 @@ def changed(**changes):
         (lambda path: os.truncate(path, 1000), "is damaged or no model"),
         (lambda path: path.write_bytes(pickle.dumps(print, protocol=2)), "is damaged or no model"),
         (lambda path: torch.save({"weights": torch.zeros(3)}, path), "is no model"),
-        (changed(version=7), "is a model of version 7, not of version 2; make one with"),
+        (changed(version=7), "is a model of version 7, not of version 3; make one with"),
         (changed(gpc=None), "something missing or damaged .*'gpc'"),
         (changed(encoder={}), "something missing or damaged"),
     ],

@@ -109,6 +109,20 @@ CONTENTS = {
     "draws of 1e9": put("gpc/settings/draws", HUGE),
     "no draws": put("gpc/settings/draws", 0),
     "draws of NaN": put("gpc/settings/draws", NAN),
+    "a threshold of failure of NaN": put("diagnoser/threshold", NAN),
+    "a threshold of text": put("diagnoser/threshold", "0.5"),
+    "errors of other descriptors": put("diagnoser/error_weights", lambda w: w[:-1]),
+    "quantiles of other descriptors": put("diagnoser/classifier/quantiles", lambda q: q[:, :-1]),
+    "quantiles that fall": put("diagnoser/classifier/quantiles", lambda q: q.flip(0)),
+    "1e9 starts": put("diagnoser/runs/starts", HUGE),
+    "starts of text": put("diagnoser/runs/starts", "many"),
+    "1e9 restarts": put("diagnoser/descriptors/restarts", HUGE),
+    "an angle of NaN": put("diagnoser/descriptors/restart_rotation_deg", NAN),
+    "1e9 points of a description": put("diagnoser/points", HUGE),
+    "a cause without a classifier": put("diagnoser/classifier/causes", lambda causes: causes[:2]),
+    "three states": put("diagnoser/classifier/failure/classes", ["nominal", "failed", "odd"]),
+    "a diagnoser of nothing": put("diagnoser", {}),
+    "a diagnoser of text": put("diagnoser", "magic"),
     "draws of the encoder of 1e9": put("encoder_settings/draws", HUGE),
     "1e9 points drawn": put("encoder_settings/points", HUGE),
     "negative points drawn": put("encoder_settings/points", -512),
@@ -140,7 +154,7 @@ CONTENTS = {
     "no settings": drop("encoder_settings"),
     "no thresholds": drop("thresholds"),
     "no title": drop("title"),
-    "another version": put("version", 3),
+    "another version": put("version", 4),
     "another format": put("format", "a model"),
 }  # fmt: skip
 
@@ -175,7 +189,7 @@ def members(path, change):
     """Write the zip anew, each member as `change` gives it: name, content and compression."""
     with zipfile.ZipFile(path) as archive:
         found = [(info.filename, archive.read(info)) for info in archive.infolist()]
-    with zipfile.ZipFile(path, "w") as archive:
+    with zipfile.ZipFile(path, "w", compresslevel=1) as archive:
         for name, content in found:
             for new_name, new_content, compression in change(name, content):
                 archive.writestr(new_name, new_content, compression)

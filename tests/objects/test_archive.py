@@ -104,7 +104,7 @@ def test_a_list_that_is_damaged_is_refused(tmp_path, text):
     archive = pack(tmp_path / "a.zip")
     folder = unpack(archive, tmp_path / "target")
     (tmp_path / "target.sha256.json").write_text(text)
-    with pytest.raises(InputError, match=r"target\.sha256\.json: is no list of files; remove"):
+    with pytest.raises(InputError, match=r"target\.sha256\.json: is not a list of files .*; remove"):
         unpack(archive, folder)
 
 

@@ -4,7 +4,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.objects.pcd import parse
 
-# The layout of the UW data set.
+# The layout of the UW dataset.
 HEADER = """# .PCD v.7 - Point Cloud Data file format
 FIELDS x y z rgb imX imY
 SIZE 4 4 4 4 4 4

@@ -11,6 +11,9 @@ def test_only_a_stand_in_is_called_one():
 
 def test_a_caption_tells_stand_ins_from_a_mixture():
     assert stand_in_clause([REAL, REAL]) == stand_in_clause([]) == ""
-    assert stand_in_clause([STAND_IN, STAND_IN]) == ", on procedural stand-ins of the datasets' objects"
-    assert stand_in_clause([STAND_IN, REAL]) == ", partly on procedural stand-ins of the datasets' objects"
-    assert stand_in_clause([STAND_IN, REAL], partly=False) == ", on procedural stand-ins of the datasets' objects"
+    assert stand_in_clause([STAND_IN, STAND_IN]) == ", measured on procedural stand-ins for the datasets' objects"
+    assert stand_in_clause([STAND_IN, REAL]) == ", measured partly on procedural stand-ins for the datasets' objects"
+    assert (
+        stand_in_clause([STAND_IN, REAL], partly=False)
+        == ", measured on procedural stand-ins for the datasets' objects"
+    )

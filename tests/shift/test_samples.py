@@ -5,8 +5,9 @@ import pytest
 
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.shift.samples import held_out_objects, make_sets, settings_from
+from gpca.shift.samples import held_out_objects, make_sets
 from gpca.shift.sets import TRAINED_ON
+from gpca.shift.settings import ShiftSettings
 
 ENCODER = {"draw_points": 32, "draws": 1, "epochs": 1, "batch_size": 16, "options": {"k": 4, "point_features": 8}}
 SHIFT = {
@@ -18,7 +19,7 @@ SHIFT = {
     "neighbours": 3,
     "shape_points": 16,
 }
-SETTINGS = settings_from(SHIFT, {"cloud_points": 256, "train": 36, "test": 18}, ENCODER)
+SETTINGS = ShiftSettings.from_dicts(SHIFT, {"cloud_points": 256, "train": 36, "test": 18}, ENCODER)
 
 
 @pytest.fixture(scope="module")

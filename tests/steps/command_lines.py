@@ -24,6 +24,11 @@ SHIFT = {
     "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
     "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "shape_points": 16,
 }  # fmt: skip
+CAUSES = {  # of two symmetric objects with few points: only pose errors make them fail
+    "train": 12, "test": 6, "points": [64, 128], "limits": {"nominal": 0.05, "failed": 0.06},
+    "shares": {"nominal": 0.5, "borderline": 0.1, "noise": 0, "pose": 0.4, "overlap": 0}, "several": [0, 0],
+    "severities": {"noise": [0.01, 0.05]}, "clean_pairs": 20, "candidates": 50,
+}  # fmt: skip
 COMMON = {"--source": "tiny"}
 STEP_OPTIONS = {
     "objects": COMMON | {
@@ -33,6 +38,25 @@ STEP_OPTIONS = {
     "registrations": COMMON | {
         "--settings": {"train": 18, "test": 6, "cloud_points": 128}, "--seed": 0, "--objects": "objects.npz",
         "--out": "registrations.npz", "--timings": "icp.csv",
+    },
+    "causes": COMMON | {
+        "--settings": CAUSES | {"icp": {"max_iterations": 30}}, "--seed": 100, "--objects": "objects.npz",
+        "--out": "causes.npz", "--candidates": "candidates.csv", "--timings": "causes_timings.csv",
+    },
+    "describe": COMMON | {
+        "--settings": {"starts": 1, "restarts": 2, "icp_points": 64, "icp": {"max_iterations": 30}}, "--seed": 100,
+        "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--out": "descriptors.npz",
+        "--timings": "descriptors.csv",
+    },
+    "train_on_causes": COMMON | {
+        "--settings": ENCODER, "--seed": 100, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
+        "--weights": "cause_weights.pt", "--curve": "cause_curve.csv", "--out": "cause_embeddings.npz",
+        "--timings": "cause_embeddings.csv",
+    },
+    "diagnose": COMMON | {
+        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 100,
+        "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
+        "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
     },
     "register_methods": COMMON | {
         "--settings": {"method_pairs": {"samples": 3, "points": 64}, "methods": {"point_to_point": {}, "fgr": {}}},
@@ -93,9 +117,12 @@ STEP_OPTIONS = {
     },
     "model": COMMON | {
         "--settings": {"encoder": ENCODER, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
-                       "registrations": {"cloud_points": 128}, "recovery": POLICY},
+                       "registrations": {"cloud_points": 128}, "recovery": POLICY, "causes": CAUSES,
+                       "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
+                       "model": {"classifier": {"iterations": 5, "inducing": 6, "draws": 20}}},
         "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
-        "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--out": "model.pt",
+        "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--causes": "causes.npz",
+        "--descriptors": "descriptors.npz", "--out": "model.pt",
     },
     "runtime": COMMON | {
         "--settings": {"runtime": {"repeats": 2}, "active_learning": LEARNING}, "--seed": 0, "--model": "model.pt",

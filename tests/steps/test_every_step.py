@@ -33,6 +33,10 @@ def test_every_step_runs_by_hand(made):
 def test_a_step_made_anew_gives_the_same_bytes(folder, made):
     for step in (
         "registrations",
+        "causes",
+        "describe",
+        "train_on_causes",
+        "diagnose",
         "register_methods",
         "train",
         "embed",
@@ -48,6 +52,12 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
         assert main(arguments(step)) == 0
     for name in (
         "registrations.npz",
+        "causes.npz",
+        "candidates.csv",
+        "descriptors.npz",
+        "cause_weights.pt",
+        "cause_embeddings.npz",
+        "diagnosis.csv",
         "point_trials.csv",
         "fgr_trials.csv",
         "weights.pt",

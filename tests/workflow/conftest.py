@@ -181,6 +181,19 @@ def finished(smoke, tmp_path):
     return smoke.copy(tmp_path / "finished")
 
 
+# What leads to predictions; of explainers and designs one of each kind, with the designs that these read.
+STAGES = {"objects", "registrations", "encoders", "embeddings", "causes", "descriptors", "cause_embeddings"}
+INTERRUPTED = {"gpca", "analytical_gpc", "residuals_forest", "shap_removal", "softmax_head", "causal", "removal"}
+INTERRUPTED |= {"icp", "dgcnn", "causes", "descriptors", "cause_embeddings"}  # as timings name them
+OF_ONE_EACH = {"predictions", "diagnoses", "uncertainty", "timings"}
+
+
+def is_interrupted(path):
+    """Whether the run that is killed and continued makes the file: those of one source."""
+    names = {part.removeprefix("uncertainty_").removeprefix("diagnoses_") for part in Path(path).parts}
+    return "ycb" in path and bool(names & INTERRUPTED if names & OF_ONE_EACH else names & STAGES)
+
+
 @dataclass(frozen=True)
 class Continued:
     """One source of the smoke run once more, one job at a time, killed in the first training and then continued.
@@ -205,7 +218,8 @@ def killed_and_continued(smoke_and_again):
 
 def _killed_and_continued(smoke, folder):
     project = _sources_copied(smoke.folder, folder)
-    targets = [f"results/smoke/{name}" for name in smoke.results(".npz", ".pt", ".csv", ".png") if "ycb" in name]
+    names = smoke.results(".npz", ".pt", ".csv", ".png")
+    targets = [f"results/smoke/{name}" for name in names if is_interrupted(name)]
     run = ("-j1", *targets, "--configfile", "config/smoke.yaml")
     process = project.start(*run)
     while process.poll() is None and not list(project.folder.glob("results/smoke/encoders/*/*/*.checkpoint")):

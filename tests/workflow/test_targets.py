@@ -33,9 +33,13 @@ RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
 # GP-CA on the two reductions of Table VI, and what shows it.
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
-# Explainers times two sources: four with a GPC (classic features on the frames too), four on embeddings, 13 on
+# What four explainers say of the causes: from the samples on, and what is made of it.
+CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
+MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
+CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
+# Explainers times two sources: three with a GPC (classic features on the frames too), four on embeddings, 11 on
 # uncertainties.
-WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 4 + 2, 2 * 4, 2 * 13))
+WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 1, 2 * 4, 2 * 11))
 
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
@@ -75,7 +79,7 @@ def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
 def test_table6_needs_the_frames_alone(planned):
     assert planned.before("results/smoke/tables/table6_backbones.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 2, "train_encoder": 2, "embed": 2,
-        "reduce_embeddings": 1, "attribute": 4, "real_world": 1, "table6_backbones": 1,
+        "reduce_embeddings": 1, "attribute": 3, "real_world": 1, "table6_backbones": 1,
     }  # fmt: skip
 
 
@@ -88,6 +92,7 @@ def test_table11_needs_the_registrations_alone(planned):
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
+        "sample_objects": 2, "sample_model_causes": 2, "describe_model_causes": 2,
         "time_stages": 1, "table7_runtime": 1,
     }  # fmt: skip
     assert planned.before("results/smoke/tables/table8_recovery.md") == {
@@ -97,40 +102,47 @@ def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
 
 EDITS = {
     "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
-    + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD,
+    + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD
+    + jobs(diagnose=4) + CAUSES_SHOWN,
     "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
     "gpca/active_learning/acquisition.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + RUNTIME,
-    "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + RUNTIME,
+    "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED,
     "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
-        jobs("table1_single_baselines", run_icp=12) + ON_UNCERTAINTY + COLLECTORS + RUNTIME + RECOVERY
-        + jobs(register_methods=2) + METHODS,
+        jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
+        + MODEL_CAUSES + jobs(register_methods=2) + METHODS,
     "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
     "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
-    "baselines/softmax_head.py": jobs(attribute=2) + COLLECTORS + RECOVERY,
+    "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
     "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
     # Not the pictures: they show an encoder without reduction.
     "gpca/encoders/reduction.py": jobs("reduce_embeddings", "attribute") + FRAMES,
-    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_encoder=2, embed=2, attribute=2)
+    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_encoder=2, embed=2, attribute=1)
     + BACKBONES + MODEL,
     "gpca/frames/bop.py":
-        jobs("reduce_embeddings", "instances", register_frames=2, train_encoder=2, embed=2, attribute=2)
+        jobs("reduce_embeddings", "instances", register_frames=2, train_encoder=2, embed=2, attribute=1)
         + BACKBONES + MODEL + RECOVERY,
     "gpca/recovery/policy.py": MODEL + RECOVERY,
     "gpca/reporting/tables/explainers.py": TABLES1,
-    "gpca/reporting/figures/confusions.py": jobs("fig_attribution_confusions", "confusion_real_world"),
+    "gpca/reporting/figures/confusions.py":
+        jobs("fig_attribution_confusions", "confusion_real_world", "cause_confusions"),
     "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
-    + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD,
+    + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
+    + jobs(train_on_causes=4, diagnose=2) + CAUSES_SHOWN,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
-    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=6)
-    + jobs(attribute=19, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
+    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=5)
+    + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
+    + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
+    + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL
     + jobs("register_methods") + METHODS,
+    "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=8, describe_model_causes=2) + CAUSES_SHOWN + MODEL,
+    "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
 }  # fmt: skip
 
 
@@ -186,7 +198,7 @@ def test_a_changed_setting_reruns_what_depends_on_it(finished):
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"source": "ycb"}}))
-    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == jobs("fig3_concepts", "page") + METHOD
+    assert finished.dry_run(*SMOKE, "mine.yaml").jobs == jobs("fig3_concepts", "causes_example", "page") + METHOD
 
 
 def test_every_table_figure_and_stage_is_a_target_by_name(project):

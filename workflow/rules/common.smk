@@ -2,7 +2,7 @@
 import json
 from pathlib import Path
 
-from baselines.registry import explainer_module
+from baselines.registry import CAUSES, explainer_entry, explainer_module
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.objects.procedural import FAMILIES
@@ -29,6 +29,7 @@ wildcard_constraints:
     backbone="|".join(config["encoders"]),
     reduction="|".join(REDUCTIONS),
     explainer="|".join([*config["explainers"], *NAMES["backbone"]]),
+    cause_explainer="|".join(config["diagnosis"]["explainers"]),
     design="|".join(config["uncertainty"]),
 
 
@@ -49,7 +50,11 @@ def as_json(section):
 
 
 def encoder_module(encoder):
-    return ENCODERS[config["encoders"][encoder]["backbone"]].split(":")[0]
+    return backbone_module(config["encoders"][encoder])
+
+
+def backbone_module(settings):
+    return ENCODERS[settings["backbone"]].split(":")[0]
 
 
 def encoder_code(step):
@@ -64,3 +69,9 @@ def shapes_code(families):
 
 def collector_code(function):
     return code_files(function.split(":")[0], "gpca.reporting.script")
+
+
+def read_by(cause_explainer):
+    """Return the folder of what an explainer of causes reads."""
+    entry = explainer_entry(cause_explainer, CAUSES)
+    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"

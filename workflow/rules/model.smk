@@ -10,6 +10,11 @@ MODEL_SETTINGS = {
     "registrations": {
         name: config["registrations"][name] for name in ("cloud_points", "icp")
     },
+    "causes": config["causes"],
+    "descriptors": DIAGNOSIS["descriptors"],
+    "model": {
+        name: config["model"][name] for name in ("causes", "classifier", "false_alarms")
+    },
     "recovery": {
         "thresholds": config["recovery"]["thresholds"],
         "treatments": config["recovery"]["treatments"],
@@ -18,10 +23,47 @@ MODEL_SETTINGS = {
 }
 
 
+use rule sample_causes as sample_model_causes with:
+    output:
+        causes="<results>/model_causes/{source}/seed{seed}.npz",
+        candidates="<results>/model_causes/{source}/seed{seed}.csv",
+        timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
+    log:
+        "<logs>/model_causes/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/model_causes/{source}/seed{seed}.tsv"
+    params:
+        settings=as_json(config["causes"] | config["model"]["causes"] | ICP),
+
+
+use rule describe as describe_model_causes with:
+    input:
+        causes="<results>/model_causes/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
+        code=code_files("gpca.steps.describe"),
+    output:
+        descriptors="<results>/model_descriptors/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/model_descriptors/seed{seed}.csv",
+    log:
+        "<logs>/model_descriptors/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/model_descriptors/{source}/seed{seed}.tsv"
+
+
 rule model:
     input:
         **MODEL_INPUTS,
         encoder=f"<results>/encoders/{MODEL_SOURCE}/{MODEL_ENCODER}/seed{SEEDS[0]}.pt",
+        causes=collect(
+            "<results>/model_causes/{source}/seed{seed}.npz",
+            source=SOURCES,
+            seed=SEEDS[0],
+        ),
+        descriptors=collect(
+            "<results>/model_descriptors/{source}/seed{seed}.npz",
+            source=SOURCES,
+            seed=SEEDS[0],
+        ),
         code=code_files("gpca.steps.model", encoder_module(MODEL_ENCODER)),
     output:
         "<results>/model.pt",
@@ -44,7 +86,8 @@ rule model:
     shell:
         "python -m gpca model --threads {threads} --source {params.source} --seed {params.seed} "
         "--title {params.title:q} {params.stand_in} --registrations {input.registrations} --encoder {input.encoder} "
-        "--embeddings {input.embeddings} --settings {params.settings:q} --out {output} 2> {log}"
+        "--embeddings {input.embeddings} --causes {input.causes} --descriptors {input.descriptors} "
+        "--settings {params.settings:q} --out {output} 2> {log}"
 
 
 rule time_stages:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from baselines.registry import explainer_entry, require_settings
+from baselines.registry import CAUSES, explainer_entry, require_settings
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
 from gpca.config.checks.named import require_names, with_key
 from gpca.encoders.registry import require_backbone
@@ -18,15 +19,29 @@ LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the pa
 
 
 def check_registrations(config: dict) -> None:
-    """Check that no range of severities runs downwards, and that the samples of one file can be held in memory."""
+    """Check that settings agree with each other, and that the samples of one file can be held in memory."""
     with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
-    for section in ("registrations", "real_world"):
+    for key, causes in {"causes": {}, "model.causes": config["model"]["causes"]}.items():
+        with_key(key, CauseSettings.from_dict, config["causes"] | causes, config["registrations"]["icp"])
+    cloud_points = "registrations.cloud_points", config["registrations"]["cloud_points"]
+    for section, (key, points) in {
+        "registrations": cloud_points,
+        "real_world": cloud_points,
+        "causes": ("causes.points", config["causes"]["points"][1]),
+    }.items():
         samples = config[section]["train"] + config[section]["test"]
-        size = samples * config["registrations"]["cloud_points"] * BYTES_PER_POINT
+        size = samples * points * BYTES_PER_POINT
         if size > LARGEST_BYTES:
             fault = f"{samples} samples have {size / 2**30:.0f} GiB of points, which one job has to hold"
-            raise InputError(f"config key {section}.train", fault, "take fewer, or lower registrations.cloud_points")
+            raise InputError(f"config key {section}.train", fault, f"take fewer, or lower {key}")
+
+
+def check_diagnosis(config: dict) -> None:
+    """Check the encoder and the explainers of causes."""
+    with_key("diagnosis.encoder.backbone", require_backbone, config["diagnosis"]["encoder"]["backbone"])
+    for name, settings in config["diagnosis"]["explainers"].items():
+        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
 
 
 def check_encoders(config: dict, left_out: Set[str]) -> None:

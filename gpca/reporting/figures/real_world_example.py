@@ -29,7 +29,7 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
-from gpca.reporting.words import in_words
+from gpca.reporting.words import object_of_frames
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,7 +113,7 @@ def draw_real_world_example(
         if panel is not panels[3]:
             panel.set_axis_off()
     lost = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
-    write_title(figure, f"{title}: {in_words(registrations.object_name[row])}, {lost}")
+    write_title(figure, f"{title}: {object_of_frames(registrations.object_name[row])}, {lost}")
     legend_of_clouds(figure, "model", "measured", gap=0.1)
     save_figure(figure, pdf_path, png_path)
 

@@ -13,7 +13,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.frame_views import draw_over_model, draw_scores, read_samples
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, save_figure, use_style, write_title
-from gpca.reporting.words import in_words
+from gpca.reporting.words import object_of_frames
 
 SHOWN = 10
 PANELS_PER_ROW = 5
@@ -63,7 +63,7 @@ def draw_real_world_failures(
         model = objects.points(index)[:2048] / objects.diameters_m[index]
         draw_over_model(panel(0.06, 0.42, cell_in - 0.12, 0.95), model, registrations.cloud(row))
         draw_scores(panel(0.42, 1.45, cell_in - 0.58, 0.38), mistake)
-        name = in_words(registrations.object_name[row])
+        name = object_of_frames(registrations.object_name[row])
         taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
         words = f"{name}\n{taken}\npose {100 * mistake['icp_error']:.0f} % $d$ off"
         x = (left_in + cell_in / 2) / TEXT_WIDTH_IN

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.alignment.pose_error import adds_error
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.causes.settings import Limits
 from gpca.csv_file import numbers
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations, load_embeddings
@@ -21,6 +23,8 @@ from gpca.reporting.figures.style import GREY, SMALL_PT, blues
 
 if TYPE_CHECKING:
     import pandas as pd
+
+FAILED = Limits().failed
 
 
 @dataclass(frozen=True)
@@ -53,20 +57,26 @@ class Stages:
         return cls(registrations, arrays["h"], predictions)
 
     def choose(self, concept: str, path: str | Path) -> int:
-        """Return the row that is shown, a test sample of the concept that is named right after a poor fit.
+        """Return the row that is shown, a test sample of the concept named right after a failed registration.
 
-        The method keeps the half that ICP fits worst of the samples named right (of all, where none is), since people
-        ask for an explanation when a registration looks bad. It returns the one of these with the median score of the
-        concept, or raises an InputError that names `path` where there is no test sample of the concept.
+        Where none failed, the method keeps the half that ICP fits worst, of the samples named right (of all, where none
+        is): people ask for an explanation when a registration looks bad. It returns the one of these with the median
+        score of the concept, or raises an InputError that names `path` where there is no test sample of the concept.
         """
         test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
         if test.empty:
             raise InputError(path, f"holds no test sample of '{concept}'", "raise registrations.test")
         right = test[test["concept_predicted"] == concept]
         kept = test if right.empty else right
+        failed = kept[[self.error(row) > FAILED for row in kept.index]]
         worst = kept.assign(fit=self.registrations.fitness[kept.index]).nsmallest((len(kept) + 1) // 2, "fit")
-        ranked = worst.sort_values([f"score_{concept}", "sample"], kind="stable")
+        ranked = (worst if failed.empty else failed).sort_values([f"score_{concept}", "sample"], kind="stable")
         return int(ranked.index[(len(ranked) - 1) // 2])
+
+    def error(self, row: int) -> float:
+        """Return the ADD-S of a row's pose after ICP in diameters; of points so sparse it is about 0.01 at best."""
+        T_icp, T_true = (self.registrations.T_target_source(which, row) for which in ("icp", "true"))
+        return adds_error(transform(inverse(T_true), self.registrations.target(row)), T_icp, T_true)
 
     def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:
         """Return target and source (·, 3) of a row, the source where the pose ``init`` or ``icp`` puts it."""
@@ -86,10 +96,11 @@ class Stages:
         return {which: (target @ view.T, source @ view.T) for which, (target, source) in pairs.items()}
 
     def words(self, row: int, which: str) -> str:
-        """Return what the registrations say of a pose: of ``init`` what was perturbed, of ``icp`` how well it fits."""
+        """Return what the registrations say of a pose: of ``init`` what was perturbed, of ``icp`` how far it is off."""
         if which == "init":
             return severity_text(self.registrations, row, str(self.registrations.concept[row]))
-        return f"fitness {self.registrations.fitness[row]:.2f}"
+        error = self.error(row)
+        return f"{'failed' if error > FAILED else 'right'}, ADD-S {100 * error:.1f} % $d$"
 
 
 def draw_embedding(axes, h_d: np.ndarray) -> None:

@@ -19,7 +19,7 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
     assert f"{sample['score_pose']:.2f}±0.12" in written
     assert f"{sample['score_noise']:.2f}±0.10" in written
     assert f"{sample['score_overlap']:.2f}±0.05" in written
-    assert f"aligned: fitness {of.fitness[row]:.2f}" in written
+    assert f"aligned: {stages.words(row, 'icp')}" in written
     assert any(f"{100 * of.severity_translation[row]:.0f} % $d$" in words for words in written)
     assert f"Solids (procedural stand-in): {of.object_name[row]}" in written
     assert "Act on pose:\nReinitialise ICP" in written

@@ -60,7 +60,7 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
     assert f"{sample['score_overlap']:.2f}±0.05" in written
     assert f"{sample['score_pose']:.2f}±0.12" in written
     assert f"initial pose $T_0$: {100 * of.severity_crop[row]:.0f} % cut off" in written
-    assert any(words.endswith(f"fitness {of.fitness[row]:.2f}") for words in written)
+    assert any(words.endswith(stages.words(row, "icp")) for words in written)
     bald = stages.predictions.loc[stages.predictions["split"] == "test", "bald"]
     assert f"{bald.min():.2f} to {bald.max():.2f} nats;\n$B K$ = 12 ringed" in written
     assert "18 test samples" in written

@@ -15,10 +15,18 @@ def test_the_sample_shown_is_a_test_sample_of_the_concept_after_a_poor_fit(stage
     sample = stages.predictions.iloc[row]
     assert (sample["split"], sample["concept_true"], sample["concept_predicted"]) == ("test", "pose", "pose")
     test = stages.predictions[(stages.predictions["split"] == "test") & (stages.predictions["concept_true"] == "pose")]
-    fits = stages.registrations.fitness[test.index]
-    assert stages.registrations.fitness[row] <= np.median(fits)
-    kept = test[fits <= np.sort(fits)[(len(fits) + 1) // 2 - 1]]["score_pose"]
-    assert kept.min() <= sample["score_pose"] <= kept.max()
+    failed = test[[stages.error(other) > 0.03 for other in test.index]]
+    assert len(failed)
+    assert failed["score_pose"].min() <= sample["score_pose"] <= failed["score_pose"].max()
+    assert stages.words(row, "icp").startswith("failed, ADD-S")
+
+
+def test_where_none_failed_the_fit_is_a_poor_one(stages, stage_files, monkeypatch):
+    monkeypatch.setattr(Stages, "error", lambda self, row: 0.012)
+    row = stages.choose("pose", stage_files[0])
+    test = stages.predictions[(stages.predictions["split"] == "test") & (stages.predictions["concept_true"] == "pose")]
+    assert stages.registrations.fitness[row] <= np.median(stages.registrations.fitness[test.index])
+    assert stages.words(row, "icp") == "right, ADD-S 1.2 % $d$"
 
 
 def test_a_concept_without_test_samples_is_refused(stages, stage_files):

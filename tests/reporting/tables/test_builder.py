@@ -91,8 +91,10 @@ def test_a_table_without_rows_is_refused_by_its_name(builder):
 
 
 def test_the_caption_speaks_of_the_stand_ins_among_the_rows(builder):
-    assert builder.stand_in_clause(SOURCES) == ", partly on procedural stand-ins of the datasets' objects"
-    assert builder.stand_in_clause(SOURCES, partly=False) == ", on procedural stand-ins of the datasets' objects"
+    assert builder.stand_in_clause(SOURCES) == ", measured partly on procedural stand-ins for the datasets' objects"
+    assert (
+        builder.stand_in_clause(SOURCES, partly=False) == ", measured on procedural stand-ins for the datasets' objects"
+    )
     others = SOURCES | {"ycb": SOURCES["linemod"], "absent": SOURCES["ycb"]}
     assert builder.stand_in_clause(others) == ""
 

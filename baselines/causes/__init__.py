@@ -1,0 +1,1 @@
+"""Explainers of causes, one kind per file: what is wrong with a registration, if anything, and why."""

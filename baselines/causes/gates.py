@@ -1,0 +1,67 @@
+"""Gates: one number that the registration itself gives, read as "is it fine?". They name no cause."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from baselines.attached import attached
+from baselines.causes.nominal import NominalThreshold
+from gpca.attribution.scores import Attribution
+from gpca.causes.labels import LABELS
+from gpca.descriptors.groups import MOTION
+from gpca.explainers.interface import ExplainerEntry
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+
+
+class Gate:
+    """An alarm by one of the numbers of the motion, times a sign.
+
+    Args:
+        name: in :data:`gpca.descriptors.groups.MOTION`.
+        sign: −1 where small values are bad.
+    """
+
+    def __init__(self, name: str, sign: int = 1) -> None:
+        self._column = MOTION.index(name)
+        self._sign = sign
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn the threshold."""
+        self._threshold = NominalThreshold().fit(self._alarm(registrations), registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score nominal by the alarm, and all causes alike."""
+        started = perf_counter()
+        n = len(registrations)
+        even_N_3 = np.full((n, len(CONCEPTS)), 1 / len(CONCEPTS))
+        scores_N_4 = self._threshold.scores(self._alarm(registrations), even_N_3)
+        seconds = (perf_counter() - started) / n
+        return Attribution.of_scores(LABELS, scores_N_4, seconds=seconds, abstained_N=np.ones(n, bool))
+
+    def _alarm(self, registrations: Registrations) -> np.ndarray:
+        return self._sign * attached(registrations, "motion", len(MOTION))[:, self._column]
+
+
+def gate_rmse(source: str, seed: int) -> Gate:
+    """Make the gate on ICP's inlier RMSE."""
+    return Gate("inlier_rmse")
+
+
+def gate_fitness(source: str, seed: int) -> Gate:
+    """Make the gate on ICP's fitness, the share of points with a partner."""
+    return Gate("fitness", sign=-1)
+
+
+def gate_spread(source: str, seed: int) -> Gate:
+    """Make the gate on the log-determinant of the covariance over other starts, which needs no clean run."""
+    return Gate("log_determinant")
+
+
+EXPLAINERS = {
+    "gate_rmse": ExplainerEntry("Inlier RMSE (gate)", gate_rmse, reads="descriptors"),
+    "gate_fitness": ExplainerEntry("Fitness (gate)", gate_fitness, reads="descriptors"),
+    "gate_spread": ExplainerEntry("Spread of the runs (gate)", gate_spread, reads="descriptors"),
+}

@@ -1,0 +1,1 @@
+"""Registrations whose causes of failure are measured by counterfactuals."""

@@ -1,0 +1,112 @@
+"""Counterfactuals of one candidate: it is registered again with every subset of its causes, from the same starts.
+
+ICP aligns the model to what was observed, so that missing surface hurts: every point of the model looks for a partner.
+It may be asked to run the other way (:attr:`gpca.causes.settings.CauseSettings.moved`).
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.pose_error import PoseErrors
+from gpca.alignment.rigid import inverses
+from gpca.alignment.twist import exp
+from gpca.causes.candidate import POSE, Candidate
+from gpca.causes.settings import OBSERVED, CauseSettings
+from gpca.causes.shapley import NONE, SUBSETS
+from gpca.causes.truth import LARGEST_ERROR
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import Runs, divergence
+
+
+class Unmeasurable(Exception):
+    """A candidate has no truth; the text says why."""
+
+
+class Registrar:
+    """Registers one candidate from any starts; what several calls share is worked out once."""
+
+    def __init__(self, candidate: Candidate, settings: CauseSettings) -> None:
+        self.candidate = candidate
+        self._settings = settings
+        self._targets: dict[tuple[int, ...], BatchedICP] = {}
+
+    def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
+        """Register with these causes from the starts exp(ξ) T_init.
+
+        Returns:
+            the runs, whose poses take what was observed to the model: the identity is right.
+
+        Raises:
+            Unmeasurable: no run found a correspondence, or a pose is not finite.
+        """
+        starts_n = exp(xi_n_6) @ self.candidate.start(causes)
+        observed, model = self.candidate.observed(causes), self.candidate.model
+        started = perf_counter()
+        if self._settings.moved == OBSERVED:
+            poses_n, fitness_n, rmse_n = self._target((), model).register(observed, starts_n)
+        else:
+            alike = tuple(cause for cause in causes if cause != POSE)  # a pose error changes no cloud
+            poses_n, fitness_n, rmse_n = self._target(alike, observed).register(model, inverses(starts_n))
+            poses_n = inverses(poses_n)
+        seconds = perf_counter() - started
+        if not np.isfinite(poses_n).all():
+            raise Unmeasurable("not finite")
+        if not fitness_n.any():
+            raise Unmeasurable("no correspondences")
+        return Runs(poses_n, fitness_n, rmse_n, len(poses_n), seconds)
+
+    def _target(self, causes: tuple[int, ...], points: np.ndarray) -> BatchedICP:
+        if causes not in self._targets:
+            self._targets[causes] = BatchedICP(points, self._settings.icp)
+        return self._targets[causes]
+
+
+class Counterfactuals:
+    """The errors and uncertainties of one candidate, each measured when it is first asked for.
+
+    Args:
+        registrar: of the candidate.
+        errors: of poses of its object's points, in diameters.
+        xi_n_6: twists of the starts, the same for every subset.
+    """
+
+    def __init__(
+        self, registrar: Registrar, errors: PoseErrors, xi_n_6: np.ndarray, settings: UncertaintySettings
+    ) -> None:
+        self._registrar = registrar
+        self._errors = errors
+        self._xi_n_6 = xi_n_6
+        self._floor = settings.floor
+        self._measured: dict[tuple[int, ...], tuple[float, np.ndarray]] = {}
+
+    def error(self, subset: int) -> float:
+        """Return v, the mean error over the starts, in diameters.
+
+        Raises:
+            Unmeasurable: see :meth:`Registrar.run`; also an error that is not finite.
+        """
+        return self._measure(subset)[0]
+
+    def uncertainty(self, subset: int) -> float:
+        """Return u against the clean pair, nats. Raises Unmeasurable as :meth:`error` does."""
+        return float(divergence(self.covariance(NONE), self.covariance(subset), self._floor))
+
+    def covariance(self, subset: int) -> np.ndarray:
+        """Return Σ (6, 6) of the poses. Raises Unmeasurable as :meth:`error` does."""
+        return self._measure(subset)[1]
+
+    def _measure(self, subset: int) -> tuple[float, np.ndarray]:
+        # What was not applied is not there to be removed: those subsets are the same registration.
+        causes = tuple(cause for cause in SUBSETS[subset] if self._registrar.candidate.applied[cause])
+        if causes not in self._measured:
+            runs = self._registrar.run(causes, self._xi_n_6)
+            # An error is that of the model's pose in what was observed.
+            errors_n = np.minimum(self._errors(inverses(runs.T_target_source_n)), LARGEST_ERROR)
+            if not np.isfinite(errors_n).all():
+                raise Unmeasurable("not finite")
+            self._measured[causes] = float(errors_n.mean()), runs.covariance(np.eye(4))
+        return self._measured[causes]

@@ -1,0 +1,142 @@
+"""Settings of the registrations with measured causes (docs/causes.md)."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, fields
+from typing import Annotated, Any, Literal
+
+from gpca.alignment.icp import ICPSettings
+from gpca.errors import InputError
+from gpca.pairs.perturbation import HalfTurn, Hidden, Severities, Shift
+from gpca.settings import Bounds, OpenShare, Positive, Share
+from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
+
+FEWEST_POINTS = 16  # that a crop leaves of a cloud, at least; as few as Monte-Carlo ICP takes anywhere
+Moved = Literal["model", "observed"]  # the cloud that ICP moves onto the other
+MODEL: Moved = "model"
+OBSERVED: Moved = "observed"
+CloudPoints = Annotated[int, Bounds(minimum=64, maximum=65536)]
+
+
+@dataclass(frozen=True)
+class CauseSeverities(Severities):
+    """Ranges (low, high) of the severities, wider than those of one perturbation at a time.
+
+    Attributes:
+        outliers: share of the points that noise throws anywhere in the object's cube.
+    """
+
+    noise: tuple[Share, Share] = (0.01, 0.08)
+    rotation_deg: tuple[HalfTurn, HalfTurn] = (10.0, 90.0)
+    translation: tuple[Shift, Shift] = (0.02, 0.40)
+    crop: tuple[Hidden, Hidden] = (0.20, 0.75)
+    outliers: tuple[Share, Share] = (0.0, 0.05)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the states are told apart by. Errors are relative to the diameter.
+
+    Attributes:
+        nominal: mean error below which nothing is wrong.
+        failed: mean error above which a registration has failed.
+        cause: part of the error above which a concept is one of the causes.
+        clean: share of the clean pairs whose uncertainty is no larger than a nominal registration's may be.
+    """
+
+    nominal: Positive = 0.02
+    failed: Positive = 0.03
+    cause: Positive = 0.01
+    clean: OpenShare = 0.95
+
+    def __post_init__(self) -> None:
+        if self.nominal > self.failed:
+            fault = f"nominal {self.nominal} is above failed {self.failed}"
+            raise InputError("causes limits", fault, "give a larger limit of failed, or a smaller one of nominal")
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Of the samples of a split, by their state and, of the failed, by their dominant cause.
+
+    Attributes:
+        nominal, borderline: share of these states.
+        noise, pose, overlap: share of the failed with that dominant cause.
+        geometry: share of those whose clean pair is off already; where it is 0 these are refused.
+    """
+
+    nominal: Share = 0.3
+    borderline: Share = 0.16
+    noise: Share = 0.18
+    pose: Share = 0.18
+    overlap: Share = 0.18
+    geometry: Share = 0.0
+
+    def __post_init__(self) -> None:
+        if abs((total := sum(asdict(self).values())) - 1) > 1e-6:
+            raise InputError("causes shares", f"they add up to {total:.4g}", "let them add up to 1")
+
+
+@dataclass(frozen=True)
+class CauseSettings(UncertaintySettings):
+    """How many samples are drawn and how (docs/causes.md).
+
+    Attributes:
+        train, test: samples of each split.
+        test_objects: share of the objects that only test samples show, at least one.
+        points: range of the number of points of a cloud, drawn for the model and for what was observed apart.
+        present: probability of each cause.
+        moved: the cloud that ICP moves onto the other: the ``model``, which has no partners where surface is missing,
+            or what was ``observed``, which has them everywhere.
+        several: range of the share that has several causes, of the failed of each dominant cause.
+        clean_pairs: on which the limit of the uncertainty is measured.
+        candidates: drawn for each sample that is wanted, at most.
+    """
+
+    starts: Annotated[int, Bounds(minimum=FEWEST_STARTS)] = FEWEST_STARTS
+    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-4
+    train: Annotated[int, Bounds(minimum=12)] = 600
+    test: Annotated[int, Bounds(minimum=6)] = 300
+    test_objects: OpenShare = 0.3
+    points: tuple[CloudPoints, CloudPoints] = (128, 1024)
+    present: OpenShare = 0.5
+    moved: Moved = MODEL
+    severities: CauseSeverities = field(default_factory=CauseSeverities)
+    limits: Limits = field(default_factory=Limits)
+    shares: Shares = field(default_factory=Shares)
+    several: tuple[Share, Share] = (0.3, 0.7)
+    clean_pairs: Annotated[int, Bounds(minimum=20)] = 200
+    candidates: Annotated[int, Bounds(minimum=1, maximum=1000)] = 20
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("points", "several"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise InputError(f"causes {name}", f"[{low}, {high}] runs downwards", "swap the two")
+        low = self.points[0]
+        if (left := round(low * (1 - self.severities.crop[1]))) < FEWEST_POINTS:
+            fault = f"of {low} points the largest crop leaves {left}"
+            remedy = f"raise causes.points or lower causes.severities.crop until {FEWEST_POINTS} are left"
+            raise InputError("causes points", fault, remedy)
+
+    def runs(self) -> UncertaintySettings:
+        """Return the part that says how ICP runs from other starts."""
+        return UncertaintySettings(**{part.name: getattr(self, part.name) for part in fields(UncertaintySettings)})
+
+    @classmethod
+    def from_dict(cls, settings: dict, icp: dict | None = None) -> CauseSettings:
+        """Build from the config's sections ``causes`` and ``registrations.icp``.
+
+        Raises:
+            InputError: values that contradict each other.
+        """
+        given: dict[str, Any] = dict(settings)
+        if "severities" in given:
+            ranges = {name: tuple(limits) for name, limits in given["severities"].items()}
+            given["severities"] = CauseSeverities(**ranges)
+        for name, kind in (("limits", Limits), ("shares", Shares)):
+            if name in given:
+                given[name] = kind(**given[name])
+        given |= {name: tuple(given[name]) for name in ("points", "several") if name in given}
+        return cls(**given, icp=ICPSettings(**icp or {}))

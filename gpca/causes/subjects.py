@@ -1,0 +1,136 @@
+"""The objects of a source as the candidates need them, their clean pairs, and which of them are for testing."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gpca.alignment.pose_error import PoseErrors
+from gpca.causes.candidate import draw_candidate
+from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
+from gpca.causes.settings import CauseSettings
+from gpca.causes.shapley import NONE
+from gpca.errors import InputError
+from gpca.objects.canonical import ObjectClouds
+from gpca.objects.symmetry import find_symmetries
+from gpca.objects.views import instance_of
+from gpca.pairs.dataset import SPLITS
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.progress import progress
+from gpca.seeds import generator
+from gpca.uncertainty.spread import divergence
+
+JUDGED_POINTS = 256  # of the model, over which an error is the mean
+SYMMETRY_POINTS = 4096  # as everywhere where symmetries are sought
+# Of an object's clean pairs. Where more are off, hardly any of its candidates would be kept; of the others, those whose
+# own clean pair is off are refused one by one. Half would be a matter of chance for mugs, at so few pairs each.
+MOST_FAILING = 0.9
+FEWEST_INSTANCES = 2  # one for training, one for testing; intervals over objects need more
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One object.
+
+    Attributes:
+        index: its number in the file of the objects.
+        surface: (N, 3) its points, in diameters.
+        errors: of its pose.
+    """
+
+    index: int
+    name: str
+    diameter_m: float
+    surface: np.ndarray
+    symmetric: bool
+    errors: PoseErrors
+
+
+def read_subjects(objects: ObjectClouds) -> list[Subject]:
+    """Return the objects, with what their symmetries mean for errors."""
+    subjects = []
+    for i, name in enumerate(objects.names):
+        diameter_m = float(objects.diameters_m[i])
+        surface = objects.points(i).astype(np.float64) / diameter_m
+        symmetric = bool(find_symmetries(objects.points(i)[:SYMMETRY_POINTS], diameter_m))
+        errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
+        subjects.append(Subject(i, str(name), diameter_m, surface, symmetric, errors))
+    return subjects
+
+
+def split_by_object(
+    subjects: list[Subject], source: str, seed: int, settings: CauseSettings
+) -> dict[str, list[Subject]]:
+    """Return the subjects of each split; views of one instance are in the same.
+
+    Raises:
+        InputError: fewer than two instances.
+    """
+    instances = sorted({instance_of(subject.name) for subject in subjects})
+    if len(instances) < FEWEST_INSTANCES:
+        fault = f"{len(instances)} object(s) cannot be split into those of training and those of testing"
+        raise InputError(f"causes of {source}", fault, f"give at least {FEWEST_INSTANCES} objects")
+    order = generator(source, seed, "causes", "objects").permutation(instances)
+    count = min(max(1, round(settings.test_objects * len(order))), len(order) - 1)
+    test = set(order[:count].tolist())
+    train, tested = SPLITS
+    return {
+        train: [subject for subject in subjects if instance_of(subject.name) not in test],
+        tested: [subject for subject in subjects if instance_of(subject.name) in test],
+    }
+
+
+def measure_clean_pairs(
+    subjects: list[Subject], source: str, seed: int, settings: CauseSettings
+) -> tuple[list[Subject], float]:
+    """Measure pairs to which nothing was done.
+
+    An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind.
+
+    Returns:
+        the subjects that are left; the limit of the uncertainty: the quantile `settings.limits.clean` of the divergence
+        between two clean pairs of the same object, with equal numbers of points, from the same starts.
+
+    Raises:
+        InputError: no object is left.
+    """
+    left, uncertainties = [], []
+    count = -(-settings.clean_pairs // len(subjects))
+    for subject in progress(subjects, f"clean pairs of {source}, seed {seed}"):
+        measured = [_clean_pair(subject, source, seed, number, settings) for number in range(count)]
+        found = [pair for pair in measured if pair is not None]
+        off = count - sum(error < settings.limits.nominal for error, _ in found)
+        if off > MOST_FAILING * count and not settings.shares.geometry:
+            print(
+                f"causes of {source}: object '{subject.name}' is left out: {off} of {count} clean pairs are off by "
+                f"{100 * settings.limits.nominal:g} % of the diameter or more, or cannot be registered",
+                file=sys.stderr,
+            )
+            continue
+        left.append(subject)
+        uncertainties += [uncertainty for _, uncertainty in found]
+    if not uncertainties:
+        limit = f"{100 * settings.limits.nominal:g} % of the diameter"
+        fault = f"of every object nearly all clean pairs are off by {limit} or more, or cannot be registered"
+        raise InputError(f"causes of {source}", fault, "raise causes.limits.nominal or causes.points")
+    return left, float(np.quantile(uncertainties, settings.limits.clean))
+
+
+def _clean_pair(
+    subject: Subject, source: str, seed: int, number: int, settings: CauseSettings
+) -> tuple[float, float] | None:
+    """Return error and uncertainty of a clean pair, None where it has none."""
+    random = generator(source, seed, "causes", "clean", subject.name, number)
+    first = draw_candidate(subject.surface, np.zeros(len(CONCEPTS), bool), settings, random)
+    rows = random.permutation(len(subject.surface))[: len(first.model) + len(first.clean)]
+    model, clean = np.split(subject.surface[rows], [len(first.model)])
+    second = replace(first, model=model, clean=clean)
+    xi_n_6 = random.normal(size=(settings.starts, 6)) * settings.deviation_6()
+    runs = [Counterfactuals(Registrar(pair, settings), subject.errors, xi_n_6, settings) for pair in (first, second)]
+    try:
+        uncertainty = divergence(runs[0].covariance(NONE), runs[1].covariance(NONE), settings.floor)
+        return runs[0].error(NONE), float(uncertainty)
+    except Unmeasurable:
+        return None

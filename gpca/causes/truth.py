@@ -1,0 +1,85 @@
+"""The truth about S registrations: errors and uncertainties under every subset of the causes, and what follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from gpca.causes.shapley import ALL, NONE, shapley_values
+from gpca.pairs.perturbation import CONCEPTS
+
+NOMINAL, BORDERLINE, FAILED = STATES = ("nominal", "borderline", "failed")
+LARGEST_ERROR = 0.5  # diameters: a pose that is farther off is as wrong as one can be
+GEOMETRY = "geometry"  # the clean pair is off already: too little shape to hold the pose
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What was measured, and the limits that states are told apart by.
+
+    Subset b of the eight has cause i of noise, pose and overlap where bit i of b is set.
+
+    Attributes:
+        error: (S, 8) v, mean over the starts of min(ADD(-S), d/2) / d, with only those causes applied.
+        uncertainty: (S, 8) u against the clean pair of the same sample, nats.
+        nominal_limit, failed_limit, cause_limit: of errors, see :class:`gpca.causes.settings.Limits`.
+        uncertainty_limit: of a nominal registration, nats.
+    """
+
+    error: np.ndarray
+    uncertainty: np.ndarray
+    nominal_limit: float
+    failed_limit: float
+    cause_limit: float
+    uncertainty_limit: float
+
+    def __len__(self) -> int:
+        return len(self.error)
+
+    def subset(self, rows: np.ndarray) -> Truth:
+        """Return the given rows."""
+        return replace(self, error=self.error[rows], uncertainty=self.uncertainty[rows])
+
+    @cached_property
+    def phi(self) -> np.ndarray:
+        """(S, 3) what each cause adds to the error; together v(all) − v(none)."""
+        return shapley_values(self.error)
+
+    @cached_property
+    def phi_uncertainty(self) -> np.ndarray:
+        """(S, 3) what each cause adds to the uncertainty, nats: the paper's quantity."""
+        return shapley_values(self.uncertainty)
+
+    @cached_property
+    def state(self) -> np.ndarray:
+        """(S,) ``nominal``, ``borderline`` or ``failed``."""
+        error_S, uncertainty_S = self.error[:, ALL], self.uncertainty[:, ALL]
+        nominal_S = (error_S < self.nominal_limit) & (uncertainty_S <= self.uncertainty_limit)
+        return np.select([nominal_S, error_S > self.failed_limit], [NOMINAL, FAILED], BORDERLINE)
+
+    @property
+    def geometry(self) -> np.ndarray:
+        """(S,) the clean pair is off by more than a nominal registration may be."""
+        return self.error[:, NONE] >= self.nominal_limit
+
+    @property
+    def dominant(self) -> np.ndarray:
+        """(S,) the concept that adds most to the error, in any state, or ``geometry`` where what is left is more."""
+        named_S = np.array(CONCEPTS)[self.phi.argmax(axis=1)]
+        return np.where(self.geometry & (self.error[:, NONE] > self.phi.max(axis=1)), GEOMETRY, named_S)
+
+    @property
+    def causes(self) -> np.ndarray:
+        """(S, 3) whether each concept is one of the causes."""
+        return self.phi > self.cause_limit
+
+
+def joined(truths: list[Truth]) -> Truth:
+    """Return the samples of several truths, which have the limits of the first."""
+    return replace(
+        truths[0],
+        error=np.concatenate([truth.error for truth in truths]),
+        uncertainty=np.concatenate([truth.uncertainty for truth in truths]),
+    )

@@ -1,0 +1,81 @@
+"""Distances within a pair after ICP, and the local shape of its clouds: quantiles over the points.
+
+The first four groups of thirteen are the plainest that tell a registration's faults apart: how far the observed cloud
+lies from the model, the model from the observed cloud, the observed cloud from the model's local planes, and how thick
+the observed cloud is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.descriptors.pair import ObservedPair
+
+QUANTILES = np.array([0.01, *np.arange(1, 12) / 12, 0.99])  # the very ends belong to single points
+NEIGHBOURS = 12  # so many span a local plane
+
+
+@dataclass(frozen=True)
+class LocalPlanes:
+    """A cloud with the plane around each of its points.
+
+    Attributes:
+        tree: of the points.
+        normals: (N, 3), without a sign.
+        thickness, extent: (N,) root mean square distance of the neighbours from the plane, and along its longest axis.
+    """
+
+    tree: cKDTree
+    normals: np.ndarray
+    thickness: np.ndarray
+    extent: np.ndarray
+
+    @classmethod
+    def of(cls, points: np.ndarray) -> LocalPlanes:
+        """Return the planes of least squares through the nearest points of each point (N, 3)."""
+        tree = cKDTree(points)
+        neighbours = min(NEIGHBOURS, len(points))
+        _, rows_N_k = tree.query(points, neighbours)
+        around_N_k_3 = points[rows_N_k]
+        offsets_N_k_3 = around_N_k_3 - around_N_k_3.mean(axis=1, keepdims=True)
+        squares_N_3, axes_N_3_3 = np.linalg.eigh(_second_moments(offsets_N_k_3))
+        spread_N_3 = np.sqrt(np.maximum(squares_N_3, 0) / neighbours)
+        return cls(tree, axes_N_3_3[:, :, 0], spread_N_3[:, 0], spread_N_3[:, 2])
+
+
+def _second_moments(offsets_N_k_3: np.ndarray) -> np.ndarray:
+    """Return Σ x xᵀ (N, 3, 3), summed in one order on every processor."""
+    x, y, z = np.moveaxis(offsets_N_k_3, -1, 0)
+    rows = [[(a * b).sum(axis=1) for b in (x, y, z)] for a in (x, y, z)]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
+    return a_N_3[:, 0] * b_N_3[:, 0] + a_N_3[:, 1] * b_N_3[:, 1] + a_N_3[:, 2] * b_N_3[:, 2]
+
+
+def describe_distances(pair: ObservedPair) -> tuple[np.ndarray, np.ndarray]:
+    """Return the 52 distances of the pair, and what else its local planes tell (45 numbers).
+
+    The second are quantiles of the model's distance from the observed cloud's planes, of |cosine| between the normals
+    of partners, and of the model's thickness; the median spacings and extents of both; and the logarithms of their
+    numbers of points.
+    """
+    observed, model = LocalPlanes.of(pair.observed), LocalPlanes.of(pair.model)
+    to_model_N, partner_N = model.tree.query(pair.observed)
+    to_observed_M, partner_M = observed.tree.query(pair.model)
+    plane_N = np.abs(_dots(pair.observed - pair.model[partner_N], model.normals[partner_N]))
+    plane_M = np.abs(_dots(pair.model - pair.observed[partner_M], observed.normals[partner_M]))
+    cosine_N = np.abs(_dots(observed.normals, model.normals[partner_N]))
+    spacings = [np.median(planes.tree.query(planes.tree.data, 2)[0][:, 1]) for planes in (observed, model)]
+    extents = [np.median(planes.extent) for planes in (observed, model)]
+    counts = [np.log(len(cloud)) for cloud in (pair.observed, pair.model)]
+    distances = [to_model_N, to_observed_M, plane_N, observed.thickness]
+    shapes = [plane_M, cosine_N, model.thickness]
+    return (
+        np.concatenate([np.quantile(values, QUANTILES) for values in distances]),
+        np.concatenate([*(np.quantile(values, QUANTILES) for values in shapes), spacings, extents, counts]),
+    )

@@ -1,0 +1,42 @@
+"""How much work a description may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from gpca.settings import Bounds, Positive
+
+
+@dataclass(frozen=True)
+class DescriptorSettings:
+    """The registrations that a description runs again with remedies.
+
+    Attributes:
+        starts: near the initial pose, and as many as that again farther off where the remedy is a restart.
+        start_rotation_deg, start_translation: root mean square angle and length (diameters) of the offsets near by.
+        restarts: starts farther off.
+        restart_rotation_deg, restart_translation: theirs.
+        icp_points: of each cloud in these runs, at most.
+    """
+
+    starts: Annotated[int, Bounds(minimum=1, maximum=1000)] = 3
+    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 10.0
+    start_translation: Positive = 0.05
+    restarts: Annotated[int, Bounds(minimum=1, maximum=1000)] = 8
+    restart_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 50.0
+    restart_translation: Positive = 0.25
+    icp_points: Annotated[int, Bounds(minimum=16, maximum=65536)] = 512
+
+    def twists(self, near_k_6: np.ndarray, far_k_6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the twists of the starts near by and farther off, of standard normal numbers (k, 6)."""
+        return (
+            near_k_6 * _deviation_6(self.start_rotation_deg, self.start_translation),
+            far_k_6 * _deviation_6(self.restart_rotation_deg, self.restart_translation),
+        )
+
+
+def _deviation_6(rotation_deg: float, translation: float) -> np.ndarray:
+    return np.repeat(np.array([np.deg2rad(rotation_deg), translation]) / np.sqrt(3), 3)

@@ -1,0 +1,125 @@
+"""Test samples with their truth beside what an explainer said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from gpca.attribution.metrics import source_method_seed
+from gpca.attribution.predictions import read_predictions
+from gpca.causes.dataset import Causes
+from gpca.causes.labels import LABELS, labels_of
+from gpca.causes.truth import NOMINAL, Truth
+from gpca.errors import InputError
+from gpca.objects.views import instance_of
+from gpca.pairs.perturbation import CONCEPTS
+
+CEILING = "ceiling"  # the truth, measured again from other starts: no explainer can be expected to do better
+POOLED = "pooled"  # all sources together
+
+
+@dataclass(frozen=True)
+class Judged:
+    """N test samples.
+
+    Attributes:
+        label: one of :data:`gpca.causes.labels.LABELS`, or ``borderline``.
+        instance: the object, views of one instance together. seed: the repeat.
+        error: (N, 8) v of every subset of the causes. phi: (N, 3). causes: (N, 3) whether each is one of them.
+        alarm: what the explainer takes for wrong, larger is worse. scores: (N, 3) of the causes.
+        named: the label that it names; empty where it names none.
+        nominal: its score of "nominal".
+    """
+
+    label: np.ndarray
+    instance: np.ndarray
+    seed: np.ndarray
+    error: np.ndarray
+    phi: np.ndarray
+    causes: np.ndarray
+    alarm: np.ndarray
+    scores: np.ndarray
+    named: np.ndarray
+    nominal: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.label)
+
+    @property
+    def names_causes(self) -> bool:
+        """Whether the explainer says more than whether something is wrong."""
+        return bool((self.named != "").any())
+
+
+def read_judged(
+    prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
+) -> dict[tuple[str, str, int], Judged]:
+    """Return the test samples of every source, explainer and seed, those of the ceiling first.
+
+    Args:
+        prediction_files: named ``…/{source}/{explainer}/seed{seed}.csv``.
+        causes_files: named ``…/{source}/seed{seed}.npz``.
+
+    Raises:
+        InputError: no files, a file that cannot be read, predictions of other samples.
+    """
+    truths, judged = {}, {}
+    for path in causes_files:
+        source, seed = Path(path).parent.name, int(Path(path).stem.removeprefix("seed"))
+        causes = Causes.load(path)
+        truths[source, seed] = causes.subset(causes.rows("test"))
+        judged[source, CEILING, seed] = _ceiling(truths[source, seed], seed)
+    for path in prediction_files:
+        source, explainer, seed = source_method_seed(path)
+        if (source, seed) not in truths:
+            raise InputError(path, "its truth was not given", f"give causes/{source}/seed{seed}.npz")
+        rows = read_predictions(path)
+        rows = rows[rows["split"] == "test"]
+        truth = truths[source, seed]
+        if rows["sample"].astype(int).tolist() != truth.registrations.sample.tolist():
+            raise InputError(path, "holds other test samples than the causes", "make both anew from one config")
+        scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
+        named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
+        judged[source, explainer, seed] = _judged(truth, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
+    if not judged:
+        raise InputError("diagnoses", "no files were given", "name at least one explainer in diagnosis.explainers")
+    return judged
+
+
+def joined(parts: Iterable[Judged]) -> Judged:
+    """Return the samples of several one after the other."""
+    parts = list(parts)
+    return Judged(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Judged)))
+
+
+def _ceiling(causes: Causes, seed: int) -> Judged:
+    again: Truth = causes.truth_again
+    error_N = again.error[:, -1]
+    shares_N_3 = np.maximum(again.phi, 0) + 1e-12
+    shares_N_3 = shares_N_3 / shares_N_3.sum(axis=1, keepdims=True)
+    nominal_N = (again.state == NOMINAL).astype(float)
+    scores_N_4 = np.column_stack([nominal_N, (1 - nominal_N[:, None]) * shares_N_3])
+    # A sample that lies between the limits this time is named by the nearer one.
+    middle = (again.nominal_limit + again.failed_limit) / 2
+    named_N = np.where(error_N < middle, NOMINAL, np.array(CONCEPTS)[again.phi.argmax(axis=1)])
+    return _judged(causes, seed, error_N, scores_N_4, named_N)
+
+
+def _judged(causes: Causes, seed: int, alarm_N, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
+    truth = causes.truth
+    instances = [instance_of(str(name)) for name in causes.registrations.object_name]
+    return Judged(
+        label=labels_of(truth),
+        instance=np.array(instances),
+        seed=np.full(len(truth), seed),
+        error=truth.error,
+        phi=truth.phi,
+        causes=truth.causes,
+        alarm=np.asarray(alarm_N, float),
+        scores=scores_N_4[:, 1:],
+        named=named_N,
+        nominal=scores_N_4[:, 0],
+    )

@@ -1,0 +1,133 @@
+"""GP-CA's classifiers on the descriptors of a pair: whether anything is wrong, and which causes there are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from gpca.causes.truth import FAILED, NOMINAL
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.seeds import seed_of
+
+QUANTILES = 100  # of each descriptor, at most
+FARTHEST = 3.0  # standard deviations; what lies beyond all training samples lies there
+ABSENT, PRESENT = "absent", "present"
+
+
+class NormalisedDescriptors:
+    """Every descriptor mapped to a normal distribution by its ranks among the training samples.
+
+    Distances, angles, costs and counts have tails of all kinds, in which one lengthscale would see little else.
+    """
+
+    def __init__(self, *axes: object) -> None:
+        self._axes = axes
+
+    def fit(self, features_N_F: np.ndarray) -> NormalisedDescriptors:
+        """Learn the ranks."""
+        from sklearn.preprocessing import QuantileTransformer
+
+        self._transformer = QuantileTransformer(
+            n_quantiles=min(QUANTILES, len(features_N_F)),
+            output_distribution="normal",
+            random_state=seed_of(*self._axes, "quantiles") % 2**32,
+        ).fit(features_N_F)
+        return self
+
+    def __call__(self, features_N_F: np.ndarray) -> np.ndarray:
+        """Return the normalised descriptors (N, F)."""
+        return self._transformer.transform(features_N_F).clip(-FARTHEST, FARTHEST)
+
+    def state(self) -> torch.Tensor:
+        """Return the quantiles (Q, F), for :meth:`from_state`."""
+        return torch.from_numpy(self._transformer.quantiles_)
+
+    @classmethod
+    def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalisedDescriptors:
+        """Return what normalises as the one of that state did."""
+        from sklearn.preprocessing import QuantileTransformer
+
+        made, quantiles = cls(), quantiles_Q_F.numpy()
+        transformer = QuantileTransformer(n_quantiles=len(quantiles), output_distribution="normal")
+        transformer.n_quantiles_, transformer.n_features_in_ = len(quantiles), quantiles.shape[1]
+        transformer.references_ = np.linspace(0, 1, len(quantiles))
+        transformer.quantiles_ = quantiles
+        made._transformer = transformer
+        return made
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the classifiers say of N pairs.
+
+    Attributes:
+        failure_N: probability that it failed.
+        causes_N_3: of each concept, that it is one of the causes.
+        causes_variances_N_3: over the posterior draws (Eq. 5).
+        bald_N: of the least certain of the four, nats (Eq. 7).
+    """
+
+    failure_N: np.ndarray
+    causes_N_3: np.ndarray
+    causes_variances_N_3: np.ndarray
+    bald_N: np.ndarray
+
+
+class PairClassifier:
+    """Independent binary Gaussian processes: one for failure, and one for each cause.
+
+    Args:
+        settings: of each.
+        axes: names of the seed.
+    """
+
+    def __init__(self, settings: GPCSettings, *axes: object) -> None:
+        self.normalised = NormalisedDescriptors(*axes)
+        self._failure = GPC((NOMINAL, FAILED), settings, *axes, FAILED)
+        self._causes = [GPC((ABSENT, PRESENT), settings, *axes, concept) for concept in CONCEPTS]
+
+    def fit(self, features_N_F: np.ndarray, failed_N: np.ndarray, causes_N_3: np.ndarray) -> PairClassifier:
+        """Learn from samples that are nominal or failed.
+
+        Args:
+            features_N_F: their descriptors.
+            failed_N: whether each failed.
+            causes_N_3: whether each concept is one of its causes.
+        """
+        inputs_N_F = self.normalised.fit(features_N_F)(features_N_F)
+        self._failure.fit(inputs_N_F, np.where(failed_N, FAILED, NOMINAL))
+        for gpc, present_N in zip(self._causes, causes_N_3.T, strict=True):
+            gpc.fit(inputs_N_F, np.where(present_N, PRESENT, ABSENT))
+        return self
+
+    def judge(self, features_N_F: np.ndarray) -> Judgement:
+        """Return what the classifiers say."""
+        inputs_N_F = self.normalised(features_N_F)
+        (failed, _, bald), *causes = (gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes))
+        return Judgement(
+            failure_N=failed[:, 1],
+            causes_N_3=np.column_stack([scores[:, 1] for scores, _, _ in causes]),
+            causes_variances_N_3=np.column_stack([variances[:, 1] for _, variances, _ in causes]),
+            bald_N=np.max([bald, *(of_cause for _, _, of_cause in causes)], axis=0),
+        )
+
+    def state(self) -> dict[str, object]:
+        """Return all that was learnt, for :meth:`from_state`."""
+        return {
+            "quantiles": self.normalised.state(),
+            "failure": self._failure.state(),
+            "causes": [gpc.state() for gpc in self._causes],
+        }
+
+    @classmethod
+    def from_state(cls, state: dict) -> PairClassifier:
+        """Return the classifier of a :meth:`state`."""
+        made = cls.__new__(cls)
+        made.normalised = NormalisedDescriptors.from_state(state["quantiles"])
+        made._failure = GPC.from_state(state["failure"])
+        made._causes = [GPC.from_state(part) for part in state["causes"]]
+        return made

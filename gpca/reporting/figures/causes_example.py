@@ -1,0 +1,146 @@
+"""Draws one failed registration with its eight counterfactuals, and what explainers say of it beside the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gpca.attribution.metrics import source_method_seed
+from gpca.attribution.predictions import read_predictions
+from gpca.causes.dataset import Causes
+from gpca.causes.labels import LABELS
+from gpca.causes.replay import replay
+from gpca.causes.settings import CauseSettings
+from gpca.causes.shapley import ALL, SUBSETS
+from gpca.causes.truth import FAILED
+from gpca.errors import InputError
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
+from gpca.reporting.figures.style import GREY, SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
+from gpca.reporting.words import in_words
+
+PANEL_IN = 1.02
+HEAD_IN = 0.3
+CAPTION_IN = 0.17
+LEFT_IN = 4 * PANEL_IN
+NAMES_IN = 1.75
+TRUTH = "measured φ (share)"
+
+
+def draw_causes_example(
+    objects_npz: str | Path,
+    causes_npz: str | Path,
+    predictions_csv: Sequence[str | Path],
+    settings: Mapping,
+    explainers: Mapping[str, str],
+    title: str,
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw the counterfactuals on the left, and on the right the measured shares and the scores of every explainer.
+
+    Left is the observed cloud over the model after ICP with every subset of the causes, and the error v of each.
+    The sample is the failed test sample of three causes whose measured shares are the most even; where none has three,
+    the one with the most causes.
+
+    Args:
+        objects_npz, causes_npz: Of the shown source and seed, which their paths name.
+        predictions_csv: One file per explainer, of the same source and seed.
+        settings: The config's section ``causes`` with ``icp``.
+        explainers: The title of each name, in order; those that name no cause are left out.
+
+    Raises:
+        InputError: an unusable file, files that do not belong together, or no failed test sample.
+    """
+    causes = Causes.load(causes_npz)
+    row = choose_sample(causes, causes_npz)
+    source, seed = Path(causes_npz).parent.name, int(Path(causes_npz).stem.removeprefix("seed"))
+    given = dict(settings)
+    own = CauseSettings.from_dict({k: v for k, v in given.items() if k != "icp"}, given.get("icp"))
+    shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
+    names, scores_R_4 = _scores(causes, row, predictions_csv, explainers)
+    use_style()
+    import matplotlib.pyplot as plt
+
+    height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), 0.35 + 0.19 * len(names))
+    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
+    view = widest_views(shown.model)[0]
+    everything = np.concatenate([shown.model @ view.T, *(cloud @ view.T for cloud in shown.observed)])
+    corners = np.quantile(everything, (0.001, 0.999), axis=0)
+    line_in = (height_in - HEAD_IN) / 2
+    for place, subset in enumerate(sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset))):
+        line, column = divmod(place, 4)
+        bottom_in = height_in - HEAD_IN - (line + 1) * line_in + CAPTION_IN
+        bounds = (column * PANEL_IN / TEXT_WIDTH_IN, bottom_in / height_in)
+        panel = figure.add_axes((*bounds, PANEL_IN / TEXT_WIDTH_IN, (line_in - CAPTION_IN) / height_in))
+        draw_clouds(panel, shown.model @ view.T, shown.observed[subset] @ view.T, size=0.9, corners=corners)
+        words = " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none"
+        error = f"{100 * causes.truth.error[row, subset]:.1f} %"
+        where = ((column + 0.5) * PANEL_IN / TEXT_WIDTH_IN, (bottom_in - 0.02) / height_in)
+        words = "all three" if subset == ALL else words
+        figure.text(*where, f"{words}: {error}", ha="center", va="top", fontsize=SMALL_PT)
+    table_in = TEXT_WIDTH_IN - LEFT_IN - NAMES_IN - 0.1
+    rows_in = 0.19 * len(names)
+    left = (LEFT_IN + NAMES_IN) / TEXT_WIDTH_IN
+    bottom = (height_in - HEAD_IN - 0.2 - rows_in) / height_in
+    panel = figure.add_axes((left, bottom, table_in / TEXT_WIDTH_IN, rows_in / height_in))
+    _draw_scores(panel, names, scores_R_4)
+    object_name = in_words(causes.registrations.object_name[row])
+    write_title(figure, f"{title}: {object_name}. Mean error in % of the diameter with each subset of the causes")
+    legend_of_clouds(figure, "model", "observed", gap=0.2)
+    save_figure(figure, pdf_path, png_path)
+
+
+def choose_sample(causes: Causes, path: str | Path) -> int:
+    """Return the row that is shown; see :func:`draw_causes_example`."""
+    failed = np.flatnonzero((causes.registrations.split == "test") & (causes.truth.state == FAILED))
+    if not len(failed):
+        raise InputError(path, "holds no failed test sample", "raise causes.test")
+    number = causes.truth.causes[failed].sum(axis=1)
+    most = failed[number == number.max()]
+    phi = np.maximum(causes.truth.phi[most], 0)
+    evenness = np.sort(phi / phi.sum(axis=1, keepdims=True), axis=1)[:, -int(max(number.max(), 1))]
+    return int(most[evenness.argmax()])
+
+
+def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: Mapping[str, str]):
+    """Return the titles of the rows and their numbers (R, 4): the measured shares first."""
+    registrations = causes.registrations
+    phi = np.maximum(causes.truth.phi[row], 0)
+    by_name = {}
+    for path in [files] if isinstance(files, str) else files:
+        _, name, _ = source_method_seed(path)
+        rows = read_predictions(path)
+        of_sample = (rows["split"] == registrations.split[row]) & (rows["sample"] == str(registrations.sample[row]))
+        if of_sample.sum() != 1:
+            raise InputError(path, "lacks the sample that is shown", "make it anew from one config")
+        said = rows[of_sample].iloc[0]
+        if not said["abstained"]:
+            by_name[name] = [said[f"score_{label}"] for label in LABELS]
+    named = [name for name in explainers if name in by_name]
+    shares = [0.0, *(phi / max(phi.sum(), 1e-9))]
+    return [TRUTH, *(explainers[name] for name in named)], np.array([shares, *(by_name[name] for name in named)], float)
+
+
+def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray) -> None:
+    panel.imshow(scores_R_4, cmap=blues(), vmin=0, vmax=1, aspect="auto")
+    for (row, column), score in np.ndenumerate(scores_R_4):
+        weight = "bold" if score == scores_R_4[row].max() else "normal"
+        colour = "white" if score > 0.65 else "black"
+        panel.text(
+            column,
+            row,
+            f"{score:.2f}",
+            ha="center",
+            va="center_baseline",
+            fontsize=SMALL_PT,
+            color=colour,
+            weight=weight,
+        )
+    panel.axhline(0.5, color=GREY, linewidth=0.8)
+    panel.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
+    panel.set_xticks(range(len(LABELS)), LABELS, fontsize=SMALL_PT)
+    panel.tick_params(length=0, pad=2, labeltop=True, labelbottom=False)

@@ -1,0 +1,40 @@
+"""Step ``causes``: canonical clouds -> ``causes/{source}/seed{seed}.npz``, registrations with measured causes."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.arguments import SEED
+from gpca.attribution.predictions import write_timings
+from gpca.causes.drawing import draw_causes
+from gpca.causes.settings import CauseSettings
+from gpca.objects.canonical import ObjectClouds
+from gpca.provenance import record_provenance
+from gpca.settings import check_settings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is the config's section ``causes``, with ``icp`` of ``registrations``."""
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=SEED)
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--candidates", required=True, type=Path, help="CSV of how many candidates were refused")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds of the observed runs of ICP")
+
+
+def run(options: Namespace) -> None:
+    """Draw candidates, measure their causes, keep a balanced set."""
+    given = dict(options.settings)
+    icp = given.pop("icp", {})
+    check_settings(given, "causes")
+    check_settings(icp, "registrations", "icp")
+    settings = CauseSettings.from_dict(given, icp)
+    objects = ObjectClouds.load(options.objects)
+    outputs = [options.out, options.candidates, options.timings]
+    with record_provenance(outputs, [options.objects], options.settings, seed=options.seed):
+        causes, tally, icp_seconds_S = draw_causes(objects, options.source, options.seed, settings)
+        causes.save(options.out)
+        tally.save(options.candidates)
+        write_timings(options.timings, causes.registrations, icp_seconds_S, icp_seconds_S)

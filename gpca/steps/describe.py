@@ -1,0 +1,41 @@
+"""Step ``describe``: causes -> ``descriptors/{source}/seed{seed}.npz``, what can be measured of each pair."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.alignment.icp import ICPSettings
+from gpca.arguments import SEED
+from gpca.attribution.predictions import read_timings, write_timings
+from gpca.causes.dataset import Causes
+from gpca.descriptors.dataset import describe_all
+from gpca.descriptors.settings import DescriptorSettings
+from gpca.provenance import record_provenance
+from gpca.settings import check_settings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` is ``diagnosis.descriptors``, with ``icp`` of ``registrations``."""
+    parser.add_argument("--causes", required=True, type=Path)
+    parser.add_argument("--causes-timings", required=True, type=Path)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=SEED)
+    parser.add_argument("--out", required=True, type=Path)
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds, the observed runs included")
+
+
+def run(options: Namespace) -> None:
+    """Describe every pair."""
+    given = dict(options.settings)
+    icp = given.pop("icp", {})
+    check_settings(given, "diagnosis", "descriptors")
+    check_settings(icp, "registrations", "icp")
+    outputs = [options.out, options.timings]
+    with record_provenance(outputs, [options.causes, options.causes_timings], options.settings, seed=options.seed):
+        causes = Causes.load(options.causes)
+        seconds_S, icp_seconds_S = read_timings(options.causes_timings, causes.registrations)
+        settings = DescriptorSettings(**given)
+        described, own_S, own_icp_S = describe_all(causes, options.source, options.seed, settings, ICPSettings(**icp))
+        described.save(options.out)
+        write_timings(options.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)

@@ -1,0 +1,110 @@
+"""What all explainers of causes have in common, and what each of them has to itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from baselines.causes.nominal import NominalThreshold
+from baselines.registry import CAUSES, explainer_entry, explainer_module, explainers
+from gpca.alignment.icp import ICPSettings
+from gpca.causes.labels import LABELS, labelled
+from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.descriptors.dataset import describe_all
+from gpca.descriptors.settings import DescriptorSettings
+from gpca.errors import InputError
+
+FAST = {
+    "gpca": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},
+    "gpca_pair": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},
+    "gpca_multilabel": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},
+    "pair_forest": {"trees": 10},
+    "pair_boosting": {"iterations": 3},
+}
+NAMES = sorted(set(explainers(CAUSES)) - {"pair_committee"})  # it is made of three of the others, and slow
+
+
+@pytest.fixture(scope="module")
+def seen(causes):
+    """Registrations with labels, descriptors and an embedding that tells the labels apart."""
+    registrations = labelled(causes)
+    few = DescriptorSettings(starts=1, restarts=2, icp_points=64)
+    descriptors, _, _ = describe_all(causes, "four", 100, few, ICPSettings())
+    embedding = np.random.default_rng(0).normal(size=(len(causes), 6))
+    for i, label in enumerate(LABELS):
+        embedding[registrations.concept == label, i] += 3
+    read = {"embedding": embedding, "head_logits": embedding[:, :4], **descriptors.groups}
+    registrations = replace(registrations, attached={**registrations.attached, **read})
+    return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))
+
+
+def explained(name, registrations):
+    explainer = explainer_entry(name, CAUSES).make("four", 100, **FAST.get(name, {}))
+    explainer.fit(registrations)
+    return explainer.explain(registrations.without_labels())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scores_are_over_the_labels_and_the_same_again(name, seen):
+    first, again = explained(name, seen), explained(name, seen)
+    assert first.concepts == LABELS
+    assert first.scores_N_C.shape == (len(seen), 4)
+    assert ((first.scores_N_C >= 0) & (first.scores_N_C <= 1)).all()
+    assert np.array_equal(first.scores_N_C, again.scores_N_C)
+    assert first.abstained_N.all() == name.startswith("gate_")
+
+
+@pytest.mark.parametrize("name", ["gpca", "softmax_head", "concept_vectors", "pair_forest", "gpca_pair"])
+def test_who_learns_finds_the_labels_of_the_samples_that_it_learnt(name, seen):
+    attribution = explained(name, seen)
+    assert (attribution.predicted_N == seen.concept).mean() > 0.5
+
+
+def test_a_committee_says_the_mean_of_what_its_members_say(seen):
+    from baselines.causes.committee import Committee
+
+    committee = Committee("four", 100)
+    committee.fit(seen)
+    members = [member.explain(seen).scores_N_C for member in committee._members]
+    assert committee.explain(seen).scores_N_C == pytest.approx(np.mean(members, axis=0))
+
+
+def test_one_label_is_nothing_to_learn(seen):
+    alike = seen.subset(np.flatnonzero(seen.concept == NOMINAL))
+    for name in ("gpca_multilabel", "pair_forest", "concept_vectors"):
+        with pytest.raises(InputError, match="fewer than two"):
+            explained(name, alike)
+
+
+def test_several_causes_may_have_high_scores_at_once(seen):
+    both = replace(seen, attached={**seen.attached, "causes": np.ones((len(seen), 3))})
+    scores = explained("gpca_multilabel", both).scores_N_C
+    failed = scores[:, 0] < 0.5
+    assert (scores[failed, 1:].sum(axis=1) > 1).any()
+
+
+def test_the_threshold_of_nominal_is_the_best_and_holds_for_the_scores():
+    alarm = np.array([0.1, 0.2, 0.3, 0.35, 0.9, 1.2])
+    label = np.array([NOMINAL, NOMINAL, "pose", NOMINAL, "noise", "pose"])
+    threshold = NominalThreshold().fit(alarm, label)
+    shares = np.tile([0.2, 0.5, 0.3], (2, 1))
+    scores = threshold.scores(np.array([0.34, 0.8]), shares)
+    assert scores.sum(axis=1) == pytest.approx(1)
+    assert scores.argmax(axis=1).tolist() == [0, 2]  # above 0.625 something is wrong
+    assert NominalThreshold().fit(alarm, np.full(6, "pose"))._threshold == pytest.approx(np.median(alarm))
+
+
+def test_a_gate_alarms_where_its_number_is_bad(seen):
+    scores = explained("gate_rmse", seen).scores_N_C[:, 0]
+    rmse = seen.attached["motion"][:, 4]
+    order = np.argsort(rmse, kind="stable")
+    assert (np.diff(scores[order]) <= 1e-12).all()
+    fitness = explained("gate_fitness", seen).scores_N_C[:, 0]
+    assert (np.diff(fitness[np.argsort(seen.attached["motion"][:, 3], kind="stable")]) >= -1e-12).all()
+
+
+def test_every_kind_of_explainer_has_its_own_names():
+    assert explainer_module("gpca", CAUSES) == "baselines.causes.embeddings"
+    assert explainer_module("gpca") == "gpca.explainers.gpca"
+    with pytest.raises(InputError, match="explainer 'shap_oracle': unknown; known are"):
+        explainer_entry("shap_oracle", CAUSES)

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from gpca.alignment.rigid import rotation_angle_rad
+from gpca.causes.candidate import draw_applied, draw_candidate
+from gpca.causes.settings import CauseSettings, CauseSeverities
+
+SETTINGS = CauseSettings(severities=CauseSeverities(outliers=(0.1, 0.2)))
+
+
+@pytest.fixture(scope="module")
+def candidates(subjects):
+    return [
+        draw_candidate(subjects[k % 4].surface, np.ones(3, bool), SETTINGS, np.random.default_rng(k)) for k in range(40)
+    ]
+
+
+def test_counts_and_severities_are_within_their_ranges(candidates):
+    for candidate in candidates:
+        severity = candidate.severity
+        for count in (len(candidate.model), len(candidate.clean)):
+            assert 128 <= count <= 1024
+        assert 0.01 <= severity["noise"] <= 0.08
+        assert 0.1 <= severity["outliers"] <= 0.2
+        assert rotation_angle_rad(candidate.T_init) == pytest.approx(severity["rotation_rad"], abs=1e-6)
+        assert np.deg2rad(10) <= severity["rotation_rad"] <= np.deg2rad(90)
+        assert np.linalg.norm(candidate.T_init[:3, 3]) == pytest.approx(severity["translation"])
+        assert len(candidate.kept) == round(len(candidate.clean) * (1 - severity["crop"]))
+    assert len({len(candidate.model) - len(candidate.clean) for candidate in candidates}) > 30  # drawn apart
+
+
+def test_model_and_observation_share_no_point(candidates):
+    for candidate in candidates:
+        shared = set(map(tuple, candidate.model.tolist())) & set(map(tuple, candidate.clean.tolist()))
+        assert not shared
+
+
+def test_each_cause_changes_what_it_should_and_nothing_else(candidates):
+    candidate = candidates[0]
+    clean, noisy, cropped = (candidate.observed(causes) for causes in ((), (0,), (2,)))
+    assert np.array_equal(candidate.observed((1,)), clean)  # a pose error changes no point
+    assert np.array_equal(cropped, clean[candidate.kept])
+    assert np.array_equal(candidate.observed((0, 2)), noisy[candidate.kept])
+    assert len(noisy) == len(clean)
+    assert np.array_equal(candidate.start((0, 2)), np.eye(4))
+    assert np.array_equal(candidate.start((1,)), candidate.T_init)
+
+
+def test_noise_is_as_strong_as_it_says_and_outliers_are_few(candidates):
+    for candidate in candidates:
+        offset = np.abs(candidate.noisy - candidate.clean)
+        assert np.median(offset) == pytest.approx(0.6745 * candidate.severity["noise"], rel=0.5)
+        assert np.abs(candidate.noisy).max() < 0.5 + 6 * candidate.severity["noise"]
+
+
+def test_severities_of_what_is_not_applied_are_zero(subjects):
+    applied = np.array([False, True, False])
+    severity = draw_candidate(subjects[0].surface, applied, SETTINGS, np.random.default_rng(0)).severity
+    assert [name for name, value in severity.items() if value] == ["rotation_rad", "translation"]
+
+
+def test_every_subset_of_the_causes_is_drawn():
+    random = np.random.default_rng(0)
+    drawn = np.array([draw_applied(CauseSettings(present=0.25), random) for _ in range(2000)])
+    assert drawn.mean(axis=0) == pytest.approx(0.25, abs=0.04)
+    assert len(np.unique(drawn, axis=0)) == 8
+
+
+def test_a_small_cloud_is_divided_between_the_two(subjects):
+    candidate = draw_candidate(subjects[0].surface[:100], np.ones(3, bool), SETTINGS, np.random.default_rng(0))
+    assert (len(candidate.model), len(candidate.clean)) == (50, 50)
+    assert len(candidate.kept) >= 16

@@ -1,0 +1,72 @@
+from dataclasses import replace
+
+import pytest
+
+from gpca.causes.settings import CauseSettings, Limits, Shares
+from gpca.causes.subjects import measure_clean_pairs, split_by_object
+from gpca.errors import InputError
+
+SETTINGS = CauseSettings(points=(128, 192), clean_pairs=20)
+
+
+def names(subjects):
+    return [subject.name for subject in subjects]
+
+
+def test_no_object_is_in_both_splits_and_seeds_differ(subjects):
+    splits = [split_by_object(subjects, "four", seed, SETTINGS) for seed in range(100, 108)]
+    for split in splits:
+        assert sorted(names(split["train"]) + names(split["test"])) == sorted(names(subjects))
+        assert len(split["test"]) == 1  # 0.3 of four
+    assert len({names(split["test"])[0] for split in splits}) > 1
+
+
+def test_views_of_one_instance_stay_together(subjects):
+    views = [replace(subjects[0], name=f"mug_{i}_1_{view}") for i in range(4) for view in range(5)]
+    for seed in range(100, 105):
+        split = split_by_object(views, "views", seed, SETTINGS)
+        instances = [{name.rsplit("_", 2)[0] for name in names(part)} for part in split.values()]
+        assert not instances[0] & instances[1]
+        assert len(split["test"]) == 5
+
+
+@pytest.mark.parametrize("share", [0.001, 0.999])
+def test_each_split_has_an_object(subjects, share):
+    split = split_by_object(subjects, "four", 100, replace(SETTINGS, test_objects=share))
+    assert split["train"]
+    assert split["test"]
+
+
+def test_one_object_cannot_be_split(subjects):
+    views = [replace(subjects[0], name=f"mug_1_1_{view}") for view in range(5)]
+    for too_few in (subjects[:1], views):
+        message = r"causes of one: 1 object\(s\) cannot be split into .*; give at least 2 objects"
+        with pytest.raises(InputError, match=message):
+            split_by_object(too_few, "one", 100, SETTINGS)
+
+
+def test_the_limit_of_the_uncertainty_is_a_quantile_of_clean_pairs(subjects):
+    left, limit = measure_clean_pairs(subjects, "four", 100, SETTINGS)
+    assert left == subjects
+    _, lower = measure_clean_pairs(subjects, "four", 100, replace(SETTINGS, limits=Limits(clean=0.5)))
+    assert 0 < lower < limit
+    assert measure_clean_pairs(subjects, "four", 100, SETTINGS)[1] == limit
+
+
+def test_objects_whose_clean_pairs_are_off_are_left_out_by_name(subjects, capsys):
+    wrong = replace(subjects[1], errors=lambda T_n: subjects[1].errors(T_n) + 0.1)
+    left, _ = measure_clean_pairs([*subjects[:1], wrong, *subjects[2:]], "four", 100, SETTINGS)
+    assert names(left) == [name for name in names(subjects) if name != wrong.name]
+    said = capsys.readouterr().err
+    assert "causes of four: object '019_pitcher_base' is left out: 5 of 5 clean pairs are off by 2 % of the d" in said
+
+
+def test_they_stay_where_that_kind_is_asked_for(subjects, capsys):
+    wrong = [replace(subject, errors=lambda T_n: T_n[:, 0, 0] * 0 + 0.1) for subject in subjects]
+    asked = replace(SETTINGS, shares=Shares(nominal=0.1, geometry=0.2))
+    assert measure_clean_pairs(wrong, "four", 100, asked)[0] == wrong
+    with pytest.raises(
+        InputError, match=r"of every object nearly all clean pairs are off by 2 % .*; raise causes.limits.nomi"
+    ):
+        measure_clean_pairs(wrong, "four", 100, SETTINGS)
+    assert len(capsys.readouterr().err.splitlines()) == len(wrong)

@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+
+from gpca.causes.truth import Truth, joined
+
+LIMITS = {"nominal_limit": 0.02, "failed_limit": 0.03, "cause_limit": 0.01, "uncertainty_limit": 5.0}
+
+
+def truth(*errors, u=0.0):
+    """Of samples whose errors are given for all eight subsets, or for none and all."""
+    rows = [row if len(row) == 8 else (row[0],) * 7 + row[1:] for row in errors]
+    return Truth(np.array(rows), np.full((len(rows), 8), u) * (np.arange(8) > 0), **LIMITS)
+
+
+def additive(none, *parts):
+    return tuple(none + sum(part for i, part in enumerate(parts) if subset >> i & 1) for subset in range(8))
+
+
+def test_states_follow_the_limits():
+    found = truth((0.01, 0.0199), (0.01, 0.02), (0.01, 0.03), (0.01, 0.0301), (0.01, 0.5))
+    assert found.state.tolist() == ["nominal", "borderline", "borderline", "failed", "failed"]
+
+
+def test_what_is_right_but_more_uncertain_than_clean_pairs_is_borderline():
+    assert truth((0.01, 0.01), u=5.0).state.tolist() == ["nominal"]
+    assert truth((0.01, 0.01), u=5.1).state.tolist() == ["borderline"]
+    assert truth((0.01, 0.2), u=0.0).state.tolist() == ["failed"]  # certain of the wrong pose
+
+
+def test_the_dominant_cause_adds_most_and_the_causes_more_than_their_limit():
+    found = truth(additive(0.01, 0.02, 0.2, 0.005), additive(0.01, 0, 0, 0.1))
+    assert found.phi == pytest.approx(np.array([[0.02, 0.2, 0.005], [0, 0, 0.1]]))
+    assert found.dominant.tolist() == ["pose", "overlap"]
+    assert found.causes.tolist() == [[True, True, False], [False, False, True]]
+
+
+def test_what_is_off_when_clean_is_geometry_where_that_is_more_than_any_cause_adds():
+    found = truth(additive(0.05, 0.01, 0, 0), additive(0.05, 0.2, 0, 0), additive(0.019, 0, 0, 0))
+    assert found.geometry.tolist() == [True, True, False]
+    assert found.dominant.tolist()[:2] == ["geometry", "noise"]
+
+
+def test_a_cause_that_helps_has_a_negative_part():
+    found = truth(additive(0.01, -0.005, 0.1, 0))
+    assert found.phi[0, 0] == pytest.approx(-0.005)
+    assert found.causes.tolist() == [[False, True, False]]
+
+
+def test_the_uncertainty_is_attributed_alike():
+    found = truth((0.0, 0.1), u=3.0)
+    assert found.phi_uncertainty.sum() == pytest.approx(3.0)
+
+
+def test_truths_are_joined_and_chosen_from():
+    both = joined([truth((0.0, 0.1)), truth((0.0, 0.2), (0.0, 0.3))])
+    assert both.error[:, -1].tolist() == [0.1, 0.2, 0.3]
+    assert both.subset(np.array([2, 0])).error[:, -1].tolist() == [0.3, 0.1]
+    assert len(both) == 3

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from gpca.causes.replay import replay
+from gpca.causes.settings import CauseSettings
+from gpca.causes.shapley import ALL
+from gpca.causes.truth import FAILED
+from gpca.errors import InputError
+from gpca.objects.canonical import write_objects
+from gpca.objects.procedural import surfaces
+from gpca.reporting.figures.causes_example import choose_sample, draw_causes_example
+
+from ...conftest import FEW_CAUSES, FOUR
+from ...diagnosis.files import write_run
+
+SETTINGS = FEW_CAUSES | {"points": list(FEW_CAUSES["points"]), "icp": {}}
+
+
+def test_a_sample_is_drawn_again_where_it_lay(four, causes):
+    row = choose_sample(causes, "causes.npz")
+    again = replay(four, causes, row, "four", 100, CauseSettings(**FEW_CAUSES))
+    assert again.observed[ALL] == pytest.approx(causes.registrations.cloud(row), abs=1e-5)
+    assert np.array_equal(again.model.astype(np.float32), causes.registrations.target(row))
+    with pytest.raises(InputError, match="is not drawn again by these settings"):
+        replay(four, causes, row, "four", 101, CauseSettings(**FEW_CAUSES))
+
+
+def test_the_sample_shown_failed_by_as_many_causes_as_any(causes):
+    row = choose_sample(causes, "causes.npz")
+    failed = causes.rows("test")[causes.truth.state[causes.rows("test")] == FAILED]
+    assert row in failed
+    assert causes.truth.causes[row].sum() == causes.truth.causes[failed].sum(axis=1).max()
+    with pytest.raises(InputError, match="holds no failed test sample"):
+        choose_sample(causes.subset(causes.rows("train")), "causes.npz")
+
+
+def test_the_figure_is_the_same_bytes_each_time(causes, tmp_path):
+    predictions, [truth] = write_run(tmp_path, causes)
+    objects = tmp_path / "four.npz"
+    write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", objects, n_points=6000)
+    drawn = []
+    for name in ("one", "two"):
+        files = [tmp_path / f"{name}.{suffix}" for suffix in ("pdf", "png")]
+        draw_causes_example(objects, truth, predictions, SETTINGS, {"right": "Right"}, "Four", *files)
+        drawn.append([path.read_bytes() for path in files])
+    assert drawn[0] == drawn[1]

@@ -1,0 +1,52 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.diagnosis.intervals import COLUMNS
+from gpca.diagnosis.judged import CEILING, POOLED
+from gpca.errors import InputError
+from gpca.reporting.tables.causes import table9_causes
+
+SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}
+EXPLAINERS = {"good": "Good", "poor": "Poor", "gate": "Gate"}
+
+
+def rows(source, method, rival, **values):
+    return [
+        (source, method, metric, 300, 5, value, value - 0.1, value + 0.05, rival, 0.2, 0.15, 0.3)
+        for metric, value in values.items()
+    ]
+
+
+@pytest.fixture
+def intervals():
+    found = []
+    for source in ("ycb", POOLED):
+        found += rows(source, CEILING, "", balanced_accuracy=0.95, auroc_failed=0.99)
+        found += rows(source, "good", "poor", balanced_accuracy=0.8, auroc_failed=0.9, false_alarm_rate=0.1)
+        found += rows(source, "poor", "good", balanced_accuracy=0.6, auroc_failed=0.7, false_alarm_rate=0.4)
+        found += rows(source, "gate", "good", auroc_failed=0.75, false_alarm_rate=0.3)
+    frame = pd.DataFrame(found, columns=list(COLUMNS))
+    without = frame["method"] == CEILING
+    frame.loc[without, ["difference", "difference_low", "difference_high"]] = np.nan
+    return frame
+
+
+def test_the_best_rival_is_bold_and_the_ceiling_is_none(intervals):
+    table = table9_causes(intervals, SOURCES, EXPLAINERS)
+    text = table.markdown()
+    assert "| YCB (procedural stand-in) | Good | **80.0 ± 7.5** | 20.0 ± 7.5 |" in text
+    assert "| All together | Truth from other starts (ceiling) | 95.0 ± 7.5 | – |" in text
+    assert "**10.0 ± 7.5**" in text and "**40.0 ± 7.5**" not in text  # the fewest false alarms
+    assert "Gate | – | – | – | 30.0 ± 7.5 | 0.750 ± 0.075 |" in text
+
+
+def test_the_bounds_in_the_csv_are_those_of_the_bootstrap(intervals):
+    table = table9_causes(intervals, SOURCES, EXPLAINERS)
+    [record] = [r for r in table.records() if r[:3] == ("ycb", "good", "balanced_accuracy")]
+    assert record[3:6] == pytest.approx((80, 70, 85))
+
+
+def test_intervals_of_other_explainers_make_no_table(intervals):
+    with pytest.raises(InputError, match="hold no diagnosis for table9_causes"):
+        table9_causes(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS)

@@ -1,0 +1,75 @@
+"""The step ``causes`` by hand: the same bytes whatever the threads, and what it says of faulty files and settings."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from gpca.code_files import ROOT
+
+from ..hostile import refusal
+from .command_lines import arguments, arrays_changed, settings, truncated, untouched
+
+
+def one_object(folder):
+    with np.load(folder / "objects.npz") as archive:
+        arrays = dict(archive)
+    rows = slice(0, arrays["offsets"][1])
+    chosen = {name: arrays[name][:1] for name in ("names", "diameters_m")}
+    chosen |= {name: arrays[name][rows] for name in ("points_m", "normals")} | {"offsets": arrays["offsets"][:2]}
+    np.savez(folder / "objects.npz", **chosen)
+
+
+TIGHT = {"nominal": 1e-6, "failed": 0.06}
+FAULTS = [
+    (untouched, {"--objects": "nowhere.npz"}, "nowhere.npz: no such file; make it with"),
+    (truncated("objects.npz"), {}, "objects.npz: is not a readable npz archive"),
+    (arrays_changed("objects.npz", points_m=lambda points: points * np.nan), {}, "array 'points_m' holds NaN"),
+    (one_object, {}, "causes of tiny: 1 object(s) cannot be split"),
+    (untouched, settings("causes", trian=9), "setting trian: unknown; did you mean train?"),
+    (untouched, settings("causes", icp_points=64), "setting icp_points: unknown"),
+    (untouched, settings("causes", icp={"max_iterations": 0}), "setting max_iterations: 0 is less"),
+    (untouched, settings("causes", icp={"method": "generalized"}), "the target has no normals; use point_to_point"),
+    (untouched, settings("causes", points=[128, 64]), "causes points: [128, 64] runs downwards"),
+    (untouched, settings("causes", shares={"nominal": 1.0}), "causes shares: they add up to 1.7"),
+    (untouched, settings("causes", starts=12), "setting starts: 12 is less than the minimum of 13"),
+    (untouched, {"--candidates": "causes.npz", "--out": "causes.npz"}, "causes.npz"),
+]
+
+
+@pytest.mark.parametrize("fault", range(len(FAULTS)))
+def test_a_fault_is_one_line_and_harms_nothing(folder, fault):
+    spoil, changes, words = FAULTS[fault]
+    spoil(folder)
+    refusal(arguments("causes", changes), folder, words)
+
+
+def test_states_that_cannot_be_filled_end_with_what_to_widen(folder):
+    changes = settings("causes", severities={"rotation_deg": [0, 0], "translation": [0, 0.001]}, candidates=1)
+    line = refusal(
+        arguments("causes", changes),
+        folder,
+        "12 candidates gave 0 of 5",
+        "failed by pose alone; raise causes.severities",
+    )
+    assert "raise causes.severities.rotation_deg or causes.severities.translation" in line
+
+
+def test_objects_that_fail_when_clean_are_named_and_the_last_is_a_refusal(folder):
+    command = [sys.executable, "-m", "gpca", *arguments("causes", settings("causes", limits=TIGHT))]
+    done = subprocess.run(
+        command, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    said = [line for line in done.stderr.splitlines() if "%|" not in line]
+    assert [line.split("'")[1] for line in said[:-1]] == ["brick", "cone"]
+    assert "of every object nearly all clean pairs are off by 0.0001 % of the diameter" in said[-1]
+
+
+def test_one_thread_or_two_give_the_same_bytes(folder, made):
+    command = [sys.executable, "-m", "gpca", *arguments("causes"), "--threads", "2"]
+    subprocess.run(command, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, check=True)
+    for name in ("causes.npz", "candidates.csv"):
+        assert (folder / name).read_bytes() == (made / name).read_bytes()

@@ -1,0 +1,49 @@
+"""The steps ``describe``, ``train_on_causes`` and ``diagnose`` by hand: what they say of faulty files and settings."""
+
+import pytest
+
+from gpca.attribution.predictions import read_predictions
+from gpca.causes.labels import LABELS
+
+from ..hostile import refusal
+from .command_lines import STEP_OPTIONS, arguments, arrays_changed, lines_kept, settings, truncated, untouched
+
+FAULTS = {
+    "describe": [
+        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
+        (truncated("causes.npz"), {}, "causes.npz: is not a readable npz archive"),
+        (arrays_changed("causes.npz", error=lambda v: v + 1), {}, "causes.npz: 'error' holds what cannot be"),
+        (untouched, settings("describe", restarts=0), "setting restarts: 0 is less than the minimum of 1"),
+        (untouched, settings("describe", restart=3), "setting restart: unknown; did you mean restarts?"),
+        (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not hold the seconds of these samples"),
+        (untouched, {"--out": "causes.npz"}, "causes.npz"),
+    ],
+    "train_on_causes": [
+        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
+        (untouched, settings("train_on_causes", epochs=0), "setting epochs: 0 is less than the minimum of 1"),
+        (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not hold the seconds of these samples"),
+        (untouched, {"--out": "causes.npz"}, "causes.npz"),
+    ],
+    "diagnose": [
+        (untouched, {"--explainer": "shap_oracle"}, "explainer 'shap_oracle': unknown; known are"),
+        (untouched, settings("diagnose", iteration=3), "setting iteration: unknown; did you mean iterations?"),
+        (untouched, {"--read": "registrations.npz"}, "registrations.npz: array"),
+        (arrays_changed("descriptors.npz", sample=lambda s: s[::-1]), {}, "descriptors.npz: holds other samples"),
+        (arrays_changed("descriptors.npz", motion=lambda m: m * float("nan")), {}, "array 'motion' holds NaN"),
+        (untouched, {"--explainer": "gpca", "--read": "descriptors.npz"}, "descriptors.npz: array 'h' is missing"),
+        (untouched, {"--predictions": "causes.npz"}, "causes.npz"),
+    ],
+}
+
+
+@pytest.mark.parametrize(("step", "fault"), [(step, i) for step in FAULTS for i in range(len(FAULTS[step]))])
+def test_a_fault_is_one_line_and_harms_nothing(folder, step, fault):
+    spoil, changes, words = FAULTS[step][fault]
+    spoil(folder)
+    refusal(arguments(step, changes), folder, words)
+
+
+def test_a_diagnosis_scores_nominal_and_the_causes_of_every_sample(made):
+    rows = read_predictions(made / STEP_OPTIONS["diagnose"]["--predictions"])
+    assert [name for name in rows.columns if name.startswith("score_")] == [f"score_{label}" for label in LABELS]
+    assert set(rows["split"]) == {"train", "test"}

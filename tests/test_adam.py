@@ -1,0 +1,39 @@
+"""Adam without its class: the same bits as torch's, and none of its compiler."""
+
+import subprocess
+import sys
+
+import pytest
+import torch
+
+from gpca.adam import Adam
+from gpca.code_files import ROOT
+
+
+def fitted(make, dtype):
+    torch.manual_seed(0)
+    weights = [torch.randn(5, 3, dtype=dtype, requires_grad=True), torch.randn(3, dtype=dtype, requires_grad=True)]
+    optimiser = make(weights)
+    for _ in range(25):
+        optimiser.zero_grad()
+        (weights[0] @ weights[1] - 1).square().sum().backward()
+        optimiser.step()
+    return weights
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_steps_are_those_of_torch_to_the_bit(dtype):
+    ours = fitted(lambda weights: Adam(weights, 0.1), dtype)
+    theirs = fitted(lambda weights: torch.optim.Adam(weights, lr=0.1), dtype)
+    assert all(torch.equal(*pair) for pair in zip(ours, theirs, strict=True))
+
+
+def test_a_classifier_is_fitted_without_torchs_compiler():
+    code = (
+        "import sys, numpy as np; from gpca.classifier.gpc import GPC, GPCSettings;"
+        "settings = GPCSettings(iterations=2, inducing=2, draws=4);"
+        "GPC(('a', 'b'), settings, 0).fit(np.arange(8.0).reshape(4, 2), np.array(['a', 'b'] * 2));"
+        "print('torch._dynamo' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"

@@ -1,0 +1,204 @@
+# Canonical clouds -> registrations whose causes of failure are measured -> what explainers say of them.
+DIAGNOSIS = config["diagnosis"]
+ICP = {"icp": config["registrations"]["icp"]}
+
+
+rule causes:
+    input:
+        collect("<results>/causes/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS),
+
+
+rule diagnoses:
+    input:
+        collect(
+            "<results>/diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
+            source=SOURCES,
+            cause_explainer=DIAGNOSIS["explainers"],
+            seed=SEEDS,
+        ),
+
+
+rule sample_causes:
+    input:
+        objects="<results>/objects/{source}.npz",
+        code=code_files("gpca.steps.causes"),
+    output:
+        causes="<results>/causes/{source}/seed{seed}.npz",
+        candidates="<results>/causes/{source}/seed{seed}.csv",
+        timings="<results>/timings/{source}/causes/seed{seed}.csv",
+    log:
+        "<logs>/causes/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/causes/{source}/seed{seed}.tsv"
+    wildcard_constraints:
+        source="|".join(SOURCES),
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        settings=as_json(config["causes"] | ICP),
+    shell:
+        "python -m gpca causes --threads {threads} --objects {input.objects} --source {wildcards.source} "
+        "--seed {wildcards.seed} --settings {params.settings:q} --out {output.causes} "
+        "--candidates {output.candidates} --timings {output.timings} 2> {log}"
+
+
+rule describe:
+    input:
+        causes="<results>/causes/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/causes/seed{seed}.csv",
+        code=code_files("gpca.steps.describe"),
+    output:
+        descriptors="<results>/descriptors/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/descriptors/seed{seed}.csv",
+    log:
+        "<logs>/descriptors/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/descriptors/{source}/seed{seed}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        settings=as_json(DIAGNOSIS["descriptors"] | ICP),
+    shell:
+        "python -m gpca describe --threads {threads} --causes {input.causes} --causes-timings {input.timings} "
+        "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
+        "--out {output.descriptors} --timings {output.timings} 2> {log}"
+
+
+rule train_on_causes:
+    input:
+        causes="<results>/causes/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/causes/seed{seed}.csv",
+        code=code_files(
+            "gpca.steps.train_on_causes", backbone_module(DIAGNOSIS["encoder"])
+        ),
+    output:
+        weights="<results>/cause_encoders/{source}/seed{seed}.pt",
+        curve="<results>/cause_encoders/{source}/seed{seed}.csv",
+        embeddings="<results>/cause_embeddings/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/cause_embeddings/seed{seed}.csv",
+    log:
+        "<logs>/cause_encoders/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/cause_encoders/{source}/seed{seed}.tsv"
+    priority: 10
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(DIAGNOSIS["encoder"]),
+    shell:
+        "python -m gpca train_on_causes --threads {threads} --causes {input.causes} "
+        "--causes-timings {input.timings} --source {wildcards.source} --seed {wildcards.seed} "
+        "--settings {params.settings:q} --weights {output.weights} --curve {output.curve} "
+        "--out {output.embeddings} --timings {output.timings} 2> {log}"
+
+
+rule diagnose:
+    input:
+        causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
+        read=lambda wildcards: collect(
+            f"<results>/{read_by(wildcards.cause_explainer)}/{wildcards.source}/seed{{seed}}.npz",
+            seed=SEEDS,
+        ),
+        timings=lambda wildcards: collect(
+            f"<results>/timings/{wildcards.source}/{read_by(wildcards.cause_explainer)}/seed{{seed}}.csv",
+            seed=SEEDS,
+        ),
+        code=lambda wildcards: code_files(
+            "gpca.steps.diagnose", explainer_module(wildcards.cause_explainer, CAUSES)
+        ),
+    output:
+        predictions=collect(
+            "<results>/diagnoses/{{source}}/{{cause_explainer}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/diagnoses_{{cause_explainer}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/diagnoses/{source}/{cause_explainer}.log",
+    benchmark:
+        "<benchmarks>/diagnoses/{source}/{cause_explainer}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        settings=lambda wildcards: as_json(
+            DIAGNOSIS["explainers"][wildcards.cause_explainer] or {}
+        ),
+        seeds=SEEDS,
+    shell:
+        "python -m gpca diagnose --threads {threads} --explainer {wildcards.cause_explainer} "
+        "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
+        "--causes {input.causes} --read {input.read} --read-timings {input.timings} "
+        "--predictions {output.predictions} --timings {output.timings} 2> {log}"
+
+
+rule cause_metrics:
+    input:
+        prediction_files=collect(
+            "<results>/diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
+            source=SOURCES,
+            cause_explainer=DIAGNOSIS["explainers"],
+            seed=SEEDS,
+        ),
+        causes_files=collect(
+            "<results>/causes/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS
+        ),
+        code=collector_code("gpca.diagnosis.metrics:collect"),
+    output:
+        "<results>/causes.csv",
+    log:
+        "<logs>/causes.log",
+    benchmark:
+        "<benchmarks>/causes.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        collector="gpca.diagnosis.metrics:collect",
+    script:
+        "../scripts/collect.py"
+
+
+rule cause_intervals:
+    input:
+        prediction_files=rules.cause_metrics.input.prediction_files,
+        causes_files=rules.cause_metrics.input.causes_files,
+        code=collector_code("gpca.diagnosis.intervals:collect"),
+    output:
+        "<results>/cause_intervals.csv",
+    log:
+        "<logs>/cause_intervals.log",
+    benchmark:
+        "<benchmarks>/cause_intervals.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        collector="gpca.diagnosis.intervals:collect",
+    script:
+        "../scripts/collect.py"
