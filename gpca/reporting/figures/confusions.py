@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, read_metrics
+from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
 from gpca.reporting.figures.style import (
     CONCEPT_COLOURS,
@@ -25,6 +26,7 @@ from gpca.reporting.figures.style import (
 if TYPE_CHECKING:
     import pandas as pd
 
+WIDEST_KEY = 3  # concepts fit into a line over the names of the explainers
 LABEL_IN = 1.45  # The explainers' titles are this wide.
 HEAD_IN = 0.62
 ROW_IN = 0.53
@@ -127,13 +129,18 @@ def _wrapped(title: str, width_in: float, size_pt: float) -> str:
 def _key(confusion: pd.DataFrame) -> str:
     concepts = list(confusion.columns[:-1])
     named = [f"{letter} {concept}" for letter, concept in zip(letters(concepts), concepts, strict=True)]
-    return f"{', '.join(named)}\n– abstained\nmatrix: true (rows), predicted\nbars: predicted (dash: true)"
+    if len(named) > WIDEST_KEY:
+        names = f"{', '.join(named[:2])},\n{', '.join([*named[2:], '– abstained'])}"
+    else:
+        names = f"{', '.join(named)}\n– abstained"
+    return f"{names}\nmatrix: true (rows), predicted\nbars: predicted (dash: true)"
 
 
 def letters(concepts: list[str]) -> list[str]:
-    """Return the shortest capitalised beginnings that tell the concepts apart."""
-    length = next(n for n in range(1, 99) if len({concept[:n] for concept in concepts}) == len(set(concepts)))
-    return [concept[:length].capitalize() for concept in concepts]
+    """Return the shortest capitalised beginnings that tell the concepts apart; what is nominal is OK."""
+    others = {concept for concept in concepts if concept != NOMINAL}
+    length = next(n for n in range(1, 99) if len({concept[:n] for concept in others}) == len(others))
+    return ["OK" if concept == NOMINAL else concept[:length].capitalize() for concept in concepts]
 
 
 def draw_matrix(axes, confusion: pd.DataFrame, head: bool) -> None:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.pose_error import adds_error
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.predictions import concepts_of, read_predictions
-from gpca.causes.settings import Limits
+from gpca.causes.truth import FAILED
 from gpca.csv_file import numbers
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations, load_embeddings
@@ -20,11 +19,10 @@ from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.concepts import severity_text
 from gpca.reporting.figures.frame_views import draw_scores
 from gpca.reporting.figures.style import GREY, SMALL_PT, blues
+from gpca.reporting.pose_state import registration_error, state_of_error
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FAILED = Limits().failed
 
 
 @dataclass(frozen=True)
@@ -68,15 +66,14 @@ class Stages:
             raise InputError(path, f"holds no test sample of '{concept}'", "raise registrations.test")
         right = test[test["concept_predicted"] == concept]
         kept = test if right.empty else right
-        failed = kept[[self.error(row) > FAILED for row in kept.index]]
+        failed = kept[[state_of_error(self.error(row)) == FAILED for row in kept.index]]
         worst = kept.assign(fit=self.registrations.fitness[kept.index]).nsmallest((len(kept) + 1) // 2, "fit")
         ranked = (worst if failed.empty else failed).sort_values([f"score_{concept}", "sample"], kind="stable")
         return int(ranked.index[(len(ranked) - 1) // 2])
 
     def error(self, row: int) -> float:
-        """Return the ADD-S of a row's pose after ICP in diameters; of points so sparse it is about 0.01 at best."""
-        T_icp, T_true = (self.registrations.T_target_source(which, row) for which in ("icp", "true"))
-        return adds_error(transform(inverse(T_true), self.registrations.target(row)), T_icp, T_true)
+        """Return how far off a row is after ICP, in diameters."""
+        return registration_error(self.registrations, row)
 
     def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:
         """Return target and source (·, 3) of a row, the source where the pose ``init`` or ``icp`` puts it."""
@@ -100,7 +97,7 @@ class Stages:
         if which == "init":
             return severity_text(self.registrations, row, str(self.registrations.concept[row]))
         error = self.error(row)
-        return f"{'failed' if error > FAILED else 'right'}, ADD-S {100 * error:.1f} % $d$"
+        return f"{state_of_error(error)}, ADD-S {100 * error:.1f} % $d$"
 
 
 def draw_embedding(axes, h_d: np.ndarray) -> None:

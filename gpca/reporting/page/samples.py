@@ -14,6 +14,7 @@ from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import thinned
+from gpca.reporting.pose_state import registration_error, state_of_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,8 @@ def page_samples(registrations_npz: str | Path, predictions_csv: str | Path, sou
 
     Each holds the target and the ICP-aligned source as flat lists x, y, z of at most `POINTS` points each, in
     thousandths of the object's diameter, and the 4×4 transforms (row by row, in diameters) that take the aligned source
-    to its initial and to its true pose; object, concept, severity, scores, standard deviations, fitness.
+    to its initial and to its true pose; object, concept, severity, scores, standard deviations, fitness, and how far
+    off ICP ends (ADD-S in % of the diameter) with the state that this is called.
 
     Args:
         registrations_npz, predictions_csv: The files of one source and seed.
@@ -75,12 +77,15 @@ def severity_words(registrations: Registrations, row: int) -> str:
 
 def _sample(registrations: Registrations, row: int, prediction: pd.Series, concepts: list[str]) -> dict:
     T_icp_target = inverse(registrations.T_target_source("icp", row))
+    error = registration_error(registrations, row)
     return {
         "object": str(registrations.object_name[row]),
         "sample": int(registrations.sample[row]),
         "concept": str(registrations.concept[row]),
         "severity": severity_words(registrations, row),
         "fitness": _number(registrations.fitness[row]),
+        "error_percent": _number(100 * error),
+        "state": state_of_error(error),
         "predicted": str(prediction["concept_predicted"]),
         "scores": [
             {

@@ -78,7 +78,7 @@ def test_bars_are_the_shares_of_all_samples_and_dashes_the_truth():
 
 def test_letters_tell_concepts_apart():
     assert letters(["noise", "pose", "overlap"]) == ["N", "P", "O"]
-    assert letters(["noise", "nominal", "pose"]) == ["Noi", "Nom", "Pos"]
+    assert letters(["pose", "position", "noise"]) == ["Pose", "Posi", "Nois"]
 
 
 def test_the_same_metrics_give_the_same_bytes(metrics_csv, tmp_path):
@@ -117,3 +117,7 @@ def test_metrics_without_these_confusions_are_refused(metrics_csv, tmp_path):
     with pytest.raises(InputError, match="no such file"):
         draw_confusions_figure(tmp_path / "none.csv", SOURCES, EXPLAINERS, tmp_path / "a.pdf", tmp_path / "a.png")
     assert not (tmp_path / "a.pdf").exists()
+
+
+def test_nominal_is_ok_and_the_others_keep_their_letter():
+    assert letters(["nominal", "noise", "pose", "overlap"]) == ["OK", "N", "P", "O"]

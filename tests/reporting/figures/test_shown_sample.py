@@ -26,7 +26,7 @@ def test_where_none_failed_the_fit_is_a_poor_one(stages, stage_files, monkeypatc
     row = stages.choose("pose", stage_files[0])
     test = stages.predictions[(stages.predictions["split"] == "test") & (stages.predictions["concept_true"] == "pose")]
     assert stages.registrations.fitness[row] <= np.median(stages.registrations.fitness[test.index])
-    assert stages.words(row, "icp") == "right, ADD-S 1.2 % $d$"
+    assert stages.words(row, "icp") == "nominal, ADD-S 1.2 % $d$"
 
 
 def test_a_concept_without_test_samples_is_refused(stages, stage_files):

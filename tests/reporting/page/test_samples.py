@@ -96,3 +96,14 @@ def test_predictions_of_other_samples_are_refused(files):
     rows[rows["split"] == "train"].to_csv(files[1], index=False)
     with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; make both anew"):
         page_samples(*files, SOURCE)
+
+
+def test_the_page_says_how_far_off_icp_ends(samples, registrations):
+    for sample, row in zip(samples, first_of_each_concept(registrations), strict=True):
+        target = registrations.target(row).astype(float)
+        T_off = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("true", row))
+        off = np.linalg.norm(transform(T_off, target) - target, axis=1).mean()
+        assert 0 <= sample["error_percent"] <= 100 * off + 1e-3  # ADD-S is never above ADD
+        assert sample["state"] == ("nominal" if sample["error_percent"] < 2 else "failed" if sample["error_percent"] > 3
+                                   else "borderline")  # fmt: skip
+    assert len({sample["state"] for sample in samples}) > 1

@@ -114,7 +114,8 @@ function showRegistrations() {
       said,
       ...rows,
       element("p", "footnote", `Mean of the posterior draws ± their standard deviation; the true cause is bold. `
-        + `ICP's fitness is ${sample.fitness}.`),
+        + `ICP ends ${sample.error_percent.toFixed(1)} % of the diameter off (ADD-S: ${sample.state}); `
+        + `its fitness is ${sample.fitness}.`),
     );
   }
 
