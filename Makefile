@@ -94,7 +94,7 @@ lock: ## renew environment.lock from what pyproject.toml names, in a fresh envir
 	@$(choose_python)
 	rm -rf build/lock
 	$$python -m venv build/lock
-	build/lock/bin/python $(INSTALL) '.[workflow,dev]'
+	build/lock/bin/python $(INSTALL) '.[workflow,methods,dev]'
 	# The suite itself is no package of the lock. The build of torch is the user's choice: neither its local version nor its CUDA packages belong into the lock.
 	build/lock/bin/python -m pip freeze --all --exclude pip --exclude wheel --exclude gpca-bench \
 	    | sed -E -e '/^(nvidia|cuda|triton)/Id' -e 's/\+[A-Za-z0-9.]+$$//' > build/lock/packages

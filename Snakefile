@@ -33,21 +33,13 @@ pathvars:
     benchmarks=f"results/{config['run']}/benchmarks",
 
 
-include: "workflow/rules/common.smk"
-include: "workflow/rules/objects.smk"
-include: "workflow/rules/registrations.smk"
-include: "workflow/rules/causes.smk"
-include: "workflow/rules/frames.smk"
-include: "workflow/rules/encoders.smk"
-include: "workflow/rules/uncertainty.smk"
-include: "workflow/rules/explainers.smk"
-include: "workflow/rules/active_learning.smk"
-include: "workflow/rules/diagnostics.smk"
-include: "workflow/rules/model.smk"
-include: "workflow/rules/recovery.smk"
-include: "workflow/rules/results.smk"
-include: "workflow/rules/comparison.smk"
-include: "workflow/rules/targets.smk"
+STAGES = (
+    "common objects registrations methods causes frames encoders uncertainty explainers active_learning diagnostics "
+    "model recovery results comparison targets"
+)
+for stage in STAGES.split():
+
+    include: f"workflow/rules/{stage}.smk"
 
 
 rule all:

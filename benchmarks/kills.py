@@ -24,7 +24,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 MEASURED = ("timings", "timings.csv", "benchmarks", "logs", "page", "index.html")
-DRAWN_FROM_IT = ("runtime", "table1_extended", "table7_runtime", "table8_recovery", "comparison")  # and show seconds
+DRAWN_FROM_IT = (  # and show seconds
+    *("runtime", "table1_extended", "table7_runtime", "table8_recovery", "table11_registration", "comparison"),
+)
 
 
 def main(arguments: list[str] | None = None) -> int:

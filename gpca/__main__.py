@@ -20,6 +20,7 @@ STEPS = {
     "scenes": "settings -> table-top scenes of procedural objects, seen by a virtual depth camera",
     "instances": "depth frames with masks and poses -> partial clouds with initial poses",
     "frame_registrations": "partial clouds -> perturbed ones aligned by ICP",
+    "register_methods": "registrations -> their test pairs registered by every method, and how far each is off",
     "train": "registrations -> encoder weights",
     "embed": "registrations and encoder -> embeddings",
     "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",

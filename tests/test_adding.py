@@ -133,6 +133,27 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     assert (tmp_path / "table.md").read_text().count("| BALD, density-weighted |") == 1
 
 
+def test_a_registration_method(config, added_modules, objects):
+    from gpca.alignment.methods.interface import Pair
+    from gpca.alignment.methods.registry import method_module, methods
+    from gpca.alignment.pose_error import adds_error
+    from gpca.alignment.rigid import inverse, transform
+    from gpca.alignment.twist import exp
+
+    added_modules("gpca/alignment/methods/principal_axes.py")
+    assert methods()["principal_axes"].title == "Principal axes"
+    assert method_module("principal_axes") == "gpca.alignment.methods.principal_axes"
+    update_config(config, yaml.safe_load(block("config/config.yaml", "principal_axes")))
+    check(config)
+    points = objects.points(0).astype(float) / objects.diameters_m[0]  # of a brick
+    T_true = exp(np.array([[1.0, -2.0, 0.5, 0.3, 0.2, -0.4]]))[0]
+    names = {"pair": Pair(transform(inverse(T_true), points[:300]), points[300:])}
+    exec(block("align.py"), names)
+    errors = [adds_error(names["pair"].source, names[name].T_target_source, T_true) for name in ("coarse", "fine")]
+    assert errors[1] < errors[0] < 0.1
+    assert names["fine"].converged
+
+
 def test_a_recovery_action_passes_the_check(config, monkeypatch):
     from gpca.recovery import actions
 

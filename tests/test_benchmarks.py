@@ -238,6 +238,22 @@ def test_latency_compares_explanations_of_equal_scores(capsys):
     assert "one explanation, 64 points, 400 posterior draws, 1 thread(s)" in out
 
 
+def test_registration_ends_with_the_numbers_of_each_method(capsys):
+    from benchmarks import registration
+
+    tiny = ["--samples", "6", "--points", "64", "--repeats", "1"]
+    registration.main([*tiny, "--methods", "point_to_point", "huber", "teaser", "kiss_matcher"])
+    out = capsys.readouterr().out
+    result = last_line(out)
+    measured = ["point_to_point", "huber", "teaser"]
+    if "kiss_matcher            left out: the package kiss_matcher is not installed" not in out:
+        measured.append("kiss_matcher")
+    names = [f"{number}_{name}" for name in measured for number in ("ms", "ratio")]
+    assert list(result) == ["reference_ms", "normals_ms", *names]
+    assert min(result.values()) > 0
+    assert "6 pairs of up to 64 points" in out
+
+
 def test_gpc_compares_equal_fits_and_ends_with_its_numbers(capsys):
     from benchmarks import gpc
 

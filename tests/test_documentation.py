@@ -137,6 +137,14 @@ def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeyp
     assert set(capsys.readouterr().out.split()) & {"nominal", "failed", "noise", "pose", "overlap"}
 
 
+def test_the_python_of_the_page_of_registration_methods_runs(registrations, capsys):
+    page = (ROOT / "docs/registration.md").read_text()
+    [example] = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
+    exec(example, clouds | {"T_target_source_init": np.eye(4)})
+    assert capsys.readouterr().out.startswith("True ")
+
+
 def test_every_page_of_the_docs_is_in_the_index():
     index = (ROOT / "docs/README.md").read_text()
     pages = {path.name for path in (ROOT / "docs").glob("*.md")} - {"README.md"}
@@ -151,6 +159,7 @@ def test_every_page_of_the_docs_is_in_the_index():
         ("diagnostics", 7),
         ("explain", 3),
         ("comparison", 14),
+        ("registration", 4),
         ("active_learning", 15),
         ("real_world", 5),
         ("causes", 20),
@@ -178,6 +187,12 @@ def test_every_configured_explainer_of_causes_is_described():
     explainers = yaml.safe_load((ROOT / "config/config.yaml").read_text())["diagnosis"]["explainers"]
     page = (ROOT / "docs/causes.md").read_text()
     assert [name for name in explainers if f"`{name}`" not in page] == []
+
+
+def test_every_configured_registration_method_is_described():
+    methods = yaml.safe_load((ROOT / "config/config.yaml").read_text())["methods"]
+    page = (ROOT / "docs/registration.md").read_text()
+    assert [name for name in methods if f"`{name}`" not in page] == []
 
 
 def test_every_configured_learner_is_described():

@@ -10,11 +10,16 @@ import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from gpca.alignment.methods.registry import methods
+
 from .documents import ROOT
 
 ROOMS = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "gpca").iterdir() if path.is_dir())
 LIBRARY = ("baselines", *(room for room in ROOMS if room != "gpca/reporting"))  # what steps import, and `gpca explain`
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+EXTRAS = ("workflow", "methods", "dev")
+# Imported by their names, and only where they are installed; nothing else is missing without them.
+OPTIONAL = {canonicalize_name(entry.package) for entry in methods().values() if entry.package}
 # Modules that are not called as their packages are.
 CALLED = {
     "PIL": "pillow",
@@ -47,19 +52,28 @@ def pinned():
 def test_the_lock_pins_every_package_and_no_build():
     assert all(line.count("==") == 1 and "+" not in line and "@" not in line for line in lock())
     assert not [line for line in lock() if line.lower().startswith(("nvidia", "cuda", "triton"))]
-    for requirement in requirements("workflow", "dev"):
+    for requirement in requirements(*EXTRAS):
         assert requirement.specifier.contains(pinned()[canonicalize_name(requirement.name)]), requirement
 
 
+def required_by(package):
+    """What a package names; an optional one that is not installed here, nothing."""
+    try:
+        return importlib.metadata.requires(package) or ()
+    except importlib.metadata.PackageNotFoundError:
+        assert package in OPTIONAL
+        return ()
+
+
 def test_the_lock_holds_nothing_that_nothing_needs():
-    needed, open_requirements = set(), requirements("workflow", "dev")
+    needed, open_requirements = set(), requirements(*EXTRAS)
     while open_requirements:
         requirement = open_requirements.pop()
         key = canonicalize_name(requirement.name), *sorted(requirement.extras)
         if key[0] not in pinned() or key in needed:
             continue
         needed.add(key)
-        for further in map(Requirement, importlib.metadata.requires(key[0]) or ()):
+        for further in map(Requirement, required_by(key[0])):
             extras = requirement.extras or {""}
             if further.marker is None or any(further.marker.evaluate({"extra": extra}) for extra in extras):
                 open_requirements.append(further)
@@ -92,8 +106,13 @@ def test_what_is_imported_is_named_where_it_is_needed(folders, lists):
 
 
 def test_what_is_named_is_imported_or_run():
-    named = {canonicalize_name(requirement.name) for requirement in requirements("workflow", "dev")}
-    assert named == imported("gpca", "baselines", "workflow", "benchmarks", "tests") | RUN
+    named = {canonicalize_name(requirement.name) for requirement in requirements(*EXTRAS)}
+    assert named == imported("gpca", "baselines", "workflow", "benchmarks", "tests") | RUN | OPTIONAL
+
+
+def test_what_is_optional_is_an_extra_of_its_own():
+    own = requirements("methods")[len(requirements()) :]
+    assert {canonicalize_name(requirement.name) for requirement in own} == OPTIONAL
 
 
 def test_the_conda_environment_of_the_rules_holds_the_lock():

@@ -35,9 +35,11 @@ class BatchedICP:
             self._icp = ICP(target, target_normals, settings)
 
     def register(
-        self, source: np.ndarray, T_target_source_init_n: np.ndarray
+        self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Align `source` (N, 3) from n initial poses (n, 4, 4).
+
+        Point-to-point runs may be given another limit of iterations than the settings'.
 
         Returns:
             T_target_source (n, 4, 4), fitness (n,), inlier RMSE (n,), as
@@ -51,7 +53,8 @@ class BatchedICP:
         if self._settings.method == "point_to_point":
             fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
             source = np.ascontiguousarray(source, np.float64)
-            align_all(source, self._target, poses_n, fitness_n, rmse_n, self._settings.max_iterations)
+            iterations = self._settings.max_iterations if max_iterations is None else max_iterations
+            align_all(source, self._target, poses_n, fitness_n, rmse_n, iterations)
             return poses_n, fitness_n, rmse_n
         runs = [self._icp.register(source, pose) for pose in poses_n]
         fitness_n, rmse_n = np.array([(run.fitness, run.inlier_rmse) for run in runs]).T

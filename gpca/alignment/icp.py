@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
@@ -49,9 +49,12 @@ class ICP:
         target: (P, 3) points, any unit; results come in the same unit.
         target_normals: (P, 3), needed by point-to-plane and generalized ICP.
         settings: the correspondence distance is in the unit of the points.
+        kernel: one of Open3D's robust kernels, for point-to-plane and generalized ICP.
     """
 
-    def __init__(self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings) -> None:
+    def __init__(
+        self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings, kernel: Any = None
+    ) -> None:
         from gpca.environment import require_open3d
 
         self._o3d = require_open3d()
@@ -64,7 +67,7 @@ class ICP:
             "point_to_point": registration.TransformationEstimationPointToPoint,
             "point_to_plane": registration.TransformationEstimationPointToPlane,
             "generalized": registration.TransformationEstimationForGeneralizedICP,
-        }[settings.method]()
+        }[settings.method](*([] if kernel is None else [kernel]))
         self._criteria = registration.ICPConvergenceCriteria(max_iteration=settings.max_iterations)
 
     def register(self, source: np.ndarray, T_target_source_init: np.ndarray) -> Registration:

@@ -19,6 +19,7 @@ TIMES = "*seconds*"
 # What kind a value is of, by its file and its metric or column; the first that fits.
 KINDS = (
     ("*", "*rho*", "correlation"),
+    ("*", "rotation_deg", "degrees"),
     *(("*", pattern, "nats") for pattern in ("*nll*", "*elbo*")),
     *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "delay", "calls", "parameters")),
     *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*")),

@@ -15,6 +15,7 @@ from gpca.config.checks.explainers import (
 )
 from gpca.config.checks.frames import check_real_world
 from gpca.config.checks.left_out import check_left_out
+from gpca.config.checks.methods import check_methods
 from gpca.config.checks.places import check_places
 from gpca.config.checks.recovery import check_recovery
 from gpca.config.checks.sources import check_named_sources, resolve_sources
@@ -66,6 +67,7 @@ def check(config: dict) -> dict[str, dict]:
     check_places(whole)
     check_registrations(whole)
     check_encoders(whole, encoders)
+    check_methods(whole, names_left_out(config, "methods"))
     check_explainers(whole, designs)
     check_diagnosis(whole)
     check_strategies(whole)

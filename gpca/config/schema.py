@@ -27,6 +27,7 @@ from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import SCHEMA, Bounds
+from gpca.trials.settings import PairSettings
 
 HEAD = "# Made from the settings classes by `python -m gpca.config.schema`: change these and make it anew.\n"
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
@@ -102,6 +103,8 @@ class Config:
         dict[str, Annotated[sections.Design, Keys(without=("icp",))]],
         Bounds(propertyNames={"enum": list(DESIGNS)}, required=["causal"]),
     ]
+    method_pairs: Annotated[PairSettings, COMPLETE]
+    methods: Annotated[dict[str, Settings], BY_NAME]
     causes: Annotated[CauseSettings, COMPLETE_CAUSES]
     diagnosis: Diagnosis
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]

@@ -118,6 +118,7 @@ class ReferenceTolerances:
     percent: NotNegative
     correlation: NotNegative
     nats: NotNegative
+    degrees: NotNegative
     count: NotNegative
 
 

@@ -17,6 +17,8 @@ import torch
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points, thin
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.attribution.scores import entropy
 from gpca.causes.truth import NOMINAL
@@ -26,7 +28,7 @@ from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.file import Model, model_path
 from gpca.objects.canonical import estimate_normals
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
-from gpca.seeds import generator
+from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
 
@@ -64,6 +66,7 @@ class Explainer:
         frame: CanonicalFrame | None = None,
         uncertainty: UncertaintySettings | None = None,
         diagnose: bool = True,
+        method: str | None = None,
     ) -> Explanation:
         """Register the source to the target, and say why that is uncertain. The same clouds give the same numbers.
 
@@ -75,11 +78,18 @@ class Explainer:
             uncertainty: how the spread of the pose is measured; by default it is not.
             diagnose: whether the registration is diagnosed, if the model can do it: GP-CA alone takes a fifth of the
                 time, cannot say that nothing is wrong, and then decides about the action.
+            method: the registration method (docs/registration.md) that aligns the clouds, with its default settings; by
+                default the model's own ICP, with which the classifier has learnt.
 
         Raises:
-            InputError: too few points, NaN, a unit that cannot be right, source and target of unlike sizes, or an
-                initial pose that is no rigid transform.
+            InputError: too few points, NaN, a unit that cannot be right, source and target of unlike sizes, an initial
+                pose that is no rigid transform, an unknown method or one whose package is missing, or the spread of a
+                method's poses, which is measured for the model's own ICP alone.
         """
+        if method is not None and uncertainty is not None:
+            fault = "the spread is that of the model's own ICP, not of another method"
+            raise InputError(f"registration method '{method}'", fault, "ask for one of the two")
+        register = None if method is None else make_method(method)
         started = perf_counter()
         seconds: dict[str, float] = {}
         notes: list[str] = []
@@ -94,7 +104,12 @@ class Explainer:
             _require_like_sizes(source, target)
             icp = self._icp(target)
         with _timed(seconds, "icp"):
-            T_icp, fitness, rmse = (of_starts[0] for of_starts in icp.register(source, np.eye(4)[None]))
+            if register is None:
+                T_icp, fitness, rmse = (of_starts[0] for of_starts in icp.register(source, np.eye(4)[None]))
+            else:
+                outcome = register(Pair(source, target, seed=seed_of("explanation", method)).with_normals())
+                T_icp, fitness, rmse = outcome.T_target_source, outcome.fitness, outcome.inlier_rmse
+                notes += [] if outcome.converged else [f"{method} failed: {outcome.failure}"]
         found = None
         if diagnose and self.model.diagnoser is not None:
             with _timed(seconds, "diagnosis"):
@@ -112,7 +127,7 @@ class Explainer:
             with _timed(seconds, "uncertainty"):
                 spread = _spread(icp, source, T_icp, uncertainty, frame.diameter)
         if fitness == 0:
-            notes.append("no source point is near the target at the initial pose, so the scores mean nothing")
+            notes.append("no source point is near the target, so the scores mean nothing")
         if found is None:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
         elif found.state == NOMINAL:
@@ -124,6 +139,7 @@ class Explainer:
             fitness=float(fitness),
             inlier_rmse=float(rmse) * frame.diameter,
             diagnosis=found,
+            method=method or self.model.icp.method,
             scores=dict(zip(self.model.concepts, scores_C.tolist(), strict=True)),
             variances=dict(zip(self.model.concepts, variances_C.tolist(), strict=True)),
             bald=float(bald),

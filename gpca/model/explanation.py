@@ -43,8 +43,9 @@ class Explanation:
     """One registration, whether it is right, and why it is not.
 
     Attributes:
-        T_target_source: the pose (4, 4) by ICP, in the unit of the points.
+        T_target_source: the pose (4, 4) that was found, in the unit of the points.
         fitness, inlier_rmse: share of source points with a correspondence; RMSE over those, in the unit of the points.
+        method: that found it: the model's kind of ICP, or a registration method by its name.
         diagnosis: of the pair, learnt from measured causes, its expected error in the unit of the points; None where
             it was not asked for.
         scores, variances: of GP-CA as in the paper, which sees the aligned source alone and always names a concept:
@@ -62,6 +63,7 @@ class Explanation:
     T_target_source: np.ndarray
     fitness: float
     inlier_rmse: float
+    method: str
     diagnosis: Diagnosis | None
     scores: dict[str, float]
     variances: dict[str, float]
@@ -93,7 +95,9 @@ class Explanation:
     def text(self) -> str:
         """Return it for a reader."""
         action = f"action    {WORDS.get(self.action, self.action)} ({self.reason})"
-        registered = f"registration   fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
+        registered = (
+            f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
+        )
         lines = [*self._diagnosed(), action, "", *self._attributed(), "", registered]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
@@ -61,3 +63,34 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
         **({"symmetries_discrete": discrete} if discrete else {}),
         **({"symmetries_continuous": continuous} if continuous else {}),
     }
+
+
+def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> float:
+    """Return the least angle, in radians, of a rotation that follows one which leaves the shape as it is.
+
+    With a single axis of revolution a, the least over all turns about it has a closed form: for the unit quaternion
+    (w, v) the cosine of half the angle is √(w² + (v·a)²). With two such axes every rotation leaves the shape as it is.
+
+    Args:
+        symmetries: as :func:`find_symmetries` returns them.
+    """
+    axes = [entry["axis"] for entry in symmetries.get("symmetries_continuous", [])]
+    if len(axes) > 1:
+        return 0.0
+    quaternions_K_4 = Rotation.from_matrix(R_3_3 @ _generated(symmetries)).as_quat()
+    cosine_squared_K = quaternions_K_4[:, 3] ** 2
+    for axis in axes:
+        cosine_squared_K += (quaternions_K_4[:, :3] @ np.asarray(axis)) ** 2
+    return float(2 * np.arccos(np.sqrt(min(1.0, cosine_squared_K.max()))))
+
+
+def _generated(symmetries: Mapping[str, list]) -> np.ndarray:
+    """Return the rotations (K, 3, 3) that the discrete symmetries make one after the other, the identity first."""
+    listed = [np.reshape(T, (4, 4))[:3, :3] for T in symmetries.get("symmetries_discrete", [])]
+    group = [np.eye(3)]
+    for known in group:  # which grows meanwhile
+        for R in listed:
+            product = R @ known
+            if not any(np.allclose(product, other, atol=1e-6) for other in group):
+                group.append(product)
+    return np.array(group)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.alignment.rigid import scale_translation
+from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.errors import InputError
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
@@ -69,6 +69,10 @@ class Registrations:
     def target(self, i: int) -> np.ndarray:
         """Return the target cloud (Q, 3) of row i."""
         return self.target_points[self.target_offsets[i] : self.target_offsets[i + 1]]
+
+    def source(self, i: int) -> np.ndarray:
+        """Return the source cloud (P, 3) of row i as it was observed, before ICP."""
+        return transform(inverse(self.T_target_source("icp", i)), self.cloud(i).astype(np.float64))
 
     def T_target_source(self, which: str, i: int) -> np.ndarray:
         """Return the pose ``init``, ``icp`` or ``true`` of row i in the unit of the clouds, the object's diameter."""

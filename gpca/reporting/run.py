@@ -10,6 +10,7 @@ from typing import Any
 
 from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.alignment.methods.registry import left_out, method_entry
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import title_of
@@ -32,6 +33,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "source": list(sources),
         "seed": list(config["seeds"]),
         "first_seed": str(config["seeds"][0]),
+        "method": installed_methods(config),
         "explainer": list(config["explainers"]),
         "cause_explainer": list(config["diagnosis"]["explainers"]),
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
@@ -66,6 +68,13 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "frames_title": title_of(of_frames),
         "model": of_model,
         "model_title": title_of(of_model),
+        "methods": {
+            name: {"title": entry.title, "is_global": entry.is_global}
+            for name in installed_methods(config)
+            for entry in [method_entry(name)]
+        },
+        "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
+        "global_start": config["method_pairs"]["global_start"],
         "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
         "explainer_titles": {name: entry.title for name, entry in entries.items()},
         "cause_explainers": {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]},
@@ -90,6 +99,12 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "treatments": recovery["treatments"],
         "budget": recovery["loop"]["budget"],
     }
+
+
+def installed_methods(config: Mapping) -> list[str]:
+    """Return the registration methods of a config, without those whose package is missing here."""
+    missing = left_out(config["methods"])
+    return [name for name in config["methods"] if name not in missing]
 
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:

@@ -24,6 +24,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--init", type=Path, help="text file of T_target_source where ICP starts, 4×4 numbers")
     parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="of files and pose (default m)")
     parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, or one in ./results/")
+    parser.add_argument("--method", help="registration method by its name, gicp for one; by default the model's ICP")
     parser.add_argument("--uncertainty", action="store_true", help="measure how the pose scatters by Monte-Carlo ICP")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
@@ -39,7 +40,7 @@ def run(options: Namespace) -> None:
     source, _ = read_points(options.source, options.unit)
     target, frame = read_points(options.target, options.unit)
     uncertainty = UncertaintySettings() if options.uncertainty else None
-    explanation = Explainer(model).explain(source, target, T_init, options.unit, frame, uncertainty)
+    explanation = Explainer(model).explain(source, target, T_init, options.unit, frame, uncertainty, options.method)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
     for note in (*explanation.notes, f"model {path}, trained on {trained_on}"):
         print(note, file=sys.stderr)

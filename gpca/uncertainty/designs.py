@@ -12,7 +12,6 @@ from functools import cache, partial
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.pairs.dataset import SPLITS, Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
@@ -62,7 +61,7 @@ class Pair:
     def __init__(self, registrations: Registrations, row: int) -> None:
         self.T_init = registrations.T_target_source("init", row)
         self.T_icp = registrations.T_target_source("icp", row)
-        self.source = transform(inverse(self.T_icp), registrations.cloud(row).astype(np.float64))
+        self.source = registrations.source(row)
         self.target = registrations.target(row).astype(np.float64)
         self._severity = {name: getattr(registrations, f"severity_{name}")[row] for name in SEVERITIES}
 

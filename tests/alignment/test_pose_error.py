@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.pose_error import add_error, adds_error, pose_error
+from gpca.alignment.pose_error import PoseErrors, add_error, adds_error, pose_error
 
 
 def pose(angle_deg=0.0, axis="z", shift=(0.0, 0.0, 0.0)):
@@ -38,3 +38,14 @@ def test_no_error_depends_on_where_the_camera_is(square):
     camera = pose(37, "y", (0.3, -0.2, 0.9))
     errors = [add_error(square, camera @ pose(20), camera @ pose(5)), add_error(square, pose(20), pose(5))]
     assert errors[0] == pytest.approx(errors[1])
+
+
+def test_errors_of_many_poses_are_those_of_each(square):
+    poses = np.stack([pose(20), pose(0, shift=(0.1, 0.2, 0.0)), pose(90)])
+    errors = PoseErrors(square, 3, symmetric=False)(poses)
+    assert errors == pytest.approx([add_error(square[:3], T, pose()) for T in poses])
+
+
+def test_the_nearest_point_is_sought_among_all_and_not_among_the_judged(square):
+    errors = PoseErrors(square, 2, symmetric=True)(np.stack([pose(90), pose(180)]))
+    assert errors == pytest.approx([0, 0], abs=1e-12)

@@ -13,6 +13,7 @@ from .configs import MISSING, changed, load, merged
     "key",
     [
         *("sources.linemod", "encoders.pointnet2", "reductions.umap", "uncertainty.oracle", "explainers.shap_oracle"),
+        "methods.trimmed",
         *("learners.learner_forest", "recovery.policies.random", "active_learning.strategies.badge"),
     ],
 )
@@ -61,6 +62,8 @@ def test_a_dataset_that_is_false_leaves_the_scenes():
 @pytest.mark.parametrize(
     ("key", "message"),
     [
+        ("methods.fgr", "method_pairs.global_start: registration method 'fgr' is left out; known are point_to_"),
+        ("methods.icp", "methods: no registration method 'icp'; known are fgr, "),
         ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; known are pointnet, "),
         ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; known are linemod, ycb"),
         ("recovery.actions.denoise", "recovery.treatments.noise: action 'denoise' is left out; known are reinit"),

@@ -8,6 +8,8 @@ import pytest
 
 from gpca import CanonicalFrame, Explainer
 from gpca.alignment.icp import ICP, ICPSettings
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
 from gpca.code_files import ROOT
@@ -115,6 +117,48 @@ def test_other_kinds_of_icp_estimate_the_normals(model, pair, method):
     source, target = pair
     explanation = Explainer(replace(model, icp=ICPSettings(method=method)), device="cpu").explain(source, target)
     assert explanation.fitness > 0
+
+
+def test_a_method_finds_the_pose_and_the_scores_are_those_at_it(explainer, model, pair):
+    source, target = pair
+    frame = CanonicalFrame.of(target)
+    explanation = explainer.explain(source, target, method="gicp")
+    own = Pair(frame.coordinates(source), frame.coordinates(target)).with_normals()
+    expected = make_method("gicp")(own).T_target_source
+    np.testing.assert_allclose(explanation.T_target_source, frame.pose_outside(expected), atol=1e-9)
+    np.testing.assert_allclose(
+        scores(explanation), model.gpc.attribute(explainer.embed(transform(expected, own.source)))[0][0], atol=1e-6
+    )
+    assert explanation.method == "gicp"
+    assert explainer.explain(source, target).method == "point_to_point"
+
+
+def test_a_global_method_needs_no_initial_pose_and_gives_the_same_numbers_again(explainer, pair):
+    source, target = pair
+    first, second = (explainer.explain(source, target, method="fpfh_ransac") for _ in range(2))
+    assert np.array_equal(first.T_target_source, second.T_target_source)
+    assert first.scores == second.scores
+
+
+def test_a_failed_registration_is_noted(explainer, pair):
+    source, target = pair
+    lost = explainer.explain(source + 5, target, method="point_to_plane")
+    assert lost.notes[0].startswith("point_to_plane failed: no source point has a target point within 0.1 diameters")
+    assert "so the scores mean nothing" in lost.notes[1]
+    assert lost.fitness == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"method": "icp"}, "registration method 'icp': unknown"),
+        ({"method": ""}, "registration method '': unknown"),
+        ({"method": "gicp", "uncertainty": UncertaintySettings()}, "the spread is that of the model's own ICP"),
+    ],
+)
+def test_a_method_that_cannot_be_asked_is_refused(explainer, pair, arguments, message):
+    with pytest.raises(InputError, match=message):
+        explainer.explain(*pair, **arguments)
 
 
 def test_the_spread_of_the_pose_is_measured_where_it_is_asked_for(explainer, pair):

@@ -58,6 +58,12 @@ STEP_OPTIONS = {
         "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
         "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
     },
+    "register_methods": COMMON | {
+        "--settings": {"method_pairs": {"samples": 3, "points": 64}, "methods": {"point_to_point": {}, "fgr": {}}},
+        "--seeds": 0, "--methods": ["point_to_point", "fgr"], "--objects": "objects.npz",
+        "--registrations": "registrations.npz", "--out": ["point_trials.csv", "fgr_trials.csv"],
+        "--timings": ["point_seconds.csv", "fgr_seconds.csv"],
+    },
     "train": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--out": "weights.pt",
         "--curve": "curve.csv",

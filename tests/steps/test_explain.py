@@ -17,6 +17,8 @@ FAULTS = [
     (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit"),
     (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: holds 3 numbers; give 4×4"),
     (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
+    (untouched, {"--method": "icp"}, r"registration method 'icp': unknown; known are fgr, "),
+    (untouched, {"--method": "gicp", "--uncertainty": []}, r"'gicp': the spread is that of the model's own ICP, not"),
     (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),
 ]
 
@@ -41,3 +43,12 @@ def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys
     text = capsys.readouterr().out
     for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
         assert word in text
+
+
+def test_another_method_finds_the_pose_and_the_model_says_why(folder, capsys):
+    assert main(arguments("explain", {"--method": "gicp"})) == 0
+    explanation = json.loads(capsys.readouterr().out)
+    assert explanation["method"] == "gicp"
+    assert sum(explanation["scores"].values()) == pytest.approx(1)
+    assert main(arguments("explain", {"--method": "gicp", "--json": None})) == 0
+    assert "registration   gicp, fitness " in capsys.readouterr().out

@@ -30,6 +30,7 @@ RUNTIME = jobs("time_stages", "table7_runtime", "runtime")
 MODEL = jobs("model") + RUNTIME
 RECOVERY_FIGURES = jobs("recovery_rates", "fig6_mitigation", "fig1_recovery_example")
 RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
+METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
 # GP-CA on the two reductions of Table VI, and what shows it.
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 # What four explainers say of the causes: from the samples on, and what is made of it.
@@ -83,6 +84,12 @@ def test_table6_needs_the_frames_alone(planned):
     }  # fmt: skip
 
 
+def test_table11_needs_the_registrations_alone(planned):
+    assert planned.before("results/smoke/tables/table11_registration.md") == {
+        "sample_objects": 2, "register": 4, "register_methods": 2, "registration_methods": 1, "table11_registration": 1,
+    }  # fmt: skip
+
+
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
@@ -107,7 +114,9 @@ EDITS = {
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
         jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES,
+        + MODEL_CAUSES + jobs(register_methods=2) + METHODS,
+    "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
+    "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
     "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
@@ -131,7 +140,8 @@ EDITS = {
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=5)
     + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
-    + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL,
+    + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL
+    + jobs("register_methods") + METHODS,
     "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=8, describe_model_causes=2) + CAUSES_SHOWN + MODEL,
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
 }  # fmt: skip

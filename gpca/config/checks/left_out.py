@@ -6,6 +6,7 @@ from collections.abc import Collection
 
 from baselines.registry import explainers
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.alignment.methods.registry import methods
 from gpca.config.checks.named import require_names
 from gpca.config.leave_out import names_left_out
 from gpca.recovery.actions import ACTIONS
@@ -24,6 +25,7 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
     return {
         "reductions": ("reduction", sections["reductions"]["properties"]),
         "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
+        "methods": ("registration method", methods()),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),

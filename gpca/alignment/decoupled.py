@@ -1,0 +1,99 @@
+"""TEASER's decoupled solver (Yang et al. 2021) for correspondences most of which may be wrong, at a known scale of 1.
+
+Differences between two correspondences do not depend on the translation, and their lengths not on the rotation either:
+
+1. two correspondences agree if their differences are equally long within the noise;
+2. the largest set of which all agree is a clique;
+3. its differences give the rotation, by graduated non-convexity on truncated least squares (GNC-TLS);
+4. its rotated points give the translation, by voting for each coordinate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.alignment.clique import largest_clique
+from gpca.alignment.least_squares import best_rotation
+from gpca.alignment.rigid import rotate
+
+GROWTH = 1.4  # of the convexity's parameter μ per iteration, as in the paper
+MOST_ITERATIONS = 100
+SETTLED = 1e-9  # relative change of the cost
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The pose (4×4), the correspondences that agree, and whether no larger set does for certain."""
+
+    T_target_source: np.ndarray
+    inliers: np.ndarray
+    certain: bool
+
+
+def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> Solution | None:
+    """Return the pose of corresponding points, or None where no three agree.
+
+    Args:
+        noise: how far a right correspondence may be off.
+    """
+    clique, certain = largest_clique(_agreeing(source_n_3, target_n_3, 2 * noise))
+    if len(clique) < 3:
+        return None
+    one, other = np.triu_indices(len(clique), 1)
+    p_n_3, q_n_3 = source_n_3[clique], target_n_3[clique]
+    R, _ = gnc_rotation(p_n_3[other] - p_n_3[one], q_n_3[other] - q_n_3[one], 2 * noise)
+    shifts_n_3 = q_n_3 - rotate(R, p_n_3)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, [vote(shifts_n, noise) for shifts_n in shifts_n_3.T]
+    inlier_n = (np.abs(shifts_n_3 - T[:3, 3]) <= noise).all(axis=1)
+    return Solution(T, clique[inlier_n], certain)
+
+
+def _agreeing(source_n_3: np.ndarray, target_n_3: np.ndarray, bound: float) -> np.ndarray:
+    """Return which two (n, n) have differences whose lengths are equal within the bound."""
+    from scipy.spatial.distance import cdist
+
+    return np.abs(cdist(source_n_3, source_n_3) - cdist(target_n_3, target_n_3)) <= bound
+
+
+def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rotation (3×3) that minimises Σ min(|b - R a|², bound²), and the weights (m,), 1 of inliers.
+
+    Graduated non-convexity: a convex cost is bent step by step until it is the truncated one (Yang et al. 2020).
+    """
+    limit = bound**2
+    weights_m = np.ones(len(source_m_3))
+    mu, before = 0.0, np.inf
+    R = np.eye(3)
+    for _ in range(MOST_ITERATIONS):
+        R = best_rotation(source_m_3, target_m_3, weights_m)
+        square_m = np.square(target_m_3 - rotate(R, source_m_3)).sum(axis=1)
+        if not mu:
+            if square_m.max() <= limit:  # nothing to reject
+                break
+            mu = limit / (2 * square_m.max() - limit)
+        cost = float((weights_m * square_m).sum())
+        upper, lower = (mu + 1) / mu * limit, mu / (mu + 1) * limit
+        between_m = np.sqrt(limit * mu * (mu + 1) / np.maximum(square_m, lower)) - mu
+        weights_m = np.where(square_m >= upper, 0.0, np.where(square_m <= lower, 1.0, between_m))
+        if abs(cost - before) <= SETTLED * limit or not weights_m.any():
+            break
+        mu, before = GROWTH * mu, cost
+    return R, weights_m
+
+
+def vote(shifts_n: np.ndarray, bound: float) -> float:
+    """Return the number t that minimises Σ min((s - t)², bound²) over shifts (n,), exactly.
+
+    As t grows, shifts come within the bound and leave it: between two such events the inliers are the same, and the
+    best t of them is their mean. So every set of inliers is tried.
+    """
+    events = np.sort(np.concatenate([shifts_n - bound, shifts_n + bound]))
+    inlier_e_n = np.abs(shifts_n - (events[1:] + events[:-1])[:, None] / 2) <= bound
+    inlier_e_n = inlier_e_n[inlier_e_n.any(axis=1)]
+    counts_e = inlier_e_n.sum(axis=1)
+    means_e = np.where(inlier_e_n, shifts_n, 0).sum(axis=1) / counts_e
+    squares_e = np.where(inlier_e_n, np.square(shifts_n - means_e[:, None]), 0).sum(axis=1)
+    return float(means_e[np.argmin(squares_e + (len(shifts_n) - counts_e) * bound**2)])

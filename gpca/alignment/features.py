@@ -1,0 +1,37 @@
+"""Fast point feature histograms (Rusu et al. 2009) and the correspondences that they suggest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.environment import require_open3d
+
+RADIUS = 0.25  # diameters: five times the spacing of some 500 points on an object
+MOST_NEIGHBOURS = 100
+
+
+def cloud_with_normals(points_N_3: np.ndarray, normals_N_3: np.ndarray) -> Any:
+    """Return Open3D's cloud of points and normals."""
+    o3d = require_open3d()
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.asarray(points_N_3, np.float64)))
+    cloud.normals = o3d.utility.Vector3dVector(np.asarray(normals_N_3, np.float64))
+    return cloud
+
+
+def fpfh(cloud: Any, radius: float = RADIUS) -> Any:
+    """Return Open3D's features of a cloud with normals; `.data` is (33, N)."""
+    o3d = require_open3d()
+    neighbours = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBOURS)
+    return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbours)
+
+
+def mutual_matches(source_N_d: np.ndarray, target_P_d: np.ndarray, most: int) -> np.ndarray:
+    """Return rows (n, 2) of source and target that are each other's nearest in feature space, best `most` of them."""
+    distance_N, nearest_N = cKDTree(target_P_d).query(source_N_d)
+    _, nearest_P = cKDTree(source_N_d).query(target_P_d)
+    mutual_n = np.flatnonzero(nearest_P[nearest_N] == np.arange(len(source_N_d)))
+    best_n = np.sort(mutual_n[np.argsort(distance_N[mutual_n], kind="stable")[:most]])
+    return np.stack([best_n, nearest_N[best_n]], axis=1)

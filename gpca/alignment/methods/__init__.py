@@ -1,0 +1,1 @@
+"""Registration methods, one file each: the registry finds them by name."""

@@ -1,0 +1,59 @@
+"""Fast global registration (Zhou et al. 2016) over matches of FPFH features, by Open3D."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.alignment.features import RADIUS, cloud_with_normals, fpfh
+from gpca.alignment.methods.interface import (
+    CORRESPONDENCE_DISTANCE,
+    FailedRegistration,
+    MethodEntry,
+    Outcome,
+    Pair,
+    as_array,
+)
+from gpca.environment import require_open3d
+
+
+def align(
+    pair: Pair,
+    feature_radius: float = RADIUS,
+    inlier_distance: float = 0.05,
+    tuple_similarity: float = 0.95,
+    tuples: int = 1000,
+    iterations: int = 64,
+    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+) -> Outcome:
+    """Minimise a robust cost over all matches that agree in triples.
+
+    Args:
+        feature_radius: of the features, in diameters.
+        inlier_distance: down to which the robust cost is sharpened, in diameters.
+        tuple_similarity: least ratio of the edges of the two triangles of a triple.
+        tuples: most triples that are used.
+    """
+    o3d = require_open3d()
+    registration = o3d.pipelines.registration
+    clouds = [cloud_with_normals(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
+    o3d.utility.random.seed(pair.seed % 2**31)
+    option = registration.FastGlobalRegistrationOption(
+        use_absolute_scale=True,
+        decrease_mu=True,
+        maximum_correspondence_distance=inlier_distance,
+        iteration_number=iterations,
+        tuple_scale=tuple_similarity,
+        maximum_tuple_count=tuples,
+    )
+    features = [fpfh(cloud, feature_radius) for cloud in clouds]
+    try:
+        found = registration.registration_fgr_based_on_feature_matching(*clouds, *features, option)
+    except RuntimeError as fault:  # with a single match it has none to draw from
+        raise FailedRegistration("too few correspondences agree") from fault
+    T_target_source = as_array(found.transformation)
+    if np.array_equal(T_target_source, np.eye(4)):  # what it gives with less than ten
+        raise FailedRegistration("too few correspondences agree")
+    return Outcome.at(pair, T_target_source, correspondence_distance)
+
+
+METHODS = {"fgr": MethodEntry("Fast global registration", align, is_global=True)}

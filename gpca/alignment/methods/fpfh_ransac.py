@@ -1,0 +1,57 @@
+"""RANSAC (Fischler & Bolles 1981) over matches of FPFH features, by Open3D."""
+
+from __future__ import annotations
+
+from gpca.alignment.features import RADIUS, cloud_with_normals, fpfh
+from gpca.alignment.methods.interface import (
+    CORRESPONDENCE_DISTANCE,
+    FEWEST,
+    FailedRegistration,
+    MethodEntry,
+    Outcome,
+    Pair,
+    as_array,
+)
+from gpca.environment import require_open3d
+
+
+def align(
+    pair: Pair,
+    feature_radius: float = RADIUS,
+    inlier_distance: float = 0.05,
+    edge_similarity: float = 0.9,
+    iterations: int = 20_000,
+    confidence: float = 0.999,
+    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+) -> Outcome:
+    """Take the pose of three matches that agrees with most others.
+
+    Args:
+        feature_radius: of the features, in diameters.
+        inlier_distance: within which a match agrees, in diameters.
+        edge_similarity: least ratio of the edges of the two triangles.
+        iterations, confidence: when to stop.
+    """
+    o3d = require_open3d()
+    registration = o3d.pipelines.registration
+    clouds = [cloud_with_normals(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
+    o3d.utility.random.seed(pair.seed % 2**31)
+    found = registration.registration_ransac_based_on_feature_matching(
+        *clouds,
+        *(fpfh(cloud, feature_radius) for cloud in clouds),
+        mutual_filter=True,
+        max_correspondence_distance=inlier_distance,
+        estimation_method=registration.TransformationEstimationPointToPoint(False),
+        ransac_n=FEWEST,
+        checkers=[
+            registration.CorrespondenceCheckerBasedOnEdgeLength(edge_similarity),
+            registration.CorrespondenceCheckerBasedOnDistance(inlier_distance),
+        ],
+        criteria=registration.RANSACConvergenceCriteria(iterations, confidence),
+    )
+    if len(found.correspondence_set) < FEWEST:
+        raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
+    return Outcome.at(pair, as_array(found.transformation), correspondence_distance)
+
+
+METHODS = {"fpfh_ransac": MethodEntry("FPFH and RANSAC", align, is_global=True)}

@@ -1,0 +1,144 @@
+"""What every registration method takes and gives: a pair of clouds in, an outcome out.
+
+All lengths are in one unit, the diameter of the object, as in :class:`gpca.alignment.canonical_frame.CanonicalFrame`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.alignment.icp import require_cloud
+from gpca.alignment.normals import estimate_normals
+from gpca.alignment.rigid import require_rigid, transform
+from gpca.errors import InputError
+
+CORRESPONDENCE_DISTANCE = 0.10  # diameters: as far as ICP of the protocol looks for a neighbour
+MAX_ITERATIONS = 50
+FEWEST = 3  # correspondences that determine a rigid motion
+
+
+class FailedRegistration(Exception):
+    """Raised inside a method that cannot go on; the registry makes a failed outcome of it."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two clouds to be aligned.
+
+    Attributes:
+        source, target: (N, 3) and (P, 3) points.
+        T_target_source_init: where local methods start; global ones do not read it.
+        source_normals, target_normals: unit vectors in the frame of their cloud, or None
+            (:meth:`with_normals` estimates them).
+        seed: of what a method draws.
+
+    Raises:
+        InputError: fewer than three points, NaN, normals of another shape, or an initial pose that is not rigid.
+    """
+
+    source: np.ndarray
+    target: np.ndarray
+    T_target_source_init: np.ndarray = field(default_factory=lambda: np.eye(4))
+    source_normals: np.ndarray | None = None
+    target_normals: np.ndarray | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("source", "target"):
+            points, normals = getattr(self, name), getattr(self, f"{name}_normals")
+            if points.ndim != 2 or points.shape[1] != 3:
+                raise InputError(f"{name} cloud", f"is of shape {points.shape}", "give points (N, 3)")
+            require_cloud(f"{name} cloud", points)
+            if normals is not None and (normals.shape != points.shape or not np.isfinite(normals).all()):
+                fault = f"{normals.shape} for points {points.shape}, or NaN among them"
+                raise InputError(f"{name} normals", fault, "give one finite vector for each point")
+        require_rigid(self.T_target_source_init, "initial pose")
+
+    def started_at(self, T_target_source: np.ndarray) -> Pair:
+        """Return the pair with another initial pose, that of a global method for one."""
+        return replace(self, T_target_source_init=T_target_source)
+
+    def with_normals(self) -> Pair:
+        """Return the pair with normals of both clouds, estimated where it has none."""
+        return replace(
+            self,
+            source_normals=estimate_normals(self.source) if self.source_normals is None else self.source_normals,
+            target_normals=estimate_normals(self.target) if self.target_normals is None else self.target_normals,
+        )
+
+    def normals(self, name: str) -> np.ndarray:
+        """Return the normals of the "source" or the "target"; a registration that lacks them fails."""
+        normals: np.ndarray | None = getattr(self, f"{name}_normals")
+        if normals is None:
+            raise FailedRegistration(f"the {name} has no normals")
+        return normals
+
+    @cached_property
+    def target_tree(self) -> cKDTree:
+        """The target's points, sorted for nearest neighbours."""
+        return cKDTree(self.target)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a method found.
+
+    Attributes:
+        T_target_source: the pose (4×4); the initial one where there is no other.
+        fitness: share of source points that have a target point within the correspondence distance at the pose.
+        inlier_rmse: over those points, and 0 without any.
+        failure: why the registration failed, empty if it did not.
+    """
+
+    T_target_source: np.ndarray
+    fitness: float
+    inlier_rmse: float
+    failure: str = ""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the method ended as it should: a pose, and no reason against it."""
+        return not self.failure
+
+    @classmethod
+    def at(cls, pair: Pair, T_target_source: np.ndarray, distance: float, failure: str = "") -> Outcome:
+        """Measure a pose as Open3D does, whatever the method minimised; without any correspondence it is a failure."""
+        distance_N, _ = pair.target_tree.query(transform(T_target_source, pair.source))
+        inlier_N = distance_N < distance
+        if not inlier_N.any():
+            raise FailedRegistration(f"no source point has a target point within {distance:g} diameters")
+        rmse = float(np.sqrt(np.square(distance_N[inlier_N]).mean()))
+        return cls(T_target_source, float(inlier_N.mean()), rmse, failure)
+
+
+@dataclass(frozen=True)
+class MethodEntry:
+    """A method in the registry.
+
+    Attributes:
+        title: as tables name the row.
+        align: ``align(pair, **settings)`` returns an :class:`Outcome` or raises :class:`FailedRegistration`.
+        is_global: whether it needs no initial pose.
+        package: module that it needs and that the suite does not install, if any.
+    """
+
+    title: str
+    align: Callable[..., Outcome]
+    is_global: bool = False
+    package: str = ""
+
+
+def still_moving(iterations: int) -> str:
+    """Return the failure of a method that was stopped."""
+    return f"has not converged in {iterations} iterations"
+
+
+def as_array(matrix: Any) -> np.ndarray:
+    """Return a matrix of another library as float64, in memory of its own."""
+    return np.array(matrix, np.float64)

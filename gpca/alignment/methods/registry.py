@@ -1,0 +1,100 @@
+"""Every registration method by name, one or a few per file of this folder."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+import gpca.alignment.methods as folder
+from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome, Pair
+from gpca.environment import require_open3d
+from gpca.errors import InputError
+from gpca.settings import require_arguments
+
+
+def methods() -> dict[str, MethodEntry]:
+    """Return all methods by name, those whose package is missing too."""
+    return {name: entry for entries in _by_module().values() for name, entry in entries.items()}
+
+
+def method_entry(name: str) -> MethodEntry:
+    """Return the method of that name; an unknown one raises an InputError that lists the known."""
+    found = methods()
+    if name not in found:
+        raise InputError(f"registration method '{name}'", "unknown", f"known are {', '.join(found)}")
+    return found[name]
+
+
+def method_module(name: str) -> str:
+    """Return the module that lists the method."""
+    method_entry(name)
+    return next(module for module, entries in _by_module().items() if name in entries)
+
+
+def left_out(names: Iterable[str]) -> dict[str, str]:
+    """Return those of the methods that cannot run here, each with the package that is missing."""
+    packages = {name: method_entry(name).package for name in names}
+    return {name: package for name, package in packages.items() if package and find_spec(package) is None}
+
+
+def require_settings(name: str, settings: Mapping[str, object]) -> None:
+    """Raise an InputError unless the method is known and takes these settings."""
+    subject, align = f"registration method '{name}'", method_entry(name).align
+    require_arguments(subject, align, 1, settings)
+    hints = get_type_hints(getattr(align, "func", align))  # a partial has those of its function
+    for key, value in settings.items():
+        choices = get_args(hints[key])
+        if get_origin(hints[key]) is Literal and value not in choices:
+            raise InputError(f"{subject}: setting {key}", f"{value!r} is none of {', '.join(choices)}")
+
+
+def require_global(name: str) -> None:
+    """Raise an InputError unless the method is known and needs no initial pose."""
+    if not method_entry(name).is_global:
+        known = ", ".join(other for other, entry in methods().items() if entry.is_global)
+        raise InputError(f"registration method '{name}'", "needs an initial pose itself", f"global ones are {known}")
+
+
+def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
+    """Return a method as a function from pairs to outcomes.
+
+    It runs in one thread, however many the process has: Open3D adds up what its threads find in the order in which they
+    end, and draws in that order too. A failure inside the method becomes an outcome at the initial pose.
+
+    Raises:
+        InputError: an unknown name, settings that the method does not take, or a missing package.
+    """
+    from threadpoolctl import ThreadpoolController
+
+    settings = dict(settings or {})
+    require_settings(name, settings)
+    entry = method_entry(name)
+    if name in left_out([name]):
+        raise InputError(
+            f"registration method '{name}'", f"needs the package {entry.package}", "install it, or leave the method out"
+        )
+    utility = require_open3d().utility  # loaded here, and with it the threads that are held to one below
+    threads = ThreadpoolController()
+
+    def register(pair: Pair) -> Outcome:
+        try:
+            # Open3D's warnings go to standard output; what they say of a pair is in its outcome.
+            with threads.limit(limits=1), utility.VerbosityContextManager(utility.VerbosityLevel.Error):
+                outcome = entry.align(pair, **settings)
+            if not np.isfinite(outcome.T_target_source).all():
+                raise FailedRegistration("the pose is not finite")
+        except FailedRegistration as failure:
+            return Outcome(np.array(pair.T_target_source_init, np.float64), 0.0, 0.0, str(failure))
+        return outcome
+
+    return register
+
+
+def _by_module() -> dict[str, dict[str, MethodEntry]]:
+    names = sorted(f"{folder.__name__}.{module.name}" for module in pkgutil.iter_modules(folder.__path__))
+    return {name: getattr(import_module(name), "METHODS", {}) for name in names}

@@ -1,0 +1,122 @@
+"""ICP as a row of stages that can be exchanged (Rusinkiewicz & Levoy 2001): select, match, reject, weigh, minimise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from gpca.alignment.least_squares import best_motion, plane_step
+from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair
+from gpca.alignment.methods.local import failure_of_a_step
+from gpca.alignment.rigid import rotate, transform
+
+Metric = Literal["point_to_point", "point_to_plane"]
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Source points (n, 3) at a pose, each with its nearest target point.
+
+    Attributes:
+        rows: (n,) of the target.
+        distance: (n,) between the two.
+        limit: farther points are no match.
+    """
+
+    pair: Pair
+    T_target_source: np.ndarray
+    source_rows: np.ndarray
+    source: np.ndarray
+    rows: np.ndarray
+    distance: np.ndarray
+    limit: float
+
+    def kept(self, keep_n: np.ndarray) -> Matches:
+        """Return those of a mask or of rows."""
+        return Matches(
+            self.pair,
+            self.T_target_source,
+            self.source_rows[keep_n],
+            self.source[keep_n],
+            self.rows[keep_n],
+            self.distance[keep_n],
+            self.limit,
+        )
+
+    def cosines(self) -> np.ndarray:
+        """Return the cosines (n,) of the angles between the normals of the two points."""
+        source_n_3 = rotate(self.T_target_source, self.pair.normals("source")[self.source_rows])
+        return np.einsum("ni,ni->n", source_n_3, self.pair.normals("target")[self.rows])
+
+
+@dataclass(frozen=True)
+class Stages:
+    """What can be exchanged; the defaults are plain ICP.
+
+    Attributes:
+        rows: of the source that take part, or None for all.
+        reject: from matches to those that are kept.
+        weigh: from matches to their weights (n,).
+        metric: what is minimised.
+        distance: farther points are no match.
+    """
+
+    rows: np.ndarray | None = None
+    reject: Callable[[Matches], Matches] = lambda matches: matches
+    weigh: Callable[[Matches], np.ndarray] = lambda matches: np.ones(len(matches.distance))
+    metric: Metric = "point_to_point"
+    distance: float = np.inf
+
+    def match(self, pair: Pair, T_target_source: np.ndarray) -> Matches:
+        """Return the matches that are kept at a pose; fewer than three are a failure."""
+        rows_n = np.arange(len(pair.source)) if self.rows is None else self.rows
+        source_n_3 = transform(T_target_source, pair.source[rows_n])
+        distance_n, target_rows_n = pair.target_tree.query(source_n_3)
+        found = Matches(pair, T_target_source, rows_n, source_n_3, target_rows_n, distance_n, self.distance)
+        matches = self.reject(found.kept(distance_n < self.distance))
+        if len(matches.distance) < FEWEST:
+            raise FailedRegistration(f"fewer than {FEWEST} correspondences are left")
+        return matches
+
+    def step(self, matches: Matches) -> np.ndarray:
+        """Return the motion (4×4) that takes the matches closer together."""
+        weights_n = self.weigh(matches)
+        if not weights_n.any():
+            raise FailedRegistration("no correspondence has any weight")
+        target_n_3 = matches.pair.target[matches.rows]
+        if self.metric == "point_to_point":
+            return best_motion(matches.source, target_n_3, weights_n)
+        normals_n_3 = matches.pair.normals("target")[matches.rows]
+        return plane_step(matches.source, target_n_3, normals_n_3, weights_n)
+
+
+def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndarray, Matches, str]:
+    """Iterate until the share of matches and their RMSE change no more, as in Open3D.
+
+    Returns:
+        the pose, the matches there, and why it is none to stop at, if so.
+    """
+    from gpca.alignment.icp_kernels import CONVERGED
+
+    T = np.array(pair.T_target_source_init, np.float64)
+    matches = stages.match(pair, T)
+    for _ in range(max_iterations):
+        before, T = matches, stages.step(matches) @ T
+        matches = stages.match(pair, T)
+        share = abs(len(matches.distance) - len(before.distance)) / len(pair.source)
+        if share < CONVERGED and abs(_rmse(matches) - _rmse(before)) < CONVERGED:
+            break
+    return T, matches, failure_of_a_step(pair, T, stages.step(matches) @ T, max_iterations)
+
+
+def align_by_stages(pair: Pair, stages: Stages, correspondence_distance: float, max_iterations: int) -> Outcome:
+    """Run the stages and measure the pose that they end at."""
+    T, _, failure = run_stages(pair, stages, max_iterations)
+    return Outcome.at(pair, T, correspondence_distance, failure)
+
+
+def _rmse(matches: Matches) -> float:
+    return float(np.sqrt(np.square(matches.distance).mean()))

@@ -1,0 +1,42 @@
+"""TEASER (Yang et al. 2021): its decoupled solver on mutual matches of FPFH features."""
+
+from __future__ import annotations
+
+from gpca.alignment.decoupled import solve
+from gpca.alignment.features import RADIUS, cloud_with_normals, fpfh, mutual_matches
+from gpca.alignment.methods.interface import (
+    CORRESPONDENCE_DISTANCE,
+    FEWEST,
+    FailedRegistration,
+    MethodEntry,
+    Outcome,
+    Pair,
+)
+
+
+def align(
+    pair: Pair,
+    feature_radius: float = RADIUS,
+    noise: float = 0.05,
+    most_matches: int = 300,
+    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+) -> Outcome:
+    """Solve for the pose on which the largest set of matches agrees.
+
+    Args:
+        feature_radius: of the features, in diameters.
+        noise: how far a right match may be off, in diameters: about the spacing of the points.
+        most_matches: the best so many are used; TEASER's authors advise some hundreds.
+    """
+    source_N_33, target_P_33 = (
+        fpfh(cloud_with_normals(getattr(pair, name), pair.normals(name)), feature_radius).data.T
+        for name in ("source", "target")
+    )
+    rows_n_2 = mutual_matches(source_N_33, target_P_33, most_matches)
+    found = solve(pair.source[rows_n_2[:, 0]], pair.target[rows_n_2[:, 1]], noise)
+    if found is None or len(found.inliers) < FEWEST:
+        raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
+    return Outcome.at(pair, found.T_target_source, correspondence_distance)
+
+
+METHODS = {"teaser": MethodEntry("TEASER's solver", align, is_global=True)}

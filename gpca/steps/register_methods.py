@@ -1,0 +1,59 @@
+"""Step ``register_methods``: registrations -> their test pairs registered by every method, and how far each is off."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.alignment.methods.registry import require_settings
+from gpca.arguments import SEED
+from gpca.csv_file import write_csv
+from gpca.errors import InputError
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
+from gpca.provenance import record_provenance
+from gpca.settings import check_settings
+from gpca.steps import per_seed
+from gpca.trials.settings import PairSettings
+from gpca.trials.trial import try_methods
+
+SECTIONS = ("method_pairs", "methods")
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` holds the config's sections ``method_pairs`` and ``methods``."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
+    parser.add_argument("--methods", required=True, nargs="+")
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+", help="one per seed")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one method after the other")
+    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of their seconds, in that order")
+
+
+def run(options: Namespace) -> None:
+    """Register by every method, seed by seed."""
+    if unknown := sorted(set(options.settings) - set(SECTIONS)):
+        raise InputError(f"setting {unknown[0]}", "unknown", f"known are {', '.join(SECTIONS)}")
+    pairs = options.settings.get("method_pairs", {})
+    check_settings(pairs, "method_pairs")
+    own = options.settings.get("methods", dict.fromkeys(options.methods))
+    check_settings(own, "methods")
+    for name in (*own, *options.methods):
+        require_settings(name, own.get(name) or {})
+    methods = {name: own.get(name) or {} for name in options.methods}
+    wanted = len(methods) * len(options.seeds)
+    for option in ("out", "timings"):
+        if (given := len(getattr(options, option))) != wanted:
+            raise InputError(f"--{option}", f"{given} file(s), not {wanted}", "give one per method and seed")
+    objects = ObjectClouds.load(options.objects)
+    for i, (seed, path) in enumerate(per_seed(options, "registrations")):
+        of_seed = slice(i, None, len(options.seeds))
+        outputs = options.out[of_seed], options.timings[of_seed]
+        inputs = [options.objects, path]
+        with record_provenance([*outputs[0], *outputs[1]], inputs, options.settings, seed=seed):
+            registrations = Registrations.load(path)
+            trials = try_methods(registrations, objects, options.source, seed, methods, PairSettings(**pairs))
+            for rows, out, timings in zip(trials.values(), *outputs, strict=True):
+                write_csv(out, rows.drop(columns="seconds"))
+                write_csv(timings, rows[["sample", "start", "seconds"]])

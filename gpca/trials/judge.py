@@ -1,0 +1,38 @@
+"""How far an object's pose is off: ADD or ADD-S, the angle up to the symmetries, the shift of its centre."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.alignment.pose_error import PoseErrors
+from gpca.alignment.rigid import inverse
+from gpca.objects.canonical import ObjectClouds
+from gpca.objects.symmetry import angle_up_to_symmetry, find_symmetries
+
+JUDGED_POINTS = 1000  # of the object, over which ADD is the mean
+SYMMETRY_POINTS = 4096  # as everywhere where symmetries are sought
+
+
+class Judge:
+    """Judges poses of one object.
+
+    All lengths are in diameters, and the target's frame is the object's canonical one, with the origin at its centre.
+
+    Attributes:
+        symmetric: whether ADD-S counts.
+    """
+
+    def __init__(self, objects: ObjectClouds, index: int) -> None:
+        diameter_m = float(objects.diameters_m[index])
+        self._symmetries = find_symmetries(objects.points(index)[:SYMMETRY_POINTS], diameter_m)
+        self.symmetric = bool(self._symmetries)
+        self._add = PoseErrors(objects.points(index).astype(np.float64) / diameter_m, JUDGED_POINTS, self.symmetric)
+
+    def __call__(self, T_target_source: np.ndarray, T_target_source_true: np.ndarray) -> dict[str, float]:
+        """Return the errors of a pose by the names of their columns."""
+        T_off = T_target_source @ inverse(T_target_source_true)  # moves the object from where it is
+        return {
+            "add_relative": float(self._add(T_off[None])[0]),
+            "rotation_error_rad": angle_up_to_symmetry(T_off[:3, :3], self._symmetries),
+            "translation_error": float(np.linalg.norm(T_off[:3, 3])),
+        }

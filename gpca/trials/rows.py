@@ -1,0 +1,34 @@
+"""The file of what one method made of the test pairs of a source and seed: a row per pair and start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gpca.csv_file import numbers, read_csv
+from gpca.errors import InputError
+from gpca.pairs.perturbation import CONCEPTS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+INITIAL, NO_START = "initial", "none"  # where a registration starts, or the name of a global method
+SEVERITIES = ("severity_noise", "severity_rotation_rad", "severity_translation", "severity_crop")
+MEASURED = ("add_relative", "rotation_error_rad", "translation_error")
+COLUMNS = ("sample", "concept", "start", "success", "failure", *SEVERITIES, *MEASURED)
+
+
+def row_name(method: str, start: str) -> str:
+    """Return e.g. ``gicp``, from its own initial pose, or ``fgr+gicp``, from that of another method."""
+    return method if start in (INITIAL, NO_START) else f"{start}+{method}"
+
+
+def read_trials(path: str | Path) -> pd.DataFrame:
+    """Read a file of the step ``register_methods``: `success` as booleans, numbers as numbers, the rest as text."""
+    rows = read_csv(path, COLUMNS)
+    for name in (*SEVERITIES, *MEASURED):
+        rows[name] = numbers(path, rows, name, least=0)
+    if not (rows["concept"].isin(CONCEPTS) & rows["success"].isin(("True", "False"))).all():
+        raise InputError(path, "holds an unknown cause, or a row neither a success nor none", "make it anew")
+    rows["success"] = rows["success"] == "True"
+    return rows

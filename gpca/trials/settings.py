@@ -1,0 +1,25 @@
+"""On which pairs the registration methods are tried, and what counts as a success: apart from what runs them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from gpca.settings import Bounds, PositiveShare
+
+
+@dataclass(frozen=True)
+class PairSettings:
+    """Which pairs.
+
+    Attributes:
+        samples: test samples of each source and seed, balanced, at most.
+        points: of source and of target (fewer where a cloud has fewer).
+        success: largest error of a success, ADD or ADD-S in diameters.
+        global_start: the global method at whose pose local methods start a second time.
+    """
+
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 60
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 512
+    success: PositiveShare = 0.02
+    global_start: str = "fgr"

@@ -1,0 +1,282 @@
+import hashlib
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from gpca.alignment.methods import registry
+from gpca.alignment.methods.interface import MethodEntry, Pair
+from gpca.alignment.methods.registry import (
+    left_out,
+    make_method,
+    method_entry,
+    method_module,
+    methods,
+    require_settings,
+)
+from gpca.alignment.pose_error import add_error
+from gpca.alignment.rigid import require_rigid
+from gpca.errors import InputError
+from tests.documents import ROOT
+
+from .pairs import clouds, error, perturbed, small_motion
+
+OPTIONAL = {"gicp_small": "small_gicp", "kiss_matcher": "kiss_matcher"}
+RUNNING = sorted(set(methods()) - set(left_out(methods())))
+LOCAL = [name for name in RUNNING if not method_entry(name).is_global]
+GLOBAL = [name for name in RUNNING if method_entry(name).is_global]
+WITHOUT_NORMALS = {"point_to_point", "point_to_point_open3d", "trimmed", *OPTIONAL}
+
+
+def test_every_method_of_the_design_is_there():
+    assert {name: entry.package for name, entry in methods().items() if entry.package} == OPTIONAL
+    assert {name for name, entry in methods().items() if entry.is_global} == {
+        *("fpfh_ransac", "fgr", "teaser", "kiss_matcher")
+    }
+    assert len({entry.title for entry in methods().values()}) == len(methods()) == 21
+    assert method_module("huber") == "gpca.alignment.methods.point_to_plane"
+
+
+@pytest.mark.parametrize("name", LOCAL)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_local_method_aligns_what_lies_close(objects, name, seed):
+    pair, T_true = small_motion(objects, seed=seed)
+    outcome = make_method(name)(pair)
+    assert outcome.failure == ""
+    require_rigid(outcome.T_target_source, name)
+    assert add_error(pair.source, outcome.T_target_source, T_true) < 0.04 < add_error(pair.source, np.eye(4), T_true)
+    assert outcome.fitness > 0.9
+
+
+@pytest.mark.parametrize("name", GLOBAL)
+def test_a_global_method_needs_no_initial_pose(objects, name):
+    pair, T_true = perturbed(objects, 1, "pose", seed=2)
+    half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
+    outcomes = [make_method(name)(pair.started_at(start)) for start in (np.eye(4), half_turn)]
+    assert error(pair, outcomes[0], T_true) < 0.1
+    assert np.array_equal(outcomes[0].T_target_source, outcomes[1].T_target_source)
+
+
+@pytest.mark.parametrize("name", RUNNING)
+def test_what_is_given_is_not_changed_and_a_repetition_is_the_same(objects, name):
+    pair, _ = perturbed(objects, 1, "overlap")
+    names = ("source", "target", "T_target_source_init", "source_normals", "target_normals")
+    before = [getattr(pair, part).copy() for part in names]
+    method = make_method(name)
+    first, second = method(pair), method(pair)
+    assert first.T_target_source.tobytes() == second.T_target_source.tobytes()
+    first.T_target_source[:] = 0  # what is returned is no view of what was given
+    for part, expected in zip(names, before, strict=True):
+        assert np.array_equal(getattr(pair, part), expected)
+
+
+def digest(threads):
+    """One line per method, from a process of so many threads."""
+    environment = {name: str(threads) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    run = subprocess.run(
+        [sys.executable, "-m", "tests.alignment.methods.test_registry"],
+        cwd=ROOT,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return run.stdout.splitlines()
+
+
+def test_two_threads_change_no_bit():
+    one, two = digest(1), digest(2)
+    assert [line.split()[0] for line in one] == RUNNING
+    assert one == two
+
+
+@pytest.mark.parametrize("name", [name for name in RUNNING if name not in WITHOUT_NORMALS])
+def test_without_normals_a_registration_fails(objects, name):
+    source, target, _, _ = clouds(objects, 0)
+    start = np.eye(4)
+    start[0, 3] = 0.01
+    outcome = make_method(name)(Pair(source, target, start))
+    assert "has no normals" in outcome.failure
+    assert not outcome.converged and outcome.fitness == 0
+    assert np.array_equal(outcome.T_target_source, start)
+
+
+@pytest.mark.parametrize("name", sorted(set(LOCAL) - {"trimmed"}))  # which knows no distance
+def test_without_correspondences_a_registration_fails(objects, name):
+    pair, _ = small_motion(objects)
+    far = np.eye(4)
+    far[2, 3] = 5
+    outcome = make_method(name)(pair.started_at(far))
+    assert "within 0.1 diameters" in outcome.failure or "correspondences are left" in outcome.failure
+    assert np.array_equal(outcome.T_target_source, far)
+
+
+@pytest.mark.parametrize("name", LOCAL)
+def test_a_method_that_is_still_on_its_way_has_failed(objects, name):
+    pair, _ = perturbed(objects, 2, "pose", seed=0)
+    outcome = make_method(name, {"max_iterations": 1})(pair)
+    assert outcome.failure == "has not converged in 1 iterations"
+    assert not np.array_equal(outcome.T_target_source, np.eye(4))
+
+
+POOR = {
+    "plane": lambda points: points * [1, 1, 0],
+    "line": lambda points: points * [0, 0, 1],
+    "three": lambda points: points[:3],
+    "five": lambda points: points[:5],
+    "one point many times": lambda points: points[[0] * 20],
+}
+
+
+@pytest.mark.parametrize("poor", POOR)
+@pytest.mark.parametrize("name", RUNNING)
+def test_poor_clouds_give_a_rigid_pose_and_no_exception(objects, name, poor):
+    source, target, _, _ = clouds(objects, 0)
+    pair = Pair(POOR[poor](source), POOR[poor](target)).with_normals()
+    outcome = make_method(name)(pair)
+    require_rigid(outcome.T_target_source, name)
+    assert 0 <= outcome.fitness <= 1 and np.isfinite(outcome.inlier_rmse)
+
+
+def test_a_pose_that_is_not_finite_is_a_failure(objects, monkeypatch):
+    from dataclasses import replace
+
+    from gpca.alignment.methods.interface import Outcome
+
+    pair, T_true = small_motion(objects)
+    broken = MethodEntry("Broken", lambda pair: replace(Outcome.at(pair, T_true, 0.1), T_target_source=T_true * np.nan))
+    monkeypatch.setattr(registry, "_by_module", lambda: {"broken": {"broken": broken}})
+    outcome = make_method("broken")(pair)
+    assert outcome.failure == "the pose is not finite"
+    assert np.array_equal(outcome.T_target_source, np.eye(4))
+
+
+def test_a_missing_package_is_named(monkeypatch):
+    monkeypatch.setattr(registry, "find_spec", lambda name: None)
+    assert left_out(["point_to_point", *OPTIONAL]) == OPTIONAL
+    for name, package in OPTIONAL.items():
+        with pytest.raises(InputError, match=f"'{name}': needs the package {package}; install it, or leave"):
+            make_method(name)
+
+
+def test_an_unknown_name_lists_the_known():
+    with pytest.raises(InputError, match=r"'icp2': unknown; known are fgr, .*trimmed"):
+        make_method("icp2")
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "words"),
+    [
+        ("gicp", {"voxel": 0.1}, "unexpected keyword argument 'voxel'"),
+        ("gicp", {"max_iterations": 2.5}, "max_iterations: 2.5 is not of type 'integer'"),
+        ("teaser", {"noise": float("nan")}, "noise: nan is not of type 'number'"),
+        ("trimmed", {"overlap": -0.5}, "overlap: -0.5 is less than the minimum"),
+        ("huber", {"scale": "wide"}, "scale: 'wide' is not of type 'number'"),
+        (
+            "random_sampling",
+            {"metric": "point_to_line"},
+            "metric: 'point_to_line' is none of point_to_point, point_to_",
+        ),
+        ("tukey", {"kernel": "Tukey"}, "kernel: 'Tukey' is none of HuberLoss, CauchyLoss, GMLoss, TukeyLoss"),
+    ],
+)
+def test_settings_that_a_method_does_not_take_are_refused(name, settings, words):
+    with pytest.raises(InputError, match=words):
+        require_settings(name, settings)
+
+
+@pytest.mark.parametrize(("name", "largest"), [("gicp_small", 0.04), ("kiss_matcher", 0.1)])  # one is a coarse start
+def test_an_optional_package_aligns_what_lies_close(objects, name, largest):
+    pytest.importorskip(OPTIONAL[name])
+    pair, T_true = small_motion(objects, 1)
+    assert error(pair, make_method(name)(pair), T_true) < largest
+
+
+REFUSED = 0.1
+
+
+def small_shift():
+    T = np.eye(4)
+    T[0, 3] = 0.01
+    return T
+
+
+class StandIn:
+    """What the two packages offer, as far as it is called, for where they are not installed."""
+
+    PointCloud = KISSMatcherConfig = staticmethod(lambda given: given)
+
+    def __init__(self, T, good):
+        self.T_target_source, self.rotation, self.translation = T, T[:3, :3], T[:3, 3:]
+        self.valid = good
+
+    def KdTree(self, cloud, num_threads):
+        return cloud
+
+    def estimate_covariances(self, cloud, tree=None, num_neighbors=20, num_threads=1):
+        assert num_threads == 1
+
+    def align(self, target, source, target_tree, init_T_target_source, max_correspondence_distance, **others):
+        assert target_tree is target and len(source) > 3 and max_correspondence_distance == 0.1
+        assert others.keys() == {"num_threads", "max_iterations", "rotation_epsilon", "translation_epsilon"}
+        if others["max_iterations"] == 1 and not self.valid:  # still on its way
+            return StandIn(small_shift() @ self.T_target_source, False)
+        return self
+
+    def KISSMatcher(self, voxel):
+        if voxel == REFUSED:
+            raise RuntimeError("Too small voxel size")
+        return self
+
+    def estimate(self, source, target):
+        assert source.dtype == target.dtype == np.float32
+        return self
+
+    def get_num_final_inliers(self):
+        return 5
+
+
+@pytest.mark.parametrize("good", [True, False])
+@pytest.mark.parametrize("name", OPTIONAL)
+def test_what_an_optional_package_finds_becomes_an_outcome(objects, monkeypatch, name, good):
+    pair, T_true = small_motion(objects)
+    monkeypatch.setitem(sys.modules, OPTIONAL[name], StandIn(T_true, good))
+    monkeypatch.setattr(registry, "find_spec", lambda name: True)
+    outcome = make_method(name)(pair)
+    assert outcome.converged == good
+    assert np.array_equal(outcome.T_target_source, T_true if good or name == "gicp_small" else np.eye(4))
+
+
+def test_what_kiss_matcher_refuses_is_a_failed_registration(objects, monkeypatch):
+    pair, T_true = small_motion(objects)
+    monkeypatch.setitem(sys.modules, "kiss_matcher", StandIn(T_true, True))
+    monkeypatch.setattr(registry, "find_spec", lambda name: True)
+    outcome = make_method("kiss_matcher", {"voxel": REFUSED})(pair)
+    assert outcome.failure == "KISS-Matcher: Too small voxel size"
+
+
+@pytest.mark.parametrize("voxel", [0.0, 0.001, 2.0])
+def test_kiss_matcher_is_not_asked_where_it_would_end_the_process(objects, monkeypatch, voxel):
+    pair, T_true = small_motion(objects)
+    monkeypatch.setitem(sys.modules, "kiss_matcher", StandIn(T_true, True))
+    monkeypatch.setattr(registry, "find_spec", lambda name: True)
+    outcome = make_method("kiss_matcher", {"voxel": voxel})(pair)
+    assert outcome.failure == f"of the source, voxels of {voxel:g} diameters leave too few points"
+
+
+def main():
+    """Print the outcome of every method on one pair of points on an ellipsoid."""
+    random = np.random.default_rng(0)
+    points = random.normal(size=(2, 400, 3))
+    points *= np.array([0.5, 0.3, 0.2]) / np.linalg.norm(points, axis=-1, keepdims=True)
+    pair = Pair(points[0] + random.normal(scale=0.01, size=(400, 3)) + [0.03, -0.02, 0.01], points[1], seed=3)
+    for name in RUNNING:
+        outcome = make_method(name)(pair.with_normals())
+        told = outcome.T_target_source.tobytes() + np.array([outcome.fitness, outcome.inlier_rmse]).tobytes()
+        print(name, hashlib.sha256(told).hexdigest(), outcome.failure)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gpca.alignment.decoupled import gnc_rotation, solve, vote
+from gpca.alignment.rigid import inverse, rotate, rotation_angle_rad, transform
+
+NOISE = 0.01
+
+
+def correspondences(n, outliers, seed, noise=NOISE):
+    """Points in a unit cube, their images under a random motion within the noise, and which of them are right."""
+    random = np.random.default_rng(seed)
+    T_true = np.eye(4)
+    T_true[:3, :3] = Rotation.random(random_state=seed).as_matrix()
+    T_true[:3, 3] = random.uniform(-1, 1, 3)
+    source = random.uniform(-0.5, 0.5, size=(n, 3))
+    offsets = random.normal(size=(n, 3))
+    offsets *= noise * random.uniform(size=(n, 1)) / np.linalg.norm(offsets, axis=1, keepdims=True)
+    target = transform(T_true, source) + offsets
+    wrong = random.permutation(n)[: round(outliers * n)]
+    target[wrong] = transform(T_true, random.uniform(-0.5, 0.5, size=(len(wrong), 3)))
+    return source, target, T_true, np.setdiff1d(np.arange(n), wrong)
+
+
+def assert_near(T, T_true, rotation_rad, translation):
+    error = T @ inverse(T_true)
+    assert rotation_angle_rad(error) < rotation_rad
+    assert np.linalg.norm(T[:3, 3] - T_true[:3, 3]) < translation
+
+
+@pytest.mark.parametrize(("outliers", "n"), [(0.0, 50), (0.5, 100), (0.9, 200), (0.95, 400)])
+@pytest.mark.parametrize("seed", range(4))
+def test_most_correspondences_may_be_wrong(outliers, n, seed):
+    source, target, T_true, right = correspondences(n, outliers, seed)
+    found = solve(source, target, NOISE)
+    assert found.certain
+    assert_near(found.T_target_source, T_true, 0.03, 0.015)
+    assert len(np.intersect1d(found.inliers, right)) >= 0.8 * len(right)
+    assert len(np.setdiff1d(found.inliers, right)) <= 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_without_noise_the_pose_is_exact(seed):
+    source, target, T_true, right = correspondences(200, 0.9, seed, noise=0)
+    found = solve(source, target, 1e-6)
+    assert_near(found.T_target_source, T_true, 1e-6, 1e-9)
+    assert np.array_equal(found.inliers, right)
+
+
+def test_where_no_three_agree_there_is_no_pose():
+    points = np.eye(3)
+    assert solve(points, 5 * points, NOISE) is None
+    assert solve(points[:0], points[:0], NOISE) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_rotation_withstands_half_of_wrong_differences(seed):
+    source, target, T_true, right = correspondences(60, 0.5, seed)
+    target = target - T_true[:3, 3]
+    R, weights = gnc_rotation(source, target, 1.5 * NOISE)
+    T = np.eye(4)
+    T[:3, :3] = R
+    assert rotation_angle_rad(T @ inverse(T_true)) < 0.02
+    assert weights[right].min() > 0.99
+    residuals = np.linalg.norm(target - rotate(R, source), axis=1)
+    assert residuals[weights > 0.99].max() < 1.6 * NOISE and residuals[weights < 0.01].min() > 1.4 * NOISE
+
+
+def test_a_vote_is_the_best_of_a_fine_grid():
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        shifts = np.concatenate([random.normal(0.3, 0.004, 12), random.uniform(-1, 1, 60)])
+        t = vote(shifts, NOISE)
+
+        def cost(at, shifts=shifts):
+            return np.minimum(np.square(shifts - at), NOISE**2).sum()
+
+        grid = np.linspace(-1.1, 1.1, 20_001)
+        assert cost(t) <= min(map(cost, grid)) + 1e-15

@@ -1,0 +1,90 @@
+# The test pairs of the registrations by every registration method -> registration_methods.csv.
+from gpca.alignment.methods.registry import left_out, method_module
+
+METHODS = NAMES["method"]
+for name, package in left_out(config["methods"]).items():
+    if workflow.is_main_process:
+        print(
+            f"gpca: registration method '{name}' is left out: the package {package} is not installed",
+            file=sys.stderr,
+        )
+
+
+rule methods:
+    input:
+        collect(
+            "<results>/methods/{source}/{method}/seed{seed}.csv",
+            source=SOURCES,
+            method=METHODS,
+            seed=SEEDS,
+        ),
+
+
+rule register_methods:
+    input:
+        objects="<results>/objects/{source}.npz",
+        registrations=collect(
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
+        ),
+        code=code_files("gpca.steps.register_methods", *map(method_module, METHODS)),
+    output:
+        rows=collect(
+            "<results>/methods/{{source}}/{method}/seed{seed}.csv",
+            method=METHODS,
+            seed=SEEDS,
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/method_{method}/seed{seed}.csv",
+            method=METHODS,
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/methods/{source}.log",
+    benchmark:
+        "<benchmarks>/methods/{source}.tsv"
+    wildcard_constraints:
+        source="|".join(SOURCES),
+    priority: 2
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        settings=as_json(
+            {
+                "method_pairs": config["method_pairs"],
+                "methods": {name: config["methods"][name] for name in METHODS},
+            }
+        ),
+        methods=METHODS,
+        seeds=SEEDS,
+    shell:
+        "python -m gpca register_methods --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "--methods {params.methods} --settings {params.settings:q} --objects {input.objects} "
+        "--registrations {input.registrations} --out {output.rows} --timings {output.timings} 2> {log}"
+
+
+rule registration_methods:
+    input:
+        files=rules.methods.input,
+        code=collector_code("gpca.trials.metrics:collect_trials"),
+    output:
+        "<results>/registration_methods.csv",
+    log:
+        "<logs>/registration_methods.log",
+    benchmark:
+        "<benchmarks>/registration_methods.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.trials.metrics:collect_trials",
+        severities=config["registrations"]["severities"],
+    script:
+        "../scripts/collect.py"
