@@ -286,6 +286,24 @@ def align_all(source, target, poses, fitness, rmse, max_iterations):
                 break
 
 
+@njit(cache=True)
+def pull_all(source, target, poses, pulls, fitness, rmse):
+    """At every pose (n, 4, 4), fill the mean of [y × r, r] (n, 6) over correspondences, r = y - q of the moved source.
+
+    That is half of the gradient of the mean square of r by a twist on the left of the pose.
+    """
+    room, moments = np.empty(LISTED), np.empty((4, 4))
+    neighbour, held = np.empty(len(source), np.int64), np.zeros((len(source), 4))
+    for n in range(len(poses)):
+        held[:, 3] = -1.0
+        moments[:] = 0.0
+        fitness[n], rmse[n] = _correspond(source, target, poses[n], moments, room, neighbour, held)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            pulls[n, i] = moments[j, k] - moments[k, j]
+            pulls[n, 3 + i] = moments[3, i] - moments[i, 3]
+
+
 @njit(**OPTIONS)
 def _correspond(source, target, pose, moments, room, neighbour, held):
     """Return fitness and inlier RMSE at a pose, and in `moments` the mean of [q, 1] [p, 1]ᵀ over correspondences."""

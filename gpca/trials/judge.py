@@ -19,13 +19,14 @@ class Judge:
     All lengths are in diameters, and the target's frame is the object's canonical one, with the origin at its centre.
 
     Attributes:
+        symmetries: rotations that leave the shape as it is, as :func:`gpca.objects.symmetry.find_symmetries` has them.
         symmetric: whether ADD-S counts.
     """
 
     def __init__(self, objects: ObjectClouds, index: int) -> None:
         diameter_m = float(objects.diameters_m[index])
-        self._symmetries = find_symmetries(objects.points(index)[:SYMMETRY_POINTS], diameter_m)
-        self.symmetric = bool(self._symmetries)
+        self.symmetries = find_symmetries(objects.points(index)[:SYMMETRY_POINTS], diameter_m)
+        self.symmetric = bool(self.symmetries)
         self._add = PoseErrors(objects.points(index).astype(np.float64) / diameter_m, JUDGED_POINTS, self.symmetric)
 
     def __call__(self, T_target_source: np.ndarray, T_target_source_true: np.ndarray) -> dict[str, float]:
@@ -33,6 +34,6 @@ class Judge:
         T_off = T_target_source @ inverse(T_target_source_true)  # moves the object from where it is
         return {
             "add_relative": float(self._add(T_off[None])[0]),
-            "rotation_error_rad": angle_up_to_symmetry(T_off[:3, :3], self._symmetries),
+            "rotation_error_rad": angle_up_to_symmetry(T_off[:3, :3], self.symmetries),
             "translation_error": float(np.linalg.norm(T_off[:3, 3])),
         }
