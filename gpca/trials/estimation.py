@@ -26,6 +26,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.objects.symmetry import symmetric_turn
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
+from gpca.trials.covariances import JUDGED, REFERENCE, covariance_columns
 from gpca.trials.judge import Judge
 from gpca.trials.settings import EstimatorPairSettings
 from gpca.uncertainty.estimators.interface import Estimate, Example, FailedEstimate, RegisteredPair, intrinsic_frame
@@ -34,10 +35,6 @@ from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
 
 if TYPE_CHECKING:
     import pandas as pd
-
-REFERENCE = "reference"
-UPPER = np.triu_indices(6)
-COVARIANCE = tuple(f"covariance_{i + 1}{j + 1}" for i, j in zip(*UPPER, strict=True))
 
 
 @dataclass(frozen=True)
@@ -201,11 +198,9 @@ def kl(reference_k_k: np.ndarray, estimate_k_k: np.ndarray, floor: float) -> flo
 def _judged(case: Case, said: Estimate, reference: Estimate, floor: float) -> dict[str, object]:
     """Return the row of an estimate; numbers that it has not are NaN."""
     row = {**case.known, "failure": said.failure}
-    numbers = dict.fromkeys(("kl_rotation", "kl_translation", "error_ratio", "mahalanobis", "spread"), np.nan)
-    covariance = np.full(len(COVARIANCE), np.nan)
+    numbers = dict.fromkeys(JUDGED, np.nan)
     if said.covariance_6_6 is not None:
         sigma_6_6, e_6 = said.covariance_6_6, case.true_twist
-        covariance = sigma_6_6[UPPER]
         numbers["error_ratio"] = float(e_6 @ e_6 / np.trace(sigma_6_6 + floor * np.eye(6)))
         numbers["mahalanobis"] = mahalanobis(e_6, sigma_6_6, floor)
         points = transform(case.registered.T_target_source, case.registered.pair.source)
@@ -213,7 +208,7 @@ def _judged(case: Case, said: Estimate, reference: Estimate, floor: float) -> di
         if reference.covariance_6_6 is not None:
             for name, block in (("kl_rotation", slice(0, 3)), ("kl_translation", slice(3, 6))):
                 numbers[name] = kl(reference.covariance_6_6[block, block], sigma_6_6[block, block], floor)
-    return row | numbers | dict(zip(COVARIANCE, covariance, strict=True))
+    return row | numbers | covariance_columns(said.covariance_6_6)
 
 
 def _reference(case: Case) -> Estimate:
@@ -247,5 +242,3 @@ def _describe(registered: RegisteredPair) -> np.ndarray:
 def _spaced(rows: np.ndarray, wanted: int) -> np.ndarray:
     """Return so many of the rows, evenly spaced: states that are rare come last."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(wanted, len(rows))).round().astype(int))]
-
-

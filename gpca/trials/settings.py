@@ -1,4 +1,4 @@
-"""On which pairs registration methods and estimators are tried, and what counts as a success: apart from what runs them."""
+"""On which pairs methods and estimators are tried, and what counts as a success: apart from what runs them."""
 
 from __future__ import annotations
 

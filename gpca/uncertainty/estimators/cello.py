@@ -50,9 +50,10 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
     for _ in range(steps):
         optimiser.zero_grad()
         scaled = features * torch.exp(log_scale)
-        squares = (scaled[:, None] - scaled[None]).square().sum(dim=2)
+        lengths = scaled.square().sum(dim=1)
+        squares = lengths[:, None] + lengths - 2 * scaled @ scaled.T
         weights = torch.softmax((-squares).masked_fill(others, -torch.inf), dim=1)
-        predicted = (weights[:, :, None] * variances[None]).sum(dim=1)
+        predicted = weights @ variances
         loss = (predicted.log() + variances / predicted).sum(dim=1).mean()
         loss.backward()
         optimiser.step()

@@ -9,17 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, MAX_ITERATIONS, Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp, log, point_jacobians
-
-if TYPE_CHECKING:
-    from gpca.alignment.batched_icp import BatchedICP
 
 SINGULAR = 1e-9  # ratio of eigenvalues below which a direction counts as open
 FEWEST_RUNS = 7  # that give a 6×6 covariance its rank
@@ -80,7 +77,7 @@ class RegisteredPair:
         pair: the clouds, where the registration started, and a seed for what an estimator draws.
         outcome: what the method found.
         method: its name in the registry of methods.
-        deviation_6: standard deviations of the initial pose's twist, which are known as they are to the paper's sampler.
+        deviation_6: standard deviations of the initial pose's twist.
         describe: returns the pair's descriptors (F,), for estimators that have learnt from others.
     """
 
@@ -224,10 +221,16 @@ def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
 
 def _batched(pair: Pair, method: str) -> Starter:
     from gpca.alignment.batched_icp import BatchedICP
-    from gpca.alignment.icp import ICPSettings
+    from gpca.alignment.batched_plane_icp import BatchedPlaneICP
 
-    settings = ICPSettings(method, CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)  # type: ignore[arg-type]
-    icp: BatchedICP = BatchedICP(pair.target, settings, pair.target_normals)
+    settings = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)
+    icp: BatchedICP | BatchedPlaneICP
+    if method == POINT_TO_POINT:
+        icp = BatchedICP(pair.target, settings)
+    elif pair.target_normals is None:
+        raise FailedEstimate("the target has no normals")
+    else:
+        icp = BatchedPlaneICP(pair.target, pair.target_normals, settings)
 
     def from_starts(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         poses_n, fitness_n, _ = icp.register(pair.source, starts_n)

@@ -1,4 +1,4 @@
-"""A learned covariance with an aleatoric and an epistemic part, after De Maio & Lacroix (2022): an ensemble of networks.
+"""A learned covariance of an aleatoric and an epistemic part, after De Maio & Lacroix (2022): some networks.
 
 Each network gives the mean and the variances of the error from a pair's descriptors. What they say on average is how
 much registrations of such a pair differ (aleatoric); how much they contradict each other, how little they know of such
@@ -37,7 +37,7 @@ def learn(
     examples: Sequence[Example],
     members: int = 5,
     hidden: int = 32,
-    steps: int = 300,
+    steps: int = 200,
     learning_rate: float = 0.01,
     weight_decay: float = 1e-3,
 ) -> Estimator:

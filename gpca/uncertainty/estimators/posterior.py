@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.batched_icp import Pulls
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE
 from gpca.alignment.rigid import inverse
 from gpca.alignment.twist import exp, log
@@ -25,6 +24,8 @@ class Posterior:
     """
 
     def __init__(self, registered: RegisteredPair) -> None:
+        from gpca.alignment.batched_icp import Pulls
+
         matches = registered.matches()
         self.source = registered.pair.source
         self._T = registered.T_target_source

@@ -1,4 +1,4 @@
-"""Stein ICP (Maken, Ramos & Ott 2022): Stein variational gradient descent moves particles from the prior to the posterior.
+"""Stein ICP (Maken, Ramos & Ott 2022): Stein variational gradient descent from the prior to the posterior.
 
 The particles attract each other to where the posterior is high and repel each other by the kernel's slope (Liu & Wang
 2016).
@@ -41,11 +41,11 @@ def descend(
     """
     x_n_6, mean_n_6, square_n_6 = start_n_6.copy(), np.zeros_like(start_n_6), np.zeros_like(start_n_6)
     for step in range(1, steps + 1):
-        apart_n_n_6 = x_n_6[:, None] - x_n_6[None]
-        squares_n_n = np.square(apart_n_n_6).sum(axis=2)
+        lengths_n = np.square(x_n_6).sum(axis=1)
+        squares_n_n = lengths_n[:, None] + lengths_n - 2 * np.einsum("ni,mi->nm", x_n_6, x_n_6)
         width = max(np.median(squares_n_n) / np.log(len(x_n_6) + 1), 1e-12)
         kernel_n_n = np.exp(-squares_n_n / width)
-        repelled_n_6 = 2 / width * np.einsum("nm,nmi->ni", kernel_n_n, apart_n_n_6)
+        repelled_n_6 = 2 / width * (kernel_n_n.sum(axis=1)[:, None] * x_n_6 - np.einsum("nm,mi->ni", kernel_n_n, x_n_6))
         phi_n_6 = (np.einsum("nm,mi->ni", kernel_n_n, slope(x_n_6)) + repelled_n_6) / len(x_n_6)
         mean_n_6 = BETA_1 * mean_n_6 + (1 - BETA_1) * phi_n_6
         square_n_6 = BETA_2 * square_n_6 + (1 - BETA_2) * phi_n_6**2
