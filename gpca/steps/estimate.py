@@ -16,6 +16,7 @@ from gpca.settings import check_settings
 from gpca.steps import per_seed
 from gpca.trials.covariances import REFERENCE, ReferenceSamples
 from gpca.trials.estimation import try_estimators
+from gpca.trials.judge import Judges
 from gpca.trials.settings import EstimatorPairSettings
 from gpca.uncertainty.estimators.registry import require_estimator_settings
 
@@ -56,13 +57,13 @@ def run(options: Namespace) -> None:
         if (given := len(getattr(options, option))) != wanted:
             remedy = "give one for the reference and each estimator, per seed"
             raise InputError(f"--{option}", f"{given} file(s), not {wanted}", remedy)
-    objects = ObjectClouds.load(options.objects)
+    judges = Judges(ObjectClouds.load(options.objects), f"objects of {options.source}")
     for i, (seed, path, samples) in enumerate(per_seed(options, "causes", "samples")):
         of_seed = slice(i, None, len(options.seeds))
         out, timings = options.out[of_seed], options.timings[of_seed]
         inputs = [options.objects, path]
         with record_provenance([*out, *timings, samples], inputs, options.settings, seed=seed):
-            rows, cases = try_estimators(Causes.load(path), objects, options.source, seed, estimators, settings)
+            rows, cases = try_estimators(Causes.load(path), judges, options.source, seed, estimators, settings)
             ReferenceSamples.of(cases).save(samples)
             for of_estimator, own_out, own_timings in zip(rows.values(), out, timings, strict=True):
                 write_csv(own_out, of_estimator.drop(columns="seconds"))

@@ -22,12 +22,11 @@ from gpca.descriptors.distances import describe_distances
 from gpca.descriptors.entropy import describe_entropy
 from gpca.descriptors.pair import ObservedPair, observed_pair
 from gpca.errors import InputError
-from gpca.objects.canonical import ObjectClouds
 from gpca.objects.symmetry import symmetric_turn
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.trials.covariances import JUDGED, REFERENCE, covariance_columns
-from gpca.trials.judge import Judge
+from gpca.trials.judge import Judge, Judges
 from gpca.trials.settings import EstimatorPairSettings
 from gpca.uncertainty.estimators.interface import Estimate, Example, FailedEstimate, RegisteredPair, intrinsic_frame
 from gpca.uncertainty.estimators.monte_carlo import sample
@@ -56,7 +55,7 @@ class Case:
 
 def try_estimators(
     causes: Causes,
-    objects: ObjectClouds,
+    judges: Judges,
     source: str,
     seed: int,
     estimators: Mapping[str, Mapping],
@@ -68,6 +67,7 @@ def try_estimators(
 
     Args:
         causes: with test samples.
+        judges: of their objects.
         estimators: name -> settings.
 
     Raises:
@@ -79,7 +79,7 @@ def try_estimators(
     cases = []
     for method, wanted in settings.methods.items():
         axes = (source, seed, "estimators", method)
-        make = _Maker(causes, objects, method, axes, settings)
+        make = _Maker(causes, judges, method, axes, settings)
         learning = any(estimator_entry(name).learn for name in estimators)
         examples = [make.example(row) for row in _spaced(causes.rows("train"), settings.train)] if learning else []
         made = {name: make_estimator(name, given, examples) for name, given in estimators.items()}
@@ -108,17 +108,16 @@ class _Maker:
     """Registers rows of the causes by one method, as they come to the estimators."""
 
     def __init__(
-        self, causes: Causes, objects: ObjectClouds, method: str, axes: tuple, settings: EstimatorPairSettings
+        self, causes: Causes, judges: Judges, method: str, axes: tuple, settings: EstimatorPairSettings
     ) -> None:
-        self._causes, self._objects, self._method, self._axes = causes, objects, method, axes
+        self._causes, self._judges, self._method, self._axes = causes, judges, method, axes
         self._settings = settings
         self._register = make_method(method)
-        self._judges: dict[int, Judge] = {}
 
     def case(self, row: int) -> Case:
         """Return a test registration with the reference's results."""
         registered, T_true = self._registered(row)
-        registrations, judge = self._causes.registrations, self._judge(row)
+        registrations, judge = self._causes.registrations, self._judges.of(self._causes.registrations, row)
         # ADD moves the object, which is the source here: errors are those of the inverse pose.
         errors = judge(inverse(registered.T_target_source), inverse(T_true))
         try:
@@ -141,7 +140,7 @@ class _Maker:
             twists_n_6 = sample(registered, self._settings.train_starts, *self._axes, "examples")
         except FailedEstimate:
             twists_n_6 = np.zeros((self._settings.train_starts, 6))
-        true_twist_6 = _true_twist(registered, T_true, self._judge(row))
+        true_twist_6 = _true_twist(registered, T_true, self._judges.of(self._causes.registrations, row))
         return Example(_describe(registered), twists_n_6, true_twist_6, intrinsic_frame(registered.pair.target))
 
     def _registered(self, row: int) -> tuple[RegisteredPair, np.ndarray]:
@@ -163,16 +162,6 @@ class _Maker:
             pair, registered.outcome, self._method, registered.deviation_6, lambda: _describe(registered)
         )
         return described, T_icp @ inverse(T_true)
-
-    def _judge(self, row: int) -> Judge:
-        registrations = self._causes.registrations
-        index, name = int(registrations.object_index[row]), str(registrations.object_name[row])
-        if index >= len(self._objects) or str(self._objects.names[index]) != name:
-            fault = f"object {index} is not '{name}', as the registrations have it"
-            raise InputError("objects", fault, "give those that the registrations were made of")
-        if index not in self._judges:
-            self._judges[index] = Judge(self._objects, index)
-        return self._judges[index]
 
 
 def mahalanobis(true_twist_6: np.ndarray, covariance_6_6: np.ndarray, floor: float) -> float:

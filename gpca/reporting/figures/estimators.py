@@ -15,7 +15,6 @@ from gpca.reporting.figures.style import (
     BLUE,
     GREEN,
     GREY,
-    LIGHT_GREY,
     ORANGE,
     PURPLE,
     SKY_BLUE,
@@ -42,6 +41,7 @@ STYLES = {  # An estimator has a colour and a line everywhere in the figure.
     "cello": (GREEN, "-"),
     "learned": (PURPLE, "-"),
 }
+SHADE = "#AAAAAA"  # of the reference's results
 _OTHER = (SKY_BLUE, "-")
 TURN = np.linspace(0, 2 * np.pi, 181)
 LEVELS = np.linspace(0.01, 0.99, 99)
@@ -85,28 +85,31 @@ def draw_estimators(
     panels = figure.add_gridspec(1, 4, left=0.065, right=0.995, top=0.875, bottom=0.63, wspace=0.42)
     for column, (kind, place) in enumerate(shown.items()):
         for part, (block, unit, factor) in enumerate(
-            (("rotation", "°", np.rad2deg(1.0)), ("translation", "% of the diameter", 100.0))
+            (("rotation", "degrees", np.rad2deg(1.0)), ("translation", "% of the diameter", 100.0))
         ):
             panel = figure.add_subplot(panels[0, 2 * column + part])
             said = {name: _said(of_shown[name], samples.sample[place]) for name in titles}
             axes = slice(0, 3) if block == "rotation" else slice(3, 6)
             _draw_ellipses(panel, samples, place, said, axes, factor)
             panel.set_title(f"{kind}: {block}", fontsize=8, pad=3)
-            panel.set_xlabel(
-                f"{'rotation' if block == 'rotation' else 'shift'} ({unit})", fontsize=SMALL_PT, labelpad=1
-            )
+            panel.set_xlabel(unit, fontsize=SMALL_PT, labelpad=1)
     names = [name for name in titles if len(pooled[name])]
     told = [name for name in names if name != REFERENCE] or names
-    of_scatter = figure.add_gridspec(2, 4, left=0.065, right=0.675, top=0.545, bottom=0.075, wspace=0.1, hspace=0.3)
+    of_scatter = figure.add_gridspec(2, 4, left=0.065, right=0.675, top=0.545, bottom=0.075, wspace=0.1, hspace=0.2)
     limits = _limits([pooled[name] for name in told])
     for i, name in enumerate([REFERENCE, *(name for name in told if name != REFERENCE)][:8]):
         panel = figure.add_subplot(of_scatter[i // 4, i % 4])
         _draw_scatter(panel, pooled[name], titles[name], limits, i % 4 == 0, i >= 4)
     figure.text(0.37, 0.005, "predicted spread (% of the diameter)", ha="center", va="bottom", fontsize=SMALL_PT)
     figure.text(0.003, 0.31, "error (% of the diameter)", ha="left", va="center", rotation=90, fontsize=SMALL_PT)
-    _draw_coverage(figure.add_axes((0.745, 0.075, 0.25, 0.47)), pooled, names)
+    _draw_coverage(figure.add_axes((0.74, 0.075, 0.245, 0.47)), pooled, names)
     handles = [plt.Line2D([], [], color=_style(n)[0], linestyle=_style(n)[1], label=titles[n]) for n in names]
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.972), ncols=5, columnspacing=1.2)
+    handles.append(plt.Line2D([], [], color=BLACK, marker="*", linestyle="", label="true pose"))
+    handles += [
+        plt.Line2D([], [], color=colour, marker=marker, linestyle="", markerfacecolor="none", markersize=3, label=label)
+        for label, marker, colour in (("succeeded", "o", BLUE), ("failed", "x", VERMILION))
+    ]
+    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.972), ncols=6, columnspacing=1.2)
     write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over the reference's results, spreads and errors")
     save_figure(figure, pdf_path, png_path)
 
@@ -166,7 +169,7 @@ def _draw_ellipses(panel, samples: ReferenceSamples, place: int, said: Mapping, 
     values_3, axes_3_3 = np.linalg.eigh(np.cov(twists_n_3, rowvar=False))
     plane_3_2 = axes_3_3[:, ::-1][:, :2]
     dots_n_2, true_2 = twists_n_3 @ plane_3_2, factor * samples.true_twist[place, block] @ plane_3_2
-    panel.scatter(*dots_n_2.T, s=1.2, color=LIGHT_GREY, linewidths=0, rasterized=True, zorder=1)
+    panel.scatter(*dots_n_2.T, s=1.2, color=SHADE, linewidths=0, rasterized=True, zorder=1)
     for name, row in said.items():
         if row is None or name == REFERENCE:
             continue
@@ -182,19 +185,22 @@ def _draw_ellipses(panel, samples: ReferenceSamples, place: int, said: Mapping, 
 
 def _draw_scatter(panel, rows: pd.DataFrame, title: str, limits, left: bool, below: bool) -> None:
     """Draw errors over predicted spreads; on the diagonal the prediction is right on average."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
     panel.plot(limits, limits, color=GREY, linewidth=0.6, zorder=1)
     for failed, marker, colour in ((False, "o", BLUE), (True, "x", VERMILION)):
         of_kind = rows[rows["failed"] == failed]
-        face = {"facecolors": "none"} if marker == "o" else {}
+        face = {"facecolors": "none", "edgecolors": colour} if marker == "o" else {"color": colour}
         where = 100 * np.maximum(of_kind["spread"], 1e-5), 100 * of_kind["add_relative"]
-        panel.scatter(
-            *where, s=7, marker=marker, linewidths=0.5, **(face | {"edgecolors": colour} if face else {"color": colour})
-        )
+        panel.scatter(*where, s=7, marker=marker, linewidths=0.5, **face)
     panel.set(xscale="log", yscale="log", xlim=limits, ylim=limits)
     panel.set_title(title, fontsize=SMALL_PT, pad=2)
     panel.tick_params(which="both", pad=1.5, length=2, labelleft=left, labelbottom=below)
+    decades = 10.0 ** np.arange(np.ceil(np.log10(limits[0])), np.floor(np.log10(limits[1])) + 1)
     for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(FixedLocator(decades))
         axis.set_major_formatter("{x:g}")
+        axis.set_minor_locator(NullLocator())
 
 
 def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:

@@ -136,4 +136,4 @@ def _errors(example: Example) -> np.ndarray:
     return twists_along_axes(log(away_n), example.T_target_intrinsic)
 
 
-ESTIMATORS = {"learned": EstimatorEntry("Learned, aleatoric + epistemic", learn=learn)}
+ESTIMATORS = {"learned": EstimatorEntry("Learned ensemble", learn=learn)}
