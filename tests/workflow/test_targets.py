@@ -89,6 +89,12 @@ def test_table11_needs_the_registrations_alone(planned):
     }  # fmt: skip
 
 
+def test_table12_needs_the_causes_alone(planned):
+    assert planned.before("results/smoke/tables/table12_uncertainty.md") == {
+        "sample_objects": 2, "sample_causes": 4, "estimate": 2, "estimator_metrics": 1, "table12_uncertainty": 1,
+    }  # fmt: skip
+
+
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
