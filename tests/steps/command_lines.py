@@ -50,7 +50,9 @@ STEP_OPTIONS = {
     },
     "estimate": COMMON | {
         "--settings": {
-            "estimator_pairs": {"methods": {"point_to_point": 2}, "train": 8, "train_starts": 7, "points": 64, "starts": 20},
+            "estimator_pairs": {
+                "methods": {"point_to_point": 2}, "train": 8, "train_starts": 7, "points": 64, "starts": 20,
+            },
             "estimators": {"brossard": {}, "cello": {"steps": 2}},
         },
         "--seeds": 100, "--estimators": ["brossard", "cello"], "--objects": "objects.npz", "--causes": "causes.npz",

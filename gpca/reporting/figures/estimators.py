@@ -110,7 +110,7 @@ def draw_estimators(
         for label, marker, colour in (("succeeded", "o", BLUE), ("failed", "x", VERMILION))
     ]
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.972), ncols=6, columnspacing=1.2)
-    write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over the reference's results, spreads and errors")
+    write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over the reference's results; below, all datasets")
     save_figure(figure, pdf_path, png_path)
 
 

@@ -11,17 +11,9 @@ ESTIMATORS, METHODS = {"censi": "Censi", "brossard": "Brossard"}, {"point_to_poi
 VALUES = {"kl_rotation": 2.0, "nees": 3.0, "coverage": 0.5, "auroc_failed": 0.7, "no_estimate": 0.25}
 
 
-def records(metric, value):
+def records(metric, value, step=0.01):
     return [
-        (
-            "estimators",
-            source,
-            name,
-            metric,
-            method,
-            seed,
-            value(source, name) + 0.01 * seed * (metric != "test_samples"),
-        )
+        ("estimators", source, name, metric, method, seed, value(source, name) + step * seed)
         for source in SOURCES
         for name in ("reference", *ESTIMATORS)
         for method in METHODS
@@ -31,11 +23,10 @@ def records(metric, value):
 
 @pytest.fixture
 def metrics():
-    found = records("test_samples", lambda source, _: {"ycb": 30, "cups": 10}[source])
+    found = records("test_samples", lambda source, _: {"ycb": 30, "cups": 10}[source], step=0)
     for metric, size in VALUES.items():
-        found += records(
-            metric, lambda source, name, size=size: size * (1 + (name == "censi")) * (1 + (source == "cups"))
-        )
+        of = {name: size * (1 + (name == "censi")) for name in ("reference", *ESTIMATORS)}
+        found += records(metric, lambda source, name, of=of: of[name] * (1 + (source == "cups")))
     return tidy(found, "estimates")
 
 
