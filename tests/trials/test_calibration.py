@@ -72,12 +72,13 @@ def test_of_gaussian_errors_a_right_covariance_scores_right():
     squares = np.einsum("ni,ij,nj->n", errors, np.linalg.inv(SIGMA), errors)
     metrics = measure(rows(4000, mahalanobis=squares, error_ratio=np.square(errors).sum(axis=1) / np.trace(SIGMA)))
     assert metrics["coverage"] == pytest.approx(0.95, abs=0.01)
-    assert metrics["nees"] == pytest.approx(1, abs=0.06)  # trimming a skewed distribution costs a little
-    assert metrics["nne"] == pytest.approx(1, abs=0.06)
+    # The distribution is skewed, so that its middle lies below its mean.
+    assert metrics["nees"] == pytest.approx(0.93, abs=0.02)
+    assert metrics["nne"] == pytest.approx(0.96, abs=0.04)
 
 
 def test_what_failed_is_counted_and_left_out_of_the_rest(file):
-    some = without(rows(spread=np.linspace(0.2, 0.02, 20)), slice(0, 4))
+    some = without(rows(spread=np.linspace(0.2, 0.02, 20)), slice(0, 3))
     metrics = measure(read_estimates(file(some)))
     assert metrics["no_estimate"] == pytest.approx(0.2)
     assert metrics["test_samples"] == 20

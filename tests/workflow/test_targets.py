@@ -31,6 +31,7 @@ MODEL = jobs("model") + RUNTIME
 RECOVERY_FIGURES = jobs("recovery_rates", "fig6_mitigation", "fig1_recovery_example")
 RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
+ESTIMATED = jobs("estimator_metrics", "table12_uncertainty", "estimators")
 # GP-CA on the two reductions of Table VI, and what shows it.
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 # What four explainers say of the causes: from the samples on, and what is made of it.
@@ -119,7 +120,7 @@ EDITS = {
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
         jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES + jobs(register_methods=2) + METHODS,
+        + MODEL_CAUSES + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED,
     "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
     "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
@@ -146,8 +147,11 @@ EDITS = {
     + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
     + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL
-    + jobs("register_methods") + METHODS,
-    "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=8, describe_model_causes=2) + CAUSES_SHOWN + MODEL,
+    + jobs("register_methods", "estimate") + METHODS + ESTIMATED,
+    "gpca/descriptors/entropy.py":
+        jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED,
+    "gpca/uncertainty/estimators/censi.py": jobs(estimate=2) + ESTIMATED,
+    "gpca/reporting/figures/estimators.py": jobs("estimators"),
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
 }  # fmt: skip
 

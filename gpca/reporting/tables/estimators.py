@@ -61,7 +61,9 @@ def table12_uncertainty(
             table.add_row([(method, method_title), (name, title)], cells, rival=name != REFERENCE)
     table.require_rows("metrics", "hold no estimator", "run the step estimate first")
     table.compare_down(_RANKED, same=1)
-    numbers = {method: cell_over_sources(metrics, metrics, sources, REFERENCE, "nne", method, 1) for method in methods}
+    numbers = {
+        method: cell_over_sources(metrics, metrics, sources, REFERENCE, "no_estimate", method, 1) for method in methods
+    }
     counted = ", ".join(
         f"{cell.test_samples // cell.seeds} by {methods[name]}" for name, cell in numbers.items() if cell is not None
     )
@@ -72,7 +74,7 @@ def table12_uncertainty(
         footnotes=(
             f"{mean_over(table.most_seeds(), counted).replace(' test samples each', ' registrations each')}. KL: from "
             f"the reference, Monte-Carlo with {pairs['starts']} starts; trimmed means (10 to 90 %), as NNE, NEES. "
-            "NNE and NEES / 6 are 1 and the coverage is 95 % where the covariance is that of the errors; above 1, or "
+            "NNE and NEES / 6 are near 1 and the coverage is 95 % where the covariance is that of the errors; above or "
             "below 95 %, an estimator is too sure. Spread and error are those of the object's points. Bold: best of a "
             "method, the reference apart.",
             "None: refused, or failed with its reason in the files: Bonnabel's rule refuses point-to-point, Censi's "

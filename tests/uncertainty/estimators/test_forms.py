@@ -37,11 +37,11 @@ def test_unscented_and_monte_carlo_agree_where_the_pose_follows_the_start():
     pair = registered("point_to_plane", plane)
     expected = np.diag(DEVIATION_6**2 * [0, 0, 1, 1, 1, 0])
     tolerance = 0.06 * np.sqrt(np.outer(DEVIATION_6, DEVIATION_6)).max() ** 2
-    unscented, sampled = brossard.unscented(pair), monte_carlo.estimate(pair, 2000)
+    unscented, sampled = brossard.unscented(pair), monte_carlo.estimate(pair, 800)
     for found in (unscented, sampled):
         assert np.abs(found - expected).max() < 2 * tolerance
     assert np.diag(unscented)[2:5] == pytest.approx(np.diag(expected)[2:5], rel=0.12)
-    assert np.diag(sampled)[2:5] == pytest.approx(np.diag(expected)[2:5], rel=0.15)
+    assert np.diag(sampled)[2:5] == pytest.approx(np.diag(expected)[2:5], rel=0.2)
 
 
 def test_unscented_is_exact_where_the_result_is_linear_in_the_start(monkeypatch):
