@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.attribution.metrics import source_method_seed
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 
@@ -54,6 +56,11 @@ def read_estimates(path: str | Path) -> pd.DataFrame:
         raise InputError(path, "holds a row neither failed nor not", f"make it anew with '{MADE_BY}'")
     rows["failed"] = rows["failed"] == "True"
     return rows
+
+
+def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], pd.DataFrame]:
+    """Return the rows of files named `…/{source}/{estimator}/seed{seed}.csv` by these three."""
+    return {source_method_seed(path): read_estimates(path) for path in files}
 
 
 @dataclass(frozen=True)

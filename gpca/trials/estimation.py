@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import log, point_jacobians
@@ -45,12 +45,14 @@ class Case:
         registered: what an estimator is given.
         true_twist: (6,) of the true pose about that of the registration, the symmetric one that is nearest.
         reference_twists: (n, 6) of the reference's results; none where it failed.
+        reference_seconds: that they took.
     """
 
     known: dict[str, object]
     registered: RegisteredPair
     true_twist: np.ndarray
     reference_twists: np.ndarray
+    reference_seconds: float
 
 
 def try_estimators(
@@ -87,15 +89,14 @@ def try_estimators(
         if not len(rows):
             raise InputError(f"causes of {source}", "hold no test samples", "raise causes.test")
         for row in progress(rows, f"estimators on {source}, seed {seed}, {method}"):
-            started = perf_counter()
             case = make.case(row)
-            seconds = perf_counter() - started
             if row == rows[0]:
                 for estimate in made.values():
                     estimate(case.registered)  # what is loaded or compiled at the first call
             cases.append(case)
             reference = _reference(case)
-            records[REFERENCE].append(_judged(case, reference, reference, settings.floor) | {"seconds": seconds})
+            of_reference = _judged(case, reference, reference, settings.floor)
+            records[REFERENCE].append(of_reference | {"seconds": case.reference_seconds})
             for name, estimate in made.items():
                 started = perf_counter()
                 said = estimate(case.registered)
@@ -120,10 +121,12 @@ class _Maker:
         registrations, judge = self._causes.registrations, self._judges.of(self._causes.registrations, row)
         # ADD moves the object, which is the source here: errors are those of the inverse pose.
         errors = judge(inverse(registered.T_target_source), inverse(T_true))
+        started = perf_counter()
         try:
             twists_n_6 = sample(registered, self._settings.starts, *self._axes, "reference")
         except FailedEstimate:
             twists_n_6 = np.empty((0, 6))
+        seconds = perf_counter() - started
         known = {
             "sample": registrations.sample[row],
             "object": registrations.object_name[row],
@@ -131,7 +134,7 @@ class _Maker:
             "add_relative": errors["add_relative"],
             "failed": bool(errors["add_relative"] >= self._settings.failed or not registered.outcome.fitness),
         }
-        return Case(known, registered, _true_twist(registered, T_true, judge), twists_n_6)
+        return Case(known, registered, _true_twist(registered, T_true, judge), twists_n_6, seconds)
 
     def example(self, row: int) -> Example:
         """Return a training registration with the results of a few starts, all at the pose where there are none."""
@@ -141,7 +144,12 @@ class _Maker:
         except FailedEstimate:
             twists_n_6 = np.zeros((self._settings.train_starts, 6))
         true_twist_6 = _true_twist(registered, T_true, self._judges.of(self._causes.registrations, row))
-        return Example(_describe(registered), twists_n_6, true_twist_6, intrinsic_frame(registered.pair.target))
+        return Example(
+            _describe(registered.pair, registered.outcome),
+            twists_n_6,
+            true_twist_6,
+            intrinsic_frame(registered.pair.target),
+        )
 
     def _registered(self, row: int) -> tuple[RegisteredPair, np.ndarray]:
         """Return a registration of the model, the source, to what was observed, and the true pose.
@@ -157,11 +165,10 @@ class _Maker:
         pair = Pair(source, target, inverse(observed.T_init), seed=seed_of(*observed.axes, "draws")).with_normals()
         registrations = self._causes.registrations
         T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
-        registered = RegisteredPair(pair, self._register(pair), self._method, self._settings.deviation_6(), None)
-        described = RegisteredPair(
-            pair, registered.outcome, self._method, registered.deviation_6, lambda: _describe(registered)
-        )
-        return described, T_icp @ inverse(T_true)
+        outcome = self._register(pair)
+        deviation_6 = self._settings.deviation_6()
+        registered = RegisteredPair(pair, outcome, self._method, deviation_6, lambda: _describe(pair, outcome))
+        return registered, T_icp @ inverse(T_true)
 
 
 def mahalanobis(true_twist_6: np.ndarray, covariance_6_6: np.ndarray, floor: float) -> float:
@@ -213,9 +220,8 @@ def _true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge) ->
     return log((T_true @ turn @ inverse(T_found))[None])[0]
 
 
-def _describe(registered: RegisteredPair) -> np.ndarray:
+def _describe(pair: Pair, outcome: Outcome) -> np.ndarray:
     """Return the descriptors (F,) that need no further registration: distances, local planes, entropy."""
-    pair, outcome = registered.pair, registered.outcome
     shown = ObservedPair(
         observed=transform(inverse(outcome.T_target_source), pair.target),
         model=pair.source,

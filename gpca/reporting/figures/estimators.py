@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
 from gpca.reporting.figures.style import (
     BLACK,
@@ -25,7 +24,7 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
-from gpca.trials.covariances import REFERENCE, ReferenceSamples, covariance_of, read_estimates
+from gpca.trials.covariances import REFERENCE, ReferenceSamples, covariance_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,7 +49,7 @@ FEWEST_SAMPLES = 20  # of the reference, that a registration shows
 
 
 def draw_estimators(
-    estimates_csv: Sequence[str | Path],
+    estimates: Mapping[tuple[str, str, int], pd.DataFrame],
     samples_npz: str | Path,
     estimators: Mapping[str, str],
     methods: Mapping[str, str],
@@ -63,21 +62,20 @@ def draw_estimators(
     Above stand the registration that failed and the one that did not whose error is the median of its kind.
 
     Args:
-        estimates_csv: `…/{source}/{estimator}/seed{seed}.csv` of every source, the reference and the estimators.
+        estimates: rows by source, estimator and seed; the reference is among the estimators.
         samples_npz: the reference's samples of the shown source and seed, which its path names.
         estimators, methods: the title of each name, in order.
 
     Raises:
         InputError: an unusable file, or files that do not belong together.
     """
-    rows = {source_method_seed(path): read_estimates(path) for path in estimates_csv}
     source, seed = Path(samples_npz).parent.name, int(Path(samples_npz).stem.removeprefix("seed"))
     samples = ReferenceSamples.load(samples_npz)
     method = next(iter(methods))
     titles = {REFERENCE: "Reference", **estimators}
-    of_shown = {name: _of_method(rows, (source, name, seed), method, samples_npz) for name in titles}
+    of_shown = {name: _of_method(estimates, (source, name, seed), method, samples_npz) for name in titles}
     shown = _chosen(of_shown[REFERENCE], samples, method, samples_npz)
-    pooled = {name: _pooled(rows, name, method) for name in titles}
+    pooled = {name: _pooled(estimates, name, method) for name in titles}
     use_style()
     import matplotlib.pyplot as plt
 

@@ -7,7 +7,7 @@ from scipy.stats import chi2
 from gpca.csv_file import write_csv
 from gpca.errors import InputError
 from gpca.reporting.figures.estimators import LEVELS, coverages, draw_estimators, ellipse
-from gpca.trials.covariances import ReferenceSamples, covariance_columns
+from gpca.trials.covariances import ReferenceSamples, covariance_columns, read_estimate_files
 
 ESTIMATORS, METHODS = {"censi": "Censi", "own": "Own"}, {"point_to_point": "ICP"}
 
@@ -41,7 +41,9 @@ def files(tmp_path):
 
 def drawn(files, folder):
     paths, samples = files
-    draw_estimators(paths, samples, ESTIMATORS, METHODS, "Cups", folder / "a.pdf", folder / "a.png")
+    draw_estimators(
+        read_estimate_files(paths), samples, ESTIMATORS, METHODS, "Cups", folder / "a.pdf", folder / "a.png"
+    )
     return (folder / "a.png").read_bytes()
 
 
