@@ -34,7 +34,7 @@ pathvars:
 
 
 STAGES = (
-    "common objects registrations methods causes frames encoders uncertainty explainers active_learning diagnostics "
+    "common objects registrations methods causes estimators frames encoders uncertainty explainers active_learning diagnostics "
     "model recovery results comparison targets"
 )
 for stage in STAGES.split():

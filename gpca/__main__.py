@@ -28,6 +28,7 @@ STEPS = {
     "causes": "canonical clouds -> pairs with any subset of the causes, and what each cause does to the error",
     "describe": "causes -> what can be measured of each pair without knowing the truth",
     "train_on_causes": "causes -> encoder weights and embeddings of their aligned sources",
+    "estimate": "causes -> what every estimator says of the test registrations' covariance, and how right it is",
     "diagnose": "causes, and descriptors or embeddings -> predictions of one explainer of causes",
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",

@@ -154,6 +154,26 @@ def test_a_registration_method(config, added_modules, objects):
     assert names["fine"].converged
 
 
+def test_an_estimator(config, added_modules, objects):
+    from gpca.alignment.methods.interface import Pair
+    from gpca.alignment.methods.registry import make_method
+    from gpca.uncertainty.estimators.interface import RegisteredPair
+    from gpca.uncertainty.estimators.registry import estimator_module, estimators, make_estimator
+
+    added_modules("gpca/uncertainty/estimators/sensitivity.py")
+    assert estimators()["sensitivity"].title == "First order in the start"
+    assert estimator_module("sensitivity") == "gpca.uncertainty.estimators.sensitivity"
+    update_config(config, yaml.safe_load(block("config/config.yaml", "sensitivity")))
+    check(config)
+    points = objects.points(0).astype(float) / objects.diameters_m[0]
+    pair = Pair(points[:300], points[300:])
+    registered = RegisteredPair(pair, make_method("point_to_point")(pair), "point_to_point", np.full(6, 0.03))
+    names = {"registered": registered}
+    exec(block("estimate.py"), names)
+    found = names["estimate"].covariance_6_6
+    assert np.trace(found) == pytest.approx(np.trace(make_estimator("monte_carlo")(registered).covariance_6_6), rel=2)
+
+
 def test_a_recovery_action_passes_the_check(config, monkeypatch):
     from gpca.recovery import actions
 

@@ -160,6 +160,7 @@ def test_every_page_of_the_docs_is_in_the_index():
         ("explain", 3),
         ("comparison", 14),
         ("registration", 4),
+        ("estimators", 8),
         ("active_learning", 15),
         ("real_world", 5),
         ("causes", 20),
@@ -187,6 +188,20 @@ def test_every_configured_explainer_of_causes_is_described():
     explainers = yaml.safe_load((ROOT / "config/config.yaml").read_text())["diagnosis"]["explainers"]
     page = (ROOT / "docs/causes.md").read_text()
     assert [name for name in explainers if f"`{name}`" not in page] == []
+
+
+def test_the_python_of_the_page_of_estimators_runs(registrations, capsys):
+    page = (ROOT / "docs/estimators.md").read_text()
+    [example] = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
+    exec(example, clouds | {"T_target_source_init": np.eye(4)})
+    assert capsys.readouterr().out.startswith("[[")
+
+
+def test_every_configured_estimator_is_described():
+    names = yaml.safe_load((ROOT / "config/config.yaml").read_text())["estimators"]
+    page = (ROOT / "docs/estimators.md").read_text()
+    assert [name for name in names if f"| `{name}` |" not in page] == []
 
 
 def test_every_configured_registration_method_is_described():

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.icp import ICP, ICPSettings, require_cloud
-from gpca.alignment.icp_kernels import align_all, make_target
+from gpca.alignment.icp_kernels import align_all, make_target, pull_all
 
 
 class BatchedICP:
@@ -59,3 +59,27 @@ class BatchedICP:
         runs = [self._icp.register(source, pose) for pose in poses_n]
         fitness_n, rmse_n = np.array([(run.fitness, run.inlier_rmse) for run in runs]).T
         return np.array([run.T_target_source for run in runs]), fitness_n, rmse_n
+
+
+class Pulls:
+    """How the correspondences of a pair pull at a pose: the slope of point-to-point ICP's mean squared distance.
+
+    Args:
+        target: (P, 3). distance: farther points are no correspondences; unit of the points.
+    """
+
+    def __init__(self, target: np.ndarray, distance: float) -> None:
+        require_cloud("target cloud", target)
+        self._target = make_target(target, distance)
+
+    def __call__(self, source: np.ndarray, T_target_source_n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
+
+        r = y - q leads to the moved point y from its neighbour q; the mean is half the gradient of the mean of |r|² by
+        a twist on the left of each pose (n, 4, 4).
+        """
+        n = len(T_target_source_n)
+        pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
+        source = np.ascontiguousarray(source, np.float64)
+        pull_all(source, self._target, np.ascontiguousarray(T_target_source_n), pulls_n_6, fitness_n, rmse_n)
+        return pulls_n_6, fitness_n, rmse_n

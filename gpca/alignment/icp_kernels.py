@@ -286,6 +286,66 @@ def align_all(source, target, poses, fitness, rmse, max_iterations):
                 break
 
 
+@njit(cache=True)
+def pull_all(source, target, poses, pulls, fitness, rmse):
+    """At every pose (n, 4, 4), fill the mean of [y × r, r] (n, 6) over correspondences, r = y - q of the moved source.
+
+    That is half of the gradient of the mean square of r by a twist on the left of the pose.
+    """
+    room, moments = np.empty(LISTED), np.empty((4, 4))
+    neighbour, held = np.empty(len(source), np.int64), np.zeros((len(source), 4))
+    for n in range(len(poses)):
+        held[:, 3] = -1.0
+        moments[:] = 0.0
+        fitness[n], rmse[n] = _correspond(source, target, poses[n], moments, room, neighbour, held)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            pulls[n, i] = moments[j, k] - moments[k, j]
+            pulls[n, 3 + i] = moments[3, i] - moments[i, 3]
+
+
+@njit(cache=True)
+def plane_all(source, target, normals, poses, hessians, gradients, fitness, rmse):
+    """At every pose fill Σ JᵀJ (n, 6, 6), Σ Jᵀd (n, 6) over correspondences, d = n·(y - q), J = [y × n, n].
+
+    `normals` (P, 3) are in the order of the target's points.
+    """
+    room, row = np.empty(LISTED), np.empty(6)
+    for n in range(len(poses)):
+        hessian, gradient = hessians[n], gradients[n]
+        hessian[:], gradient[:] = 0.0, 0.0
+        fitness[n], rmse[n] = _plane_sums(source, target, normals, poses[n], hessian, gradient, room, row)
+
+
+@njit(**OPTIONS)
+def _plane_sums(source, target, normals, pose, hessian, gradient, room, row):
+    points, starts, low, cell, cells, voxel, voxels, list_of_voxel, listed, offsets, reach, used, distance = target
+    lists = (voxel, voxels, list_of_voxel, listed, offsets, reach, used, distance)
+    count, squares = 0, 0.0
+    for i in range(len(source)):
+        x, y, z = source[i, 0], source[i, 1], source[i, 2]
+        px = pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3]
+        py = pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3]
+        pz = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
+        index = nearest(px, py, pz, room, points, starts, low, cell, cells, *lists)[0]
+        if index < 0:
+            continue
+        rx, ry, rz = px - points[index, 0], py - points[index, 1], pz - points[index, 2]
+        square = rx * rx + ry * ry + rz * rz
+        if square < distance * distance:
+            nx, ny, nz = normals[index, 0], normals[index, 1], normals[index, 2]
+            row[0], row[1], row[2] = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+            row[3], row[4], row[5] = nx, ny, nz
+            off_plane = rx * nx + ry * ny + rz * nz
+            count += 1
+            squares += square
+            for a in range(6):
+                gradient[a] += row[a] * off_plane
+                for b in range(6):
+                    hessian[a, b] += row[a] * row[b]
+    return count / len(source), np.sqrt(squares / max(count, 1))
+
+
 @njit(**OPTIONS)
 def _correspond(source, target, pose, moments, room, neighbour, held):
     """Return fitness and inlier RMSE at a pose, and in `moments` the mean of [q, 1] [p, 1]ᵀ over correspondences."""

@@ -20,6 +20,9 @@ TIMES = "*seconds*"
 KINDS = (
     ("*", "*rho*", "correlation"),
     ("*", "rotation_deg", "degrees"),
+    ("*", "spearman_error", "correlation"),
+    *(("*", pattern, "nats") for pattern in ("kl_*", "nne", "nees")),
+    ("tables/table12_*", "auroc_failed", "share"),
     *(("*", pattern, "nats") for pattern in ("*nll*", "*elbo*")),
     *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "delay", "calls", "parameters")),
     *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gpca.config.checks.estimators import check_estimators
 from gpca.config.checks.explainers import (
     check_diagnosis,
     check_encoders,
@@ -68,6 +69,7 @@ def check(config: dict) -> dict[str, dict]:
     check_registrations(whole)
     check_encoders(whole, encoders)
     check_methods(whole, names_left_out(config, "methods"))
+    check_estimators(whole)
     check_explainers(whole, designs)
     check_diagnosis(whole)
     check_strategies(whole)

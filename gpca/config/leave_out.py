@@ -15,7 +15,7 @@ from gpca.recovery.policies import ALWAYS, POLICIES
 # Mappings of which any entry may be false.
 LEAVABLE = (
     *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners"),
-    *("real_world.datasets", "recovery.actions", "diagnosis.explainers"),
+    *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
 )
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
 SWITCHES = ("active_learning.strategies", "recovery.policies")

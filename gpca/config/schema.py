@@ -27,7 +27,7 @@ from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import SCHEMA, Bounds
-from gpca.trials.settings import PairSettings
+from gpca.trials.settings import EstimatorPairSettings, PairSettings
 
 HEAD = "# Made from the settings classes by `python -m gpca.config.schema`: change these and make it anew.\n"
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
@@ -105,6 +105,8 @@ class Config:
     ]
     method_pairs: Annotated[PairSettings, COMPLETE]
     methods: Annotated[dict[str, Settings], BY_NAME]
+    estimators: Annotated[dict[str, Settings], BY_NAME]
+    estimator_pairs: Annotated[EstimatorPairSettings, COMPLETE]
     causes: Annotated[CauseSettings, COMPLETE_CAUSES]
     diagnosis: Diagnosis
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]

@@ -17,20 +17,20 @@ import torch
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points, thin
-from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.attribution.scores import entropy
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
-from gpca.model.explanation import Explanation, PoseSpread
+from gpca.model.explanation import Explanation
 from gpca.model.file import Model, model_path
+from gpca.model.pose_spread import MONTE_CARLO, NAMES, estimated_spread, spread_estimator, spread_of_icp
 from gpca.objects.canonical import estimate_normals
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import UncertaintySettings
-from gpca.uncertainty.spread import run_from_starts
 
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
@@ -67,6 +67,7 @@ class Explainer:
         uncertainty: UncertaintySettings | None = None,
         diagnose: bool = True,
         method: str | None = None,
+        estimator: str = MONTE_CARLO,
     ) -> Explanation:
         """Register the source to the target, and say why that is uncertain. The same clouds give the same numbers.
 
@@ -75,21 +76,21 @@ class Explainer:
             T_target_source_init: (4, 4) where ICP starts; the identity by default.
             unit: that of points and pose: ``m``, ``cm`` or ``mm``.
             frame: the target's, where it is known already; by default it is measured on its points.
-            uncertainty: how the spread of the pose is measured; by default it is not.
+            uncertainty: how the starts spread over which the pose's uncertainty is measured; by default it is not.
             diagnose: whether the registration is diagnosed, if the model can do it: GP-CA alone takes a fifth of the
                 time, cannot say that nothing is wrong, and then decides about the action.
             method: the registration method (docs/registration.md) that aligns the clouds, with its default settings; by
                 default the model's own ICP, with which the classifier has learnt.
+            estimator: of the uncertainty, where it is measured (docs/estimators.md): one that needs no training
+                registrations. Where it cannot tell, a note says why.
 
         Raises:
             InputError: too few points, NaN, a unit that cannot be right, source and target of unlike sizes, an initial
-                pose that is no rigid transform, an unknown method or one whose package is missing, or the spread of a
-                method's poses, which is measured for the model's own ICP alone.
+                pose that is no rigid transform, an unknown method or one whose package is missing, an unknown estimator
+                or one that learns.
         """
-        if method is not None and uncertainty is not None:
-            fault = "the spread is that of the model's own ICP, not of another method"
-            raise InputError(f"registration method '{method}'", fault, "ask for one of the two")
         register = None if method is None else make_method(method)
+        estimate = None if uncertainty is None else spread_estimator(estimator, uncertainty)
         started = perf_counter()
         seconds: dict[str, float] = {}
         notes: list[str] = []
@@ -123,9 +124,16 @@ class Explainer:
         if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
             raise InputError("model", "it gives no finite numbers for these clouds", "make another one")
         spread = None
-        if uncertainty is not None:
+        if uncertainty is not None and estimate is not None:
             with _timed(seconds, "uncertainty"):
-                spread = _spread(icp, source, T_icp, uncertainty, frame.diameter)
+                if method is None and estimator == MONTE_CARLO:
+                    spread = spread_of_icp(icp, source, T_icp, uncertainty, frame.diameter)
+                else:
+                    found_by = method or NAMES[self.model.icp.method]
+                    at_pose = Outcome(T_icp, float(fitness), float(rmse))
+                    of_pair = (source, target, at_pose, found_by, uncertainty, frame.diameter)
+                    spread, fault = estimated_spread(estimate, estimator, *of_pair)
+                    notes += [fault] if fault else []
         if fitness == 0:
             notes.append("no source point is near the target, so the scores mean nothing")
         if found is None:
@@ -187,14 +195,6 @@ def _require_like_sizes(source: np.ndarray, target: np.ndarray) -> None:
     ratio = extents[0] / extents[1]
     if not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
         raise InputError("source", f"is {ratio:.3g} times as large as the target", "give both in the same unit")
-
-
-def _spread(
-    icp: BatchedICP, source: np.ndarray, T_icp: np.ndarray, settings: UncertaintySettings, diameter: float
-) -> PoseSpread:
-    xi_n_6 = generator("explanation", "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
-    runs = run_from_starts(icp, thin(source, settings.icp_points, "spread"), np.eye(4), xi_n_6)
-    return PoseSpread(runs.covariance(T_icp), settings.starts, diameter)
 
 
 @contextmanager

@@ -21,11 +21,19 @@ WORDS = {  # what a reader is told of each branch
 
 @dataclass(frozen=True)
 class PoseSpread:
-    """How far poses scatter when ICP starts elsewhere: Σ (6, 6) of twists in radians and diameters, over n starts."""
+    """How uncertain the pose is.
+
+    Attributes:
+        covariance_6_6: Σ of twists on the left of the pose, in radians and diameters.
+        diameter: of the target, in the unit of the points.
+        estimator: that says so.
+        starts: of Monte-Carlo; None of another estimator.
+    """
 
     covariance_6_6: np.ndarray
-    starts: int
     diameter: float
+    estimator: str
+    starts: int | None
 
     @property
     def rotation_deg(self) -> float:
@@ -54,7 +62,7 @@ class Explanation:
         concept: the one with the largest score (Eq. 6).
         action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`).
         reason: why this action, in words.
-        spread: how far the pose scatters by Monte-Carlo ICP, where it was asked for.
+        spread: how uncertain the pose is by an estimator, where it was asked for and could tell.
         unit: that of all lengths.
         seconds: those of each stage, and ``total``.
         notes: what a reader has to know, such as points that were left out.
@@ -83,6 +91,7 @@ class Explanation:
             "rotation_deg": self.spread.rotation_deg,
             "translation": self.spread.translation,
             "covariance": self.spread.covariance_6_6.tolist(),
+            "estimator": self.spread.estimator,
             "starts": self.spread.starts,
         }
         return vars(self) | {
@@ -101,7 +110,8 @@ class Explanation:
         lines = [*self._diagnosed(), action, "", *self._attributed(), "", registered]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
-            lines.append(f"pose spread    {scatter} (root mean square over {self.spread.starts} starts)")
+            by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"
+            lines.append(f"pose spread    {scatter} (root mean square {by})")
         lines += ["", f"T_target_source, in {self.unit}"]
         lines += [" ".join(f"{number:12.6g}" for number in row) for row in self.T_target_source]
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())

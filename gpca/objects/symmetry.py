@@ -84,6 +84,24 @@ def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> f
     return float(2 * np.arccos(np.sqrt(min(1.0, cosine_squared_K.max()))))
 
 
+def symmetric_turn(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> np.ndarray:
+    """Return the rotation S (3, 3) that leaves the shape as it is and makes R S the least one.
+
+    The angle of R S is that of :func:`angle_up_to_symmetry`.
+    """
+    axes = [np.asarray(entry["axis"], np.float64) for entry in symmetries.get("symmetries_continuous", [])]
+    if len(axes) > 1:
+        return R_3_3.T
+    turns = list(_generated(symmetries))
+    for i, turn in enumerate(turns):
+        for axis in axes:
+            x, y, z, w = Rotation.from_matrix(R_3_3 @ turn).as_quat()
+            half_angle = np.arctan2(-(axis @ (x, y, z)), w)
+            turns[i] = turn @ Rotation.from_rotvec(2 * half_angle * axis).as_matrix()
+    cosines = [abs(Rotation.from_matrix(R_3_3 @ turn).as_quat()[3]) for turn in turns]
+    return turns[int(np.argmax(cosines))]
+
+
 def _generated(symmetries: Mapping[str, list]) -> np.ndarray:
     """Return the rotations (K, 3, 3) that the discrete symmetries make one after the other, the identity first."""
     listed = [np.reshape(T, (4, 4))[:3, :3] for T in symmetries.get("symmetries_discrete", [])]

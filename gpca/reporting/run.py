@@ -17,6 +17,7 @@ from gpca.objects.title import title_of
 from gpca.recovery.policies import policy_entry
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
 from gpca.reporting.tables.kernel_grid import PRINTED
+from gpca.uncertainty.estimators.registry import estimator_entry
 
 
 def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -34,6 +35,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "seed": list(config["seeds"]),
         "first_seed": str(config["seeds"][0]),
         "method": installed_methods(config),
+        "estimator": list(config["estimators"]),
         "explainer": list(config["explainers"]),
         "cause_explainer": list(config["diagnosis"]["explainers"]),
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
@@ -74,6 +76,9 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
             for entry in [method_entry(name)]
         },
         "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
+        "estimators": {name: estimator_entry(name).title for name in config["estimators"]},
+        "estimated_methods": {name: method_entry(name).title for name in config["estimator_pairs"]["methods"]},
+        "estimator_pairs": config["estimator_pairs"],
         "global_start": config["method_pairs"]["global_start"],
         "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
         "explainer_titles": {name: entry.title for name, entry in entries.items()},

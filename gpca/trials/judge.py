@@ -6,8 +6,10 @@ import numpy as np
 
 from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverse
+from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.symmetry import angle_up_to_symmetry, find_symmetries
+from gpca.pairs.dataset import Registrations
 
 JUDGED_POINTS = 1000  # of the object, over which ADD is the mean
 SYMMETRY_POINTS = 4096  # as everywhere where symmetries are sought
@@ -19,13 +21,14 @@ class Judge:
     All lengths are in diameters, and the target's frame is the object's canonical one, with the origin at its centre.
 
     Attributes:
+        symmetries: rotations that leave the shape as it is, as :func:`gpca.objects.symmetry.find_symmetries` has them.
         symmetric: whether ADD-S counts.
     """
 
     def __init__(self, objects: ObjectClouds, index: int) -> None:
         diameter_m = float(objects.diameters_m[index])
-        self._symmetries = find_symmetries(objects.points(index)[:SYMMETRY_POINTS], diameter_m)
-        self.symmetric = bool(self._symmetries)
+        self.symmetries = find_symmetries(objects.points(index)[:SYMMETRY_POINTS], diameter_m)
+        self.symmetric = bool(self.symmetries)
         self._add = PoseErrors(objects.points(index).astype(np.float64) / diameter_m, JUDGED_POINTS, self.symmetric)
 
     def __call__(self, T_target_source: np.ndarray, T_target_source_true: np.ndarray) -> dict[str, float]:
@@ -33,6 +36,28 @@ class Judge:
         T_off = T_target_source @ inverse(T_target_source_true)  # moves the object from where it is
         return {
             "add_relative": float(self._add(T_off[None])[0]),
-            "rotation_error_rad": angle_up_to_symmetry(T_off[:3, :3], self._symmetries),
+            "rotation_error_rad": angle_up_to_symmetry(T_off[:3, :3], self.symmetries),
             "translation_error": float(np.linalg.norm(T_off[:3, 3])),
         }
+
+
+class Judges:
+    """The judge of each object, made when it is first asked for; `subject` names the objects in a message."""
+
+    def __init__(self, objects: ObjectClouds, subject: str) -> None:
+        self._objects, self._subject = objects, subject
+        self._made: dict[int, Judge] = {}
+
+    def of(self, registrations: Registrations, row: int) -> Judge:
+        """Return the judge of a registration's object.
+
+        Raises:
+            InputError: the objects have another one in its place.
+        """
+        index, name = int(registrations.object_index[row]), str(registrations.object_name[row])
+        if index >= len(self._objects) or str(self._objects.names[index]) != name:
+            fault = f"object {index} is not '{name}', as the registrations have it"
+            raise InputError(self._subject, fault, "give those that the registrations were made of")
+        if index not in self._made:
+            self._made[index] = Judge(self._objects, index)
+        return self._made[index]

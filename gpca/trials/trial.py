@@ -18,7 +18,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
-from gpca.trials.judge import Judge
+from gpca.trials.judge import Judges
 from gpca.trials.rows import INITIAL, NO_START, SEVERITIES
 from gpca.trials.settings import PairSettings
 
@@ -56,16 +56,17 @@ def try_methods(
     require_global(start)
     if start not in made:
         raise InputError("method_pairs.global_start", f"'{start}' is not among the methods", "add it, or name another")
-    rows = _chosen(registrations, objects, source, settings.samples)
-    judges = {index: Judge(objects, index) for index in sorted(set(registrations.object_index[rows].tolist()))}
+    rows = _chosen(registrations, source, settings.samples)
+    of_objects = Judges(objects, f"objects of {source}")
+    judges = [of_objects.of(registrations, row) for row in rows]
     first = observed_pair(registrations, rows[0], source, seed, settings.points)
     for method in made.values():
         method(first)
     records: dict[str, list[dict]] = {name: [] for name in made}
-    for row in progress(rows, f"registration methods on {source}, seed {seed}"):
+    for i, row in enumerate(progress(rows, f"registration methods on {source}, seed {seed}")):
         pair = observed_pair(registrations, row, source, seed, settings.points)
         T_true = registrations.T_target_source("true", row)
-        judge = judges[int(registrations.object_index[row])]
+        judge = judges[i]
         known = {
             "sample": registrations.sample[row],
             "object": registrations.object_name[row],
@@ -121,13 +122,9 @@ def _timed(method: Method, pair: Pair) -> tuple[Outcome, float]:
     return outcome, perf_counter() - started
 
 
-def _chosen(registrations: Registrations, objects: ObjectClouds, source: str, samples: int) -> np.ndarray:
+def _chosen(registrations: Registrations, source: str, samples: int) -> np.ndarray:
     """Return the rows of the first test samples: threes of one object, which go round the objects."""
     rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < samples))
     if not len(rows):
         raise InputError(f"registrations of {source}", "hold no test samples", "raise registrations.test")
-    for index, name in zip(registrations.object_index[rows], registrations.object_name[rows], strict=True):
-        if index >= len(objects) or objects.names[index] != name:
-            fault = f"object {index} is not '{name}', as the registrations have it"
-            raise InputError(f"objects of {source}", fault, "give those that the registrations were made of")
     return rows

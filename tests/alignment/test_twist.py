@@ -3,7 +3,7 @@ import pytest
 from scipy.linalg import expm
 
 from gpca.alignment.rigid import rotation_angle_rad
-from gpca.alignment.twist import exp, log
+from gpca.alignment.twist import adjoint, exp, log, point_jacobians
 
 
 def hat(xi_6):
@@ -63,3 +63,16 @@ def test_half_of_a_twist_twice_is_the_whole():
     half_n = exp(xi_n_6 / 2)
     assert np.allclose(half_n @ half_n, exp(xi_n_6), atol=1e-12)
     assert np.allclose(exp(xi_n_6) @ exp(-xi_n_6), np.eye(4), atol=1e-12)
+
+
+def test_the_adjoint_takes_a_twist_to_another_frame():
+    T = exp(np.array([[0.4, -1.0, 0.7, 0.3, 0.1, -0.2]]))[0]
+    for xi_6 in twists(0.8, 5):
+        assert np.allclose(exp((adjoint(T) @ xi_6)[None])[0], T @ exp(xi_6[None])[0] @ np.linalg.inv(T), atol=1e-12)
+
+
+def test_points_move_by_their_jacobians():
+    points = np.random.default_rng(0).normal(size=(7, 3))
+    for axis in np.eye(6):
+        moved = points @ exp(1e-6 * axis[None])[0][:3, :3].T + exp(1e-6 * axis[None])[0][:3, 3]
+        assert np.allclose((moved - points) / 1e-6, point_jacobians(points) @ axis, atol=1e-5)

@@ -13,7 +13,7 @@ from .configs import MISSING, changed, load, merged
     "key",
     [
         *("sources.linemod", "encoders.pointnet2", "reductions.umap", "uncertainty.oracle", "explainers.shap_oracle"),
-        "methods.trimmed",
+        *("methods.trimmed", "estimators.stein_icp", "estimator_pairs.methods.point_to_plane"),
         *("learners.learner_forest", "recovery.policies.random", "active_learning.strategies.badge"),
     ],
 )
@@ -63,6 +63,7 @@ def test_a_dataset_that_is_false_leaves_the_scenes():
     ("key", "message"),
     [
         ("methods.fgr", "method_pairs.global_start: registration method 'fgr' is left out; known are point_to_"),
+        ("estimators.gauss", "estimators: no estimator 'gauss'; known are bayesian_icp, "),
         ("methods.icp", "methods: no registration method 'icp'; known are fgr, "),
         ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; known are pointnet, "),
         ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; known are linemod, ycb"),

@@ -153,7 +153,8 @@ def test_a_failed_registration_is_noted(explainer, pair):
     [
         ({"method": "icp"}, "registration method 'icp': unknown"),
         ({"method": ""}, "registration method '': unknown"),
-        ({"method": "gicp", "uncertainty": UncertaintySettings()}, "the spread is that of the model's own ICP"),
+        ({"uncertainty": UncertaintySettings(), "estimator": "gauss"}, "estimator 'gauss': unknown"),
+        ({"uncertainty": UncertaintySettings(), "estimator": "cello"}, "'cello': learns from registrations"),
     ],
 )
 def test_a_method_that_cannot_be_asked_is_refused(explainer, pair, arguments, message):
@@ -169,6 +170,24 @@ def test_the_spread_of_the_pose_is_measured_where_it_is_asked_for(explainer, pai
     assert 0 <= explanation.spread.rotation_deg < 60
     assert 0 <= explanation.spread.translation < 100
     assert "uncertainty" in explanation.seconds
+
+
+def test_an_estimator_says_how_uncertain_the_pose_of_a_method_is(explainer, pair):
+    asked = {"uncertainty": UncertaintySettings(starts=13, icp_points=64), "method": "gicp", "estimator": "brossard"}
+    explanation = explainer.explain(*pair, **asked)
+    spread = explanation.spread
+    assert np.linalg.eigvalsh(spread.covariance_6_6).min() > 0
+    assert spread.translation == pytest.approx(spread.diameter * np.sqrt(np.trace(spread.covariance_6_6[3:, 3:])))
+    assert "(root mean square by brossard)" in explanation.text()
+    assert explanation.as_dict()["spread"]["estimator"] == "brossard"
+    assert explanation.as_dict()["spread"]["starts"] is None
+
+
+def test_an_estimator_that_cannot_tell_leaves_a_note(explainer, pair):
+    asked = {"uncertainty": UncertaintySettings(icp_points=64), "estimator": "bonnabel"}
+    explanation = explainer.explain(*pair, **asked)
+    assert explanation.spread is None
+    assert [note for note in explanation.notes if note.startswith("bonnabel gives no covariance: the Hessian is no")]
 
 
 def test_an_explanation_is_json_and_text(explainer, pair):

@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import angle_up_to_symmetry, find_symmetries, read_symmetries
+from gpca.objects.symmetry import angle_up_to_symmetry, find_symmetries, read_symmetries, symmetric_turn
 
 create = trimesh.creation
 
@@ -95,3 +95,18 @@ def test_the_closed_form_is_the_least_over_all_turns_about_the_axis():
 def test_a_ball_has_no_angle():
     ball = {"symmetries_continuous": [{"axis": [1.0, 0.0, 0.0]}, {"axis": [0.0, 1.0, 0.0]}]}
     assert angle_up_to_symmetry(turn([0, 0, 1], 50), ball) == 0
+
+
+def test_the_turn_that_leaves_the_least_angle_is_a_symmetry():
+    cone = {"symmetries_continuous": [{"axis": [0.0, 0.0, 1.0], "offset": [0.0, 0.0, 0.0]}]}
+    shapes = {"none": {}, "bar": discrete(turn([0, 0, 1], 90), turn([1, 0, 0], 180)), "cone": cone}
+    shapes["cylinder"] = cone | discrete(turn([1, 0, 0], 180))
+    for name, symmetries in shapes.items():
+        for R in Rotation.random(5, rng=np.random.default_rng(0)).as_matrix():
+            S = symmetric_turn(R, symmetries)
+            left = Rotation.from_matrix(R @ S).magnitude()
+            assert left == pytest.approx(angle_up_to_symmetry(R, symmetries), abs=1e-6), name
+            assert angle_up_to_symmetry(S, symmetries) == pytest.approx(0, abs=1e-6), name
+    ball = {"symmetries_continuous": [{"axis": [1.0, 0.0, 0.0]}, {"axis": [0.0, 1.0, 0.0]}]}
+    R = turn([0, 0, 1], 50)
+    np.testing.assert_allclose(R @ symmetric_turn(R, ball), np.eye(3), atol=1e-12)

@@ -48,6 +48,17 @@ STEP_OPTIONS = {
         "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--out": "descriptors.npz",
         "--timings": "descriptors.csv",
     },
+    "estimate": COMMON | {
+        "--settings": {
+            "estimator_pairs": {
+                "methods": {"point_to_point": 2}, "train": 8, "train_starts": 7, "points": 64, "starts": 20,
+            },
+            "estimators": {"brossard": {}, "cello": {"steps": 2}},
+        },
+        "--seeds": 100, "--estimators": ["brossard", "cello"], "--objects": "objects.npz", "--causes": "causes.npz",
+        "--samples": "reference_samples.npz", "--out": ["reference_said.csv", "brossard_said.csv", "cello_said.csv"],
+        "--timings": ["reference_seconds.csv", "brossard_seconds.csv", "cello_seconds.csv"],
+    },
     "train_on_causes": COMMON | {
         "--settings": ENCODER, "--seed": 100, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
         "--weights": "cause_weights.pt", "--curve": "cause_curve.csv", "--out": "cause_embeddings.npz",

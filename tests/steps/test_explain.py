@@ -18,7 +18,9 @@ FAULTS = [
     (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: holds 3 numbers; give 4×4"),
     (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
     (untouched, {"--method": "icp"}, r"registration method 'icp': unknown; known are fgr, "),
-    (untouched, {"--method": "gicp", "--uncertainty": []}, r"'gicp': the spread is that of the model's own ICP, not"),
+    (untouched, {"--uncertainty": "gauss"}, r"estimator 'gauss': unknown; known are .*brossard"),
+    (untouched, {"--uncertainty": "cello"}, r"'cello': learns from registrations of training objects, and there are"),
+    (untouched, {"--uncertainty": ""}, r"estimator '': unknown"),
     (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),
 ]
 
@@ -43,6 +45,14 @@ def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys
     text = capsys.readouterr().out
     for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
         assert word in text
+
+
+def test_an_estimator_says_how_uncertain_another_methods_pose_is(folder, capsys):
+    assert main(arguments("explain", {"--method": "gicp", "--uncertainty": "brossard"})) == 0
+    spread = json.loads(capsys.readouterr().out)["spread"]
+    assert spread["estimator"] == "brossard"
+    assert spread["starts"] is None
+    assert np.linalg.eigvalsh(np.array(spread["covariance"])).min() > 0
 
 
 def test_another_method_finds_the_pose_and_the_model_says_why(folder, capsys):

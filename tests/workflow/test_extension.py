@@ -14,7 +14,7 @@ SMOKE = ("--configfile", "config/smoke.yaml")
 ROW = {"sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "run_icp": 5, "attribute": 16}
 ROW |= {"sample_causes": 2, "describe": 2, "train_on_causes": 2, "diagnose": 4}
 ROW |= {"sample_model_causes": 1, "describe_model_causes": 1}
-ROW |= {"register_methods": 1, "shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
+ROW |= {"register_methods": 1, "estimate": 1, "shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
 COLLECTORS = {"metrics": 1, "timings": 1, "fig_attribution_confusions": 1, "table1_extended": 1}
 TABLES = dict.fromkeys(("table1_single_baselines", "table2_per_concept"), 1)
 TABLES |= dict.fromkeys(("active_learning", "active_learning_curves", "diagnostics"), 1)
@@ -23,6 +23,7 @@ TABLES |= dict.fromkeys(("table5_learners", "table5_shift", "table5_claims"), 1)
 TABLES |= dict.fromkeys(("cause_metrics", "cause_intervals", "table9_causes", "cause_confusions"), 1)
 TABLES |= dict.fromkeys(("nominal_reliability", "model", "time_stages", "table7_runtime", "runtime"), 1)
 TABLES |= dict.fromkeys(("registration_methods", "table11_registration", "table11_severity"), 1)
+TABLES |= dict.fromkeys(("estimator_metrics", "table12_uncertainty", "estimators"), 1)
 TABLES |= dict.fromkeys(("coverage_risk", "reliability", "uncertainty_vs_distance"), 1)
 
 

@@ -27,7 +27,7 @@ def test_every_config_loads_offline_and_asks_for_all_results(
     assert planned.jobs["render_scenes"] == (config != "real")
     assert planned.jobs["run_icp"] == sources * (5 if config == "smoke" else 6)
     assert planned.jobs["shift"] == planned.jobs["fit_learners"] == sources
-    assert planned.jobs["register_methods"] == sources
+    assert planned.jobs["register_methods"] == planned.jobs["estimate"] == sources
     assert planned.jobs["fit_kernel_grid"] == (1 if config == "smoke" else 2)
     assert planned.jobs["embed_without"] == planned.jobs["learn_actively"] == sources * seeds
     for name in (
@@ -43,6 +43,11 @@ def test_every_config_loads_offline_and_asks_for_all_results(
         "diagnostics.csv",
         "kernels.csv",
         "registration_methods.csv",
+        "estimators.csv",
+        "tables/table12_uncertainty.md",
+        "figures/estimators.pdf",
+        "estimates/ycb/reference/seed0.csv",
+        "timings/ycb/estimator_brossard/seed0.csv",
         "tables/table11_registration.md",
         "methods/ycb/gicp/seed0.csv",
         "timings/ycb/method_gicp/seed0.csv",

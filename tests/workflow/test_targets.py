@@ -31,6 +31,7 @@ MODEL = jobs("model") + RUNTIME
 RECOVERY_FIGURES = jobs("recovery_rates", "fig6_mitigation", "fig1_recovery_example")
 RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
+ESTIMATED = jobs("estimator_metrics", "table12_uncertainty", "estimators")
 # GP-CA on the two reductions of Table VI, and what shows it.
 BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 # What four explainers say of the causes: from the samples on, and what is made of it.
@@ -90,6 +91,12 @@ def test_table11_needs_the_registrations_alone(planned):
     }  # fmt: skip
 
 
+def test_table12_needs_the_causes_alone(planned):
+    assert planned.before("results/smoke/tables/table12_uncertainty.md") == {
+        "sample_objects": 2, "sample_causes": 4, "estimate": 2, "estimator_metrics": 1, "table12_uncertainty": 1,
+    }  # fmt: skip
+
+
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
@@ -114,7 +121,7 @@ EDITS = {
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
         jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES + jobs(register_methods=2) + METHODS,
+        + MODEL_CAUSES + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED,
     "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
     "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
@@ -141,8 +148,11 @@ EDITS = {
     + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
     + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL
-    + jobs("register_methods") + METHODS,
-    "gpca/descriptors/entropy.py": jobs(describe=4, diagnose=8, describe_model_causes=2) + CAUSES_SHOWN + MODEL,
+    + jobs("register_methods", "estimate") + METHODS + ESTIMATED,
+    "gpca/descriptors/entropy.py":
+        jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED,
+    "gpca/uncertainty/estimators/censi.py": jobs(estimate=2) + ESTIMATED,
+    "gpca/reporting/figures/estimators.py": jobs("estimators"),
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
 }  # fmt: skip
 

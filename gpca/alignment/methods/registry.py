@@ -60,6 +60,15 @@ def require_global(name: str) -> None:
         raise InputError(f"registration method '{name}'", "needs an initial pose itself", f"global ones are {known}")
 
 
+def require_local(name: str) -> None:
+    """Raise an InputError unless the method is known, installed, and starts at an initial pose."""
+    if method_entry(name).is_global:
+        remedy = "name one that starts at an initial pose"
+        raise InputError(f"registration method '{name}'", "is global, so that its results do not spread", remedy)
+    if package := left_out([name]).get(name):
+        raise InputError(f"registration method '{name}'", f"needs the package {package}", "install it, or name another")
+
+
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
     """Return a method as a function from pairs to outcomes.
 

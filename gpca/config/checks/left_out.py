@@ -12,6 +12,7 @@ from gpca.config.leave_out import names_left_out
 from gpca.recovery.actions import ACTIONS
 from gpca.recovery.policies import ALWAYS, POLICIES
 from gpca.settings import load_schema
+from gpca.uncertainty.estimators.registry import estimators
 
 
 def check_left_out(config: dict) -> None:
@@ -26,6 +27,8 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "reductions": ("reduction", sections["reductions"]["properties"]),
         "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
         "methods": ("registration method", methods()),
+        "estimators": ("estimator", estimators()),
+        "estimator_pairs.methods": ("registration method", methods()),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),

@@ -113,6 +113,25 @@ def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bo
     return Cell(mean, mean - low, len(values_R), test_samples, at_least)
 
 
+def cell_over_sources(
+    metrics: pd.DataFrame,
+    values: pd.DataFrame,
+    sources: Iterable[str],
+    method: str,
+    metric: str,
+    concept: str,
+    factor: float,
+) -> Cell | None:
+    """Return the mean over the seeds of what all pairs of a seed have, whatever their source."""
+    counts = rows_where(metrics, method=method, metric="test_samples", concept=concept)
+    of_metric = rows_where(values, method=method, metric=metric, concept=concept)
+    both = of_metric.merge(counts, on=["source", "seed"], suffixes=("", "_n"))
+    both = both[both["source"].isin(list(sources))]
+    sums = (both["value"] * both["value_n"]).groupby(both["seed"]).sum()
+    counts_R = both.groupby("seed")["value_n"].sum()
+    return cell_of_repeats((factor * sums / counts_R).to_numpy(), int(counts_R.sum()))
+
+
 def plain_cell(value: float, seeds: int, test_samples: int) -> Cell:
     """Return a number that has no interval."""
     return Cell(value, nan, seeds, test_samples)

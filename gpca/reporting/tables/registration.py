@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 from gpca.attribution.metrics import ALL
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
-from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over
+from gpca.reporting.tables.table import Column, Table
 from gpca.trials.metrics import BINS, bin_name
 from gpca.trials.rows import INITIAL, NO_START, row_name
 
@@ -48,9 +48,15 @@ def table11_registration(
     table = _table("table11_registration")
     causes = (ALL, *CONCEPTS)
     for labels, name in _rows(methods, global_start):
-        cells = {f"success_{cause}": _cell(metrics, metrics, sources, name, "success", cause, 100) for cause in causes}
-        cells |= {key: _cell(metrics, metrics, sources, name, key, ALL, factor) for key, (_, factor) in _ERRORS.items()}
-        cells["milliseconds"] = _cell(metrics, seconds, sources, name, "seconds", ALL, 1e3)
+        cells = {
+            f"success_{cause}": cell_over_sources(metrics, metrics, sources, name, "success", cause, 100)
+            for cause in causes
+        }
+        cells |= {
+            key: cell_over_sources(metrics, metrics, sources, name, key, ALL, factor)
+            for key, (_, factor) in _ERRORS.items()
+        }
+        cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", ALL, 1e3)
         table.add_row(labels, cells)
     table.require_rows("metrics", "hold no registration method", "run the step register_methods first")
     columns = {f"success_{cause}": Column(f"{cause.capitalize()} (%)") for cause in causes}
@@ -84,7 +90,9 @@ def table11_severity(
         for severity in BINS
     }
     for labels, name in _rows(methods, global_start):
-        table.add_row(labels, {key: _cell(metrics, metrics, sources, name, "success", key, 100) for key in columns})
+        table.add_row(
+            labels, {key: cell_over_sources(metrics, metrics, sources, name, "success", key, 100) for key in columns}
+        )
     table.require_rows("metrics", "hold no registration method", "run the step register_methods first")
     table.compare_down(columns, same=1)
     pairs = {key: cell.test_samples for (_, key), cell in table.cells.items()}
@@ -115,30 +123,11 @@ def _rows(methods: Mapping[str, Mapping], global_start: str) -> Iterable[tuple[l
                 yield [(start, title), (name, entry["title"])], row_name(name, start)
 
 
-def _cell(
-    metrics: pd.DataFrame,
-    values: pd.DataFrame,
-    sources: Mapping[str, Mapping],
-    method: str,
-    metric: str,
-    concept: str,
-    factor: float,
-) -> Cell | None:
-    """Return the mean over the seeds of what all pairs of a seed have, whatever their source."""
-    counts = rows_where(metrics, method=method, metric="test_samples", concept=concept)
-    of_metric = rows_where(values, method=method, metric=metric, concept=concept)
-    both = of_metric.merge(counts, on=["source", "seed"], suffixes=("", "_n"))
-    both = both[both["source"].isin(list(sources))]
-    sums = (both["value"] * both["value_n"]).groupby(both["seed"]).sum()
-    counts_R = both.groupby("seed")["value_n"].sum()
-    return cell_of_repeats((factor * sums / counts_R).to_numpy(), int(counts_R.sum()))
-
-
 def _notes(
     table: TableBuilder, metrics: pd.DataFrame, sources: Mapping[str, Mapping], left_out: Mapping[str, str]
 ) -> list[str]:
     (start, _), (method, _) = table.rows[0]
-    pairs = _cell(metrics, metrics, sources, row_name(method, start), "success", ALL, 1)
+    pairs = cell_over_sources(metrics, metrics, sources, row_name(method, start), "success", ALL, 1)
     per_seed = pairs.test_samples // pairs.seeds if pairs else 0
     notes = [
         f"{mean_over(table.most_seeds(), per_seed)}. A success is off by less than the config's `method_pairs.success` "

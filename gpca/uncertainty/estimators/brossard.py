@@ -1,0 +1,45 @@
+"""Brossard, Bonnabel & Barrau (2020): an unscented transform of the initial pose, and a term of the sensor.
+
+The starts' spread goes through the method by 2·6 sigma points and their middle, 13 runs. The sensor's white noise w and
+a bias b, the same for all points along their normals, move the minimum by A⁻¹ Σ Jᵀ (w + b) with A = Σ JᵀJ; the bias is
+what remains when there are many points.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.uncertainty.estimators.interface import EstimatorEntry, RegisteredPair, inverse_hessian
+
+SIGMA_POINTS = 12
+
+
+def estimate(registered: RegisteredPair, noise: float = 0.0, bias: float = 0.0) -> np.ndarray:
+    """Return Σ = Σ_unscented + σ² A⁻¹ + b² g gᵀ with g = A⁻¹ Σ Jᵀ.
+
+    Args:
+        noise: σ, standard deviation of the distances from planes, in diameters; with 0 it is estimated from them.
+        bias: b, in diameters; with 0 it is as large as the noise, as the authors take it.
+
+    Raises:
+        FailedEstimate: no normals, a singular Hessian, or a method that does not start at an initial pose.
+    """
+    distances_n, rows_n_6 = registered.matches().plane_rows()
+    variance = noise**2 if noise else np.square(distances_n).sum() / max(len(distances_n) - 6, 1)
+    inverse_6_6 = inverse_hessian(np.einsum("ni,nj->ij", rows_n_6, rows_n_6))
+    shift_6 = inverse_6_6 @ rows_n_6.sum(axis=0)
+    sensor_6_6 = variance * inverse_6_6 + (bias**2 or variance) * np.outer(shift_6, shift_6)
+    return unscented(registered) + sensor_6_6
+
+
+def unscented(registered: RegisteredPair) -> np.ndarray:
+    """Return the covariance (6, 6) of the results from starts at ±√6 σ along each axis, about their mean.
+
+    The middle sigma point has no weight, as in a transform of κ = 0; it is the registration itself.
+    """
+    offsets_6_6 = np.sqrt(SIGMA_POINTS / 2) * np.diag(registered.deviation_6)
+    twists_m_6 = registered.twists_from(np.concatenate([offsets_6_6, -offsets_6_6]))
+    return np.cov(twists_m_6, rowvar=False, bias=True)
+
+
+ESTIMATORS = {"brossard": EstimatorEntry("Brossard, unscented", estimate)}

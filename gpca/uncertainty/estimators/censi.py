@@ -1,0 +1,64 @@
+"""Censi's closed form (2007): how the minimum of ICP's cost moves with the points, while the matches stay.
+
+With A(z, ξ) the cost of the points z at the twist ξ, Σ = H⁻¹ (∂²A/∂z∂ξ) Σ_z (∂²A/∂z∂ξ)ᵀ H⁻¹ with H = ∂²A/∂ξ². That the
+matches change with the pose is left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.alignment.twist import point_jacobians
+from gpca.uncertainty.estimators.interface import (
+    POINT_TO_POINT,
+    EstimatorEntry,
+    FailedEstimate,
+    Matches,
+    RegisteredPair,
+    inverse_hessian,
+)
+
+
+def estimate(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
+    """Return Σ of point-to-point ICP.
+
+    Args:
+        noise: standard deviation of every coordinate of both clouds' points, in diameters; with 0 it is estimated from
+            the residuals, in which that of both clouds adds up.
+
+    Raises:
+        FailedEstimate: another method than point-to-point, or a singular Hessian.
+    """
+    if not registered.method.startswith(POINT_TO_POINT):
+        raise FailedEstimate(f"the closed form is that of point-to-point, not of '{registered.method}'")
+    matches = registered.matches()
+    variance = noise**2 if noise else matches.variance / 2
+    inverse_6_6 = inverse_hessian(hessian(matches))
+    of_source_n_6_3, of_target_n_6_3 = mixed_derivatives(matches)
+    middle_6_6 = sum(np.einsum("nij,nkj->ik", of_z, of_z) for of_z in (of_source_n_6_3, of_target_n_6_3))
+    return variance * inverse_6_6 @ middle_6_6 @ inverse_6_6
+
+
+def hessian(matches: Matches) -> np.ndarray:
+    """Return H (6, 6) of A = Σ |exp(ξ) y - q|² at ξ = 0, the curvature of the motion included."""
+    y, r = matches.source, matches.residuals
+    hessian_6_6 = 2 * np.einsum("nik,nil->kl", matches.jacobians, matches.jacobians)
+    outer_3_3 = np.einsum("ni,nj->ij", r, y)
+    hessian_6_6[:3, :3] += outer_3_3 + outer_3_3.T - 2 * np.trace(outer_3_3) * np.eye(3)
+    cross_3_3 = -point_jacobians(r.sum(axis=0)[None])[0, :, :3]
+    hessian_6_6[3:, :3] += cross_3_3
+    hessian_6_6[:3, 3:] += cross_3_3.T
+    return hessian_6_6
+
+
+def mixed_derivatives(matches: Matches) -> tuple[np.ndarray, np.ndarray]:
+    """Return ∂²A/∂y∂ξ and ∂²A/∂q∂ξ (n, 6, 3), by the moved source points and by the target's.
+
+    The gradient is 2 Σ (y × r, r) with r = y - q; moving y by a changes y × r by q × a, moving q by b by -y × b.
+    """
+    of_source_n_6_3 = 2 * np.swapaxes(point_jacobians(matches.target), 1, 2)
+    of_target_n_6_3 = -2 * np.swapaxes(point_jacobians(matches.source), 1, 2)
+    return of_source_n_6_3, of_target_n_6_3
+
+
+ESTIMATORS = {"censi": EstimatorEntry("Censi, closed form", estimate)}

@@ -1,0 +1,239 @@
+"""What every estimator takes and gives: a registered pair in, the covariance of its pose out.
+
+All lengths are in diameters of the object, and twists are (rotation, translation) on the left of the pose, in the
+target's frame: T = exp(ξ) T̂.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gpca.alignment.icp import ICPSettings
+from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, MAX_ITERATIONS, Outcome, Pair
+from gpca.alignment.methods.registry import make_method, method_entry
+from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.twist import exp, log, point_jacobians
+
+SINGULAR = 1e-9  # ratio of eigenvalues below which a direction counts as open
+FEWEST_RUNS = 7  # that give a 6×6 covariance its rank
+POINT_TO_POINT, POINT_TO_PLANE = "point_to_point", "point_to_plane"
+Starter = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+class FailedEstimate(Exception):
+    """Raised inside an estimator that cannot tell; the registry makes a failed estimate of it."""
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Source points (n, 3) at the pose, their nearest target points, and how the points move under a twist.
+
+    Attributes:
+        jacobians: (n, 3, 6).
+        normals: (n, 3) of the target's points, or None.
+    """
+
+    source: np.ndarray
+    target: np.ndarray
+    normals: np.ndarray | None
+
+    @cached_property
+    def residuals(self) -> np.ndarray:
+        """(n, 3) from the target's points to the source's."""
+        return self.source - self.target
+
+    @cached_property
+    def jacobians(self) -> np.ndarray:
+        """(n, 3, 6) of the source's points."""
+        return point_jacobians(self.source)
+
+    @property
+    def variance(self) -> float:
+        """Of a coordinate of a residual, with the six that the pose has taken subtracted."""
+        squares = np.square(self.residuals)
+        return float(squares.sum() / max(squares.size - 6, 1))
+
+    def plane_rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return distances from the target's planes (n,) and how they change under a twist (n, 6).
+
+        Raises:
+            FailedEstimate: the target has no normals.
+        """
+        if self.normals is None:
+            raise FailedEstimate("the target has no normals")
+        distances_n = np.einsum("ni,ni->n", self.normals, self.residuals)
+        return distances_n, np.einsum("ni,nij->nj", self.normals, self.jacobians)
+
+
+@dataclass(frozen=True)
+class RegisteredPair:
+    """A registration whose covariance is asked for.
+
+    Attributes:
+        pair: the clouds, where the registration started, and a seed for what an estimator draws.
+        outcome: what the method found.
+        method: its name in the registry of methods.
+        deviation_6: standard deviations of the initial pose's twist.
+        describe: returns the pair's descriptors (F,), for estimators that have learnt from others.
+    """
+
+    pair: Pair
+    outcome: Outcome
+    method: str
+    deviation_6: np.ndarray
+    describe: Callable[[], np.ndarray] | None = None
+
+    @property
+    def T_target_source(self) -> np.ndarray:
+        """The pose (4×4)."""
+        return self.outcome.T_target_source
+
+    def matches(self) -> Matches:
+        """Return the correspondences at the pose; fewer than three are a failure."""
+        moved_N_3 = transform(self.T_target_source, self.pair.source)
+        distance_N, rows_N = self.pair.target_tree.query(moved_N_3)
+        near_N = distance_N < CORRESPONDENCE_DISTANCE
+        if near_N.sum() < FEWEST:
+            raise FailedEstimate(f"fewer than {FEWEST} correspondences at the pose")
+        normals = self.pair.target_normals
+        rows_n = rows_N[near_N]
+        return Matches(moved_N_3[near_N], self.pair.target[rows_n], None if normals is None else normals[rows_n])
+
+    def twists_from(self, xi_n_6: np.ndarray) -> np.ndarray:
+        """Register from the starts exp(ξ) T_init and return the results' twists about the pose (m, 6).
+
+        Runs that found no correspondence are no results.
+
+        Raises:
+            FailedEstimate: too few runs found any, or the method reads no initial pose.
+        """
+        if method_entry(self.method).is_global:
+            raise FailedEstimate(f"'{self.method}' reads no initial pose, so that its results do not spread")
+        poses_n, found_n = self._register(exp(xi_n_6) @ self.pair.T_target_source_init)
+        if found_n.sum() < FEWEST_RUNS:
+            raise FailedEstimate(f"fewer than {FEWEST_RUNS} runs found a correspondence")
+        return log(poses_n[found_n] @ inverse(self.T_target_source))
+
+    @cached_property
+    def _register(self) -> Starter:
+        if self.method in (POINT_TO_POINT, POINT_TO_PLANE):
+            return _batched(self.pair, self.method)
+        register = make_method(self.method)
+
+        def from_starts(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            outcomes = [register(self.pair.started_at(start)) for start in starts_n]
+            found_n = np.array([outcome.fitness > 0 for outcome in outcomes])
+            return np.array([outcome.T_target_source for outcome in outcomes]), found_n
+
+        return from_starts
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What an estimator says: Σ (6, 6) in radians and diameters, or why it says nothing."""
+
+    covariance_6_6: np.ndarray | None
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Example:
+    """A registration to learn from.
+
+    Attributes:
+        descriptors: (F,).
+        twists: (n, 6) results of several starts, as :meth:`RegisteredPair.twists_from` gives them.
+        true_twist: (6,) of the true pose about that of the registration.
+        T_target_intrinsic: :func:`intrinsic_frame` of the pair.
+    """
+
+    descriptors: np.ndarray
+    twists: np.ndarray
+    true_twist: np.ndarray
+    T_target_intrinsic: np.ndarray
+
+
+Estimator = Callable[[RegisteredPair], np.ndarray]
+
+
+@dataclass(frozen=True)
+class EstimatorEntry:
+    """An estimator in the registry: it has the one or the other function.
+
+    Attributes:
+        title: as tables name the row.
+        estimate: ``estimate(registered, **settings)`` returns Σ (6, 6) or raises :class:`FailedEstimate`.
+        learn: ``learn(examples, **settings)`` returns such a function of a registered pair.
+    """
+
+    title: str
+    estimate: Callable[..., np.ndarray] | None = None
+    learn: Callable[..., Estimator] | None = None
+
+    @property
+    def function(self) -> Callable[..., object]:
+        """The one that takes the settings."""
+        return self.learn or self.estimate  # type: ignore[return-value]
+
+
+def require_examples(examples: Sequence[Example], fewest: int) -> None:
+    """Raise FailedEstimate where there are too few examples to learn from."""
+    if len(examples) < fewest:
+        raise FailedEstimate(f"{len(examples)} registrations to learn from, not {fewest}")
+
+
+def inverse_hessian(hessian_6_6: np.ndarray) -> np.ndarray:
+    """Return H⁻¹.
+
+    Raises:
+        FailedEstimate: the Hessian is singular, or no minimum.
+    """
+    values_6 = np.linalg.eigvalsh(hessian_6_6)
+    if not np.isfinite(values_6).all() or values_6[-1] <= 0:
+        raise FailedEstimate("the Hessian is singular: nothing holds the pose")
+    if (least := values_6[0] / values_6[-1]) < -SINGULAR:
+        raise FailedEstimate("the Hessian is not positive: the pose is no minimum")
+    if least < SINGULAR:
+        open_directions = int((values_6 < SINGULAR * values_6[-1]).sum())
+        raise FailedEstimate(f"the Hessian is singular: {open_directions} of 6 directions are open")
+    return np.linalg.inv(hessian_6_6)
+
+
+def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
+    """Return T_target_intrinsic (4×4): a cloud's centroid and principal axes, the longest first.
+
+    An axis points to where the cloud reaches farther, by the sum of cubes, so that like clouds have like frames.
+    """
+    centre_3 = points_N_3.mean(axis=0)
+    offset_N_3 = points_N_3 - centre_3
+    axes_3_3 = np.linalg.eigh(np.einsum("ni,nj->ij", offset_N_3, offset_N_3))[1][:, ::-1]
+    along_N_3 = np.einsum("ni,ij->nj", offset_N_3, axes_3_3)
+    axes_3_3 = axes_3_3 * np.where((along_N_3**3).sum(axis=0) < 0, -1.0, 1.0)
+    axes_3_3[:, 2] = np.cross(axes_3_3[:, 0], axes_3_3[:, 1])
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = axes_3_3, centre_3
+    return T
+
+
+def _batched(pair: Pair, method: str) -> Starter:
+    from gpca.alignment.batched_icp import BatchedICP
+    from gpca.alignment.batched_plane_icp import BatchedPlaneICP
+
+    settings = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)
+    icp: BatchedICP | BatchedPlaneICP
+    if method == POINT_TO_POINT:
+        icp = BatchedICP(pair.target, settings)
+    elif pair.target_normals is None:
+        raise FailedEstimate("the target has no normals")
+    else:
+        icp = BatchedPlaneICP(pair.target, pair.target_normals, settings)
+
+    def from_starts(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        poses_n, fitness_n, _ = icp.register(pair.source, starts_n)
+        return poses_n, fitness_n > 0
+
+    return from_starts

@@ -1,0 +1,78 @@
+"""Table XII."""
+
+import pytest
+
+from gpca.attribution.metrics import tidy
+from gpca.errors import InputError
+from gpca.reporting.tables.estimators import table12_uncertainty
+
+SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
+ESTIMATORS, METHODS = {"censi": "Censi", "brossard": "Brossard"}, {"point_to_point": "ICP", "point_to_plane": "Plane"}
+VALUES = {"kl_rotation": 2.0, "nees": 3.0, "coverage": 0.5, "auroc_failed": 0.7, "no_estimate": 0.25}
+
+
+def records(metric, value, step=0.01):
+    return [
+        ("estimators", source, name, metric, method, seed, value(source, name) + step * seed)
+        for source in SOURCES
+        for name in ("reference", *ESTIMATORS)
+        for method in METHODS
+        for seed in range(2)
+    ]
+
+
+@pytest.fixture
+def metrics():
+    found = records("test_samples", lambda source, _: {"ycb": 30, "cups": 10}[source], step=0)
+    for metric, size in VALUES.items():
+        of = {name: size * (1 + (name == "censi")) for name in ("reference", *ESTIMATORS)}
+        found += records(metric, lambda source, name, of=of: of[name] * (1 + (source == "cups")))
+    return tidy(found, "estimates")
+
+
+@pytest.fixture
+def seconds():
+    return tidy(records("seconds", lambda *_: 0.02), "seconds")
+
+
+def made(metrics, seconds, sources=SOURCES):
+    return table12_uncertainty(metrics, seconds, sources, ESTIMATORS, METHODS, {"starts": 1000})
+
+
+def test_methods_stand_apart_and_the_reference_comes_first(metrics, seconds):
+    table = made(metrics, seconds)
+    names = [tuple(key for key, _ in labels) for labels in table.rows]
+    assert names == [(m, n) for m in METHODS for n in ("reference", "censi", "brossard")]
+    assert table.rows[0][1][1] == "Reference, 1000 starts"
+
+
+def test_sources_count_by_their_registrations(metrics, seconds):
+    cell = made(metrics, seconds).cells[2, "kl_rotation"]  # Brossard's: 2 and, of a quarter, 4
+    assert cell.mean == pytest.approx(2.5 + 0.005)
+    assert (cell.seeds, cell.test_samples) == (2, 80)
+    assert made(metrics, seconds).cells[2, "milliseconds"].mean == pytest.approx(25)
+
+
+def test_the_reference_has_no_divergence_and_competes_with_none(metrics, seconds):
+    table = made(metrics, seconds)
+    assert (0, "kl_rotation") not in table.cells
+    assert table.best() == {(2, "kl_rotation"), (5, "kl_rotation"), (1, "auroc_failed"), (4, "auroc_failed")}
+
+
+def test_what_an_estimator_refuses_is_a_dash_and_counted(metrics, seconds):
+    refused = (metrics["method"] == "censi") & ~metrics["metric"].isin(["no_estimate", "test_samples"])
+    table = made(metrics[~refused], seconds)
+    assert (1, "nees") not in table.cells
+    assert (1, "no_estimate") in table.cells
+
+
+def test_the_notes_say_what_was_counted(metrics, seconds):
+    text = made(metrics, seconds).markdown()
+    assert "Mean over 2 seeds, 40 by ICP, 40 by Plane registrations each" in text
+    assert "Monte-Carlo with 1000 starts" in text
+    assert "stand-in" in text
+
+
+def test_nothing_to_show_is_one_line(metrics, seconds):
+    with pytest.raises(InputError, match="hold no estimator for table12_uncertainty; run the step estimate first"):
+        made(metrics[metrics["source"] == "none"], seconds)

@@ -1,0 +1,103 @@
+"""Censi's closed form against finite differences of what it is made of, and of the minimum itself."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from gpca.alignment.least_squares import best_motion
+from gpca.alignment.rigid import transform
+from gpca.alignment.twist import exp, log
+from gpca.uncertainty.estimators.censi import estimate, hessian, mixed_derivatives
+from gpca.uncertainty.estimators.interface import FailedEstimate, Matches
+
+from .cases import plane, registered
+
+STEP = 1e-4
+
+
+@pytest.fixture
+def matches():
+    """Twelve matched points at the pose of least squares, with residuals that are no rounding."""
+    random = np.random.default_rng(0)
+    target = random.normal(size=(12, 3)) * [0.5, 0.3, 0.2]
+    source = target + 0.05 * random.normal(size=target.shape)
+    return Matches(transform(best_motion(source, target, np.ones(12)), source), target, None)
+
+
+def cost(xi_6, source, target):
+    return float(np.square(transform(exp(xi_6[None])[0], source) - target).sum())
+
+
+def second_difference(function, i, j):
+    """∂²f/∂x_i ∂x_j at zero, of a function of six numbers."""
+    a, b = STEP * np.eye(6)[i], STEP * np.eye(6)[j]
+    return (function(a + b) - function(a - b) - function(b - a) + function(-a - b)) / (4 * STEP**2)
+
+
+def test_the_hessian(matches):
+    found = [
+        [second_difference(lambda xi: cost(xi, matches.source, matches.target), i, j) for j in range(6)]
+        for i in range(6)
+    ]
+    np.testing.assert_allclose(hessian(matches), found, atol=1e-5)
+
+
+def test_the_mixed_derivatives(matches):
+    """By one coordinate of one point of either cloud, and one of the twist."""
+    for which, derivatives_n_6_3 in enumerate(mixed_derivatives(matches)):
+        for point, axis, k in ((0, 0, 0), (3, 1, 2), (5, 2, 4), (7, 0, 5), (9, 1, 3)):
+
+            def gradient(step, which=which, point=point, axis=axis, k=k):
+                clouds = [matches.source.copy(), matches.target.copy()]
+                clouds[which][point, axis] += step
+                forward, backward = (cost(sign * STEP * np.eye(6)[k], *clouds) for sign in (1, -1))
+                return (forward - backward) / (2 * STEP)
+
+            found = (gradient(STEP) - gradient(-STEP)) / (2 * STEP)
+            assert derivatives_n_6_3[point, k, axis] == pytest.approx(found, abs=1e-5)
+
+
+def test_the_covariance_is_that_of_the_minimum_under_noise_of_the_points(matches):
+    """The definition: registered again and again with new noise, the matches kept."""
+    sigma, random = 1e-3, np.random.default_rng(1)
+    runs = []
+    for _ in range(1500):
+        source, target = (cloud + sigma * random.normal(size=cloud.shape) for cloud in (matches.source, matches.target))
+        runs.append(log(best_motion(source, target, np.ones(12))[None])[0])
+    inverse = np.linalg.inv(hessian(matches))
+    middle = sum(np.einsum("nij,nkj->ik", part, part) for part in mixed_derivatives(matches))
+    expected, found = sigma**2 * inverse @ middle @ inverse, np.cov(np.array(runs), rowvar=False)
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.abs((found - expected) / scale).max() < 0.15
+
+
+def test_the_noise_is_given_or_estimated_from_the_residuals():
+    pair = registered(noise=0.01)
+    assert estimate(pair, noise=0.02) == pytest.approx(4 * estimate(pair, noise=0.01))
+    variance = pair.matches().variance / 2
+    assert estimate(pair) == pytest.approx(estimate(pair, noise=np.sqrt(variance)))
+    assert variance == pytest.approx(
+        np.square(pair.matches().residuals).sum() / (pair.matches().residuals.size - 6) / 2
+    )
+
+
+def test_a_hessian_that_leaves_a_turn_open_is_named():
+    """All points on one line: turning about it moves nothing."""
+
+    def line(seed):
+        along = np.sort(np.random.default_rng(seed).uniform(-0.5, 0.5, 200))
+        return np.outer(along, [1.0, 0, 0]), np.tile([0.0, 0, 1], (200, 1))
+
+    with pytest.raises(FailedEstimate, match="Hessian is singular: 1 of 6 directions"):
+        estimate(registered(shape=line))
+    assert np.isfinite(estimate(registered(shape=plane))).all()  # between points a plane holds all six
+
+
+def test_another_method_is_refused():
+    with pytest.raises(FailedEstimate, match="that of point-to-point, not of 'gicp'"):
+        estimate(registered("gicp"))
+
+
+def test_the_least_of_the_cost_is_where_the_fixture_says(matches):
+    found = minimize(lambda xi: cost(xi, matches.source, matches.target), np.full(6, 0.01), tol=1e-12)
+    assert np.abs(found.x).max() < 1e-5

@@ -1,0 +1,97 @@
+"""CELLO-3D and the learned ensemble on examples of which it is known what a descriptor means."""
+
+import numpy as np
+import pytest
+
+from gpca.alignment.twist import adjoint, exp, log
+from gpca.uncertainty.estimators import cello, learned
+from gpca.uncertainty.estimators.interface import Example, FailedEstimate, intrinsic_frame
+
+from .cases import ellipsoid, registered
+
+FRAME = intrinsic_frame(ellipsoid(1)[0])
+SCALE_6 = np.array([1, 2, 3, 0.5, 1, 1.5]) * 0.02
+
+
+def example(easy, seed):
+    """Twists along the axes whose variance is ten times as large where the first four descriptors are near 1."""
+    random = np.random.default_rng(seed)
+    along_n_6 = random.normal(size=(30, 6)) * SCALE_6 * (1 if easy else 10) ** 0.5
+    twists_n_6 = along_n_6 @ adjoint(FRAME).T
+    descriptors = np.concatenate([(0 if easy else 1) + 0.1 * random.normal(size=4), random.normal(size=3)])
+    return Example(descriptors, twists_n_6, np.zeros(6), FRAME)
+
+
+EXAMPLES = [example(seed % 2 == 0, seed) for seed in range(60)]
+
+
+def variances(estimate, easy):
+    """What is estimated along the axes, of another pair of the kind."""
+    descriptors = example(easy, 1000).descriptors
+    covariance = estimate(registered(describe=lambda: descriptors))
+    back = np.linalg.inv(adjoint(FRAME))
+    return back @ covariance @ back.T
+
+
+@pytest.mark.parametrize(("module", "tolerance"), [(cello, 0.35), (learned, 0.6)])
+def test_the_covariance_is_that_of_like_pairs(module, tolerance):
+    estimate = module.learn(EXAMPLES)
+    for easy, factor in ((True, 1), (False, 10)):
+        found = variances(estimate, easy)
+        assert np.diag(found) == pytest.approx(factor * SCALE_6**2, rel=tolerance)
+        assert found == pytest.approx(np.diag(np.diag(found)), abs=1e-9)
+
+
+def test_networks_contradict_each_other_far_from_what_they_know():
+    """Errors with a mean that follows a descriptor: beyond the examples nobody knows how it goes on."""
+    random = np.random.default_rng(0)
+    examples = []
+    for x in random.uniform(-1, 1, 40):
+        truth = np.array([0.1 * x, 0, 0, 0, 0.1 * x, 0])
+        runs = 0.005 * random.normal(size=(13, 6))
+        descriptors = np.concatenate([[x], 0.01 * random.normal(size=3)])
+        examples.append(Example(descriptors, runs, adjoint(FRAME) @ truth, FRAME))
+    reduce = cello.Reduction([each.descriptors for each in examples], 4)
+    networks = learned._Ensemble(4, 16, 5)
+    features = reduce(np.array([each.descriptors for each in examples]))
+    errors = [learned._errors(each) for each in examples]
+    networks.fit(features, np.array([e.mean(0) for e in errors]), np.array([e.var(0) for e in errors]), 200, 0.01, 1e-3)
+    known, unknown = (networks.variances(reduce(np.array([[x, 0, 0, 0]])))[1].sum() for x in (0.0, 5.0))
+    assert unknown > 3 * known
+
+
+def test_an_error_is_the_truth_seen_from_each_run():
+    runs, truth = 0.1 * np.random.default_rng(0).normal(size=(4, 6)), np.array([0.1, 0, 0.05, 0.02, 0, 0])
+    found = learned._errors(Example(np.zeros(3), runs, truth, np.eye(4)))
+    for error, run in zip(found, runs, strict=True):
+        assert exp(error[None])[0] @ exp(run[None])[0] == pytest.approx(exp(truth[None])[0], abs=1e-12)
+    assert learned._errors(Example(np.zeros(3), truth[None], truth, np.eye(4))) == pytest.approx(np.zeros((1, 6)))
+
+
+def test_descriptors_that_say_nothing_are_not_learnt_by_heart():
+    """Each training pair is predicted by the others alone; by itself too, the metric would single it out."""
+    random = np.random.default_rng(5)
+    blind = [Example(random.normal(size=7), each.twists, each.true_twist, FRAME) for each in EXAMPLES]
+    pooled = np.mean([cello._variances(each) for each in blind], axis=0)
+    assert np.diag(variances(cello.learn(blind), True)) == pytest.approx(pooled, rel=0.4)
+
+
+@pytest.mark.parametrize("module", [cello, learned])
+def test_too_few_examples_and_a_pair_without_descriptors_are_failures(module):
+    with pytest.raises(FailedEstimate, match="7 registrations to learn from, not 8"):
+        module.learn(EXAMPLES[:7])
+    with pytest.raises(FailedEstimate, match="the pair has no descriptors"):
+        module.learn(EXAMPLES[:8], steps=1)(registered())
+
+
+def test_what_never_changes_says_nothing():
+    reduce = cello.Reduction([np.array([1.0, x, 5.0]) for x in range(4)], 8)
+    assert np.isfinite(reduce(np.array([[2.0, 1.0, 9.0]]))).all()
+    assert reduce(np.array([[2.0, 1.0, 9.0]])) == pytest.approx(reduce(np.array([[1.0, 1.0, 5.0]])))
+
+
+def test_twists_go_to_the_axes_and_back():
+    twist = np.arange(6.0)[None] / 50
+    along = cello.twists_along_axes(twist, FRAME)
+    assert exp(along)[0] == pytest.approx(np.linalg.inv(FRAME) @ exp(twist)[0] @ FRAME)
+    assert log(FRAME @ exp(along) @ np.linalg.inv(FRAME)) == pytest.approx(twist)

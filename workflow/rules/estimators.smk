@@ -1,0 +1,86 @@
+# Registrations with measured causes -> what every estimator says of their uncertainty -> estimators.csv.
+from gpca.trials.covariances import REFERENCE
+from gpca.uncertainty.estimators.registry import estimator_module
+
+ESTIMATORS = [REFERENCE, *NAMES["estimator"]]
+
+
+rule estimates:
+    input:
+        collect(
+            "<results>/estimates/{source}/{estimator}/seed{seed}.csv",
+            source=SOURCES,
+            estimator=ESTIMATORS,
+            seed=SEEDS,
+        ),
+
+
+rule estimate:
+    input:
+        objects="<results>/objects/{source}.npz",
+        causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
+        code=code_files(
+            "gpca.steps.estimate",
+            *map(estimator_module, NAMES["estimator"]),
+            *map(method_module, config["estimator_pairs"]["methods"]),
+        ),
+    output:
+        rows=collect(
+            "<results>/estimates/{{source}}/{estimator}/seed{seed}.csv",
+            estimator=ESTIMATORS,
+            seed=SEEDS,
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/estimator_{estimator}/seed{seed}.csv",
+            estimator=ESTIMATORS,
+            seed=SEEDS,
+        ),
+        samples=collect(
+            "<results>/reference_samples/{{source}}/seed{seed}.npz", seed=SEEDS
+        ),
+    log:
+        "<logs>/estimates/{source}.log",
+    benchmark:
+        "<benchmarks>/estimates/{source}.tsv"
+    wildcard_constraints:
+        source="|".join(SOURCES),
+    priority: 2
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        settings=as_json(
+            {name: config[name] for name in ("estimator_pairs", "estimators")}
+        ),
+        estimators=NAMES["estimator"],
+        seeds=SEEDS,
+    shell:
+        "python -m gpca estimate --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "--estimators {params.estimators} --settings {params.settings:q} --objects {input.objects} "
+        "--causes {input.causes} --samples {output.samples} --out {output.rows} --timings {output.timings} 2> {log}"
+
+
+rule estimator_metrics:
+    input:
+        files=rules.estimates.input,
+        code=collector_code("gpca.trials.calibration:collect_estimates"),
+    output:
+        "<results>/estimators.csv",
+    log:
+        "<logs>/estimators.log",
+    benchmark:
+        "<benchmarks>/estimators.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.trials.calibration:collect_estimates",
+    script:
+        "../scripts/collect.py"
