@@ -104,9 +104,8 @@ class PairClassifier:
             gpc.fit(inputs_N_F, np.where(present_N, PRESENT, ABSENT))
         return self
 
-    def judge(self, features_N_F: np.ndarray) -> Judgement:
-        """Return what the classifiers say."""
-        inputs_N_F = self.normalised(features_N_F)
+    def judge(self, inputs_N_F: np.ndarray) -> Judgement:
+        """Return what the classifiers say of descriptors that `normalised` has mapped."""
         (failed, _, bald), *causes = (gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes))
         return Judgement(
             failure_N=failed[:, 1],
