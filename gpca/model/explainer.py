@@ -6,7 +6,7 @@ frame, ICP, the mean embedding of random draws, posterior draws.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,8 @@ import torch
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points, thin
-from gpca.alignment.rigid import require_rigid, transform
+from gpca.alignment.icp import clipped_cost
+from gpca.alignment.rigid import inverse, require_rigid, transform
 from gpca.attribution.scores import entropy
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
@@ -30,6 +31,8 @@ from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
 
+GOOD_FITNESS = 0.9  # from which on an initial pose is not doubted
+INVERSE_COST = 0.5  # of that from the initial pose; where the inverse of this ends with less, it was probably meant
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
 
@@ -90,7 +93,8 @@ class Explainer:
             require_cloud_points(source, "source")
             frame = frame or CanonicalFrame.of(target, unit)
             target = frame.coordinates(self._thinned(target, "target", notes))
-            source = frame.coordinates(transform(T_init, self._thinned(source, "source", notes)))
+            seen = self._thinned(source, "source", notes)
+            source = frame.coordinates(transform(T_init, seen))
             _require_like_sizes(source, target)
             icp = self._icp(target)
         with _timed(seconds, "icp"):
@@ -107,12 +111,25 @@ class Explainer:
         told = [*scores_C, *((found.failure, *found.causes.values()) if found else ())]
         if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
             raise InputError("model", "it gives no finite numbers for these clouds", "make another one")
+        with _timed(seconds, "familiarity"):
+            warnings = list(self.model.familiar.warnings(source, target)) if self.model.familiar else []
+            if found is not None and found.unlikeness > 1:
+                warnings.append(
+                    f"the pair is {found.unlikeness:.1f} times as far from the registrations that the diagnosis was "
+                    "learnt from as 99 % of these are from one another"
+                )
+            if fitness == 0:
+                warnings.append("no source point is near the target at the initial pose, so the scores mean nothing")
+            if fitness < GOOD_FITNESS and T_target_source_init is not None:
+                from_inverse = frame.coordinates(transform(inverse(T_init), seen))
+                distance = self.model.icp.correspondence_distance
+                _, *fits = (of_starts[0] for of_starts in icp.register(from_inverse, np.eye(4)[None]))
+                if clipped_cost(*fits, distance) < INVERSE_COST * clipped_cost(fitness, rmse, distance):
+                    warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         spread = None
         if uncertainty is not None:
             with _timed(seconds, "uncertainty"):
                 spread = _spread(icp, source, T_icp, uncertainty, frame.diameter)
-        if fitness == 0:
-            notes.append("no source point is near the target at the initial pose, so the scores mean nothing")
         if found is None:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
         elif found.state == NOMINAL:
@@ -135,7 +152,36 @@ class Explainer:
             unit=unit,
             seconds=seconds | {"total": perf_counter() - started},
             notes=tuple(notes),
+            warnings=tuple(warnings),
         )
+
+    def explain_many(
+        self,
+        pairs: Iterable[tuple[np.ndarray, np.ndarray] | tuple[np.ndarray, np.ndarray, np.ndarray | None]],
+        unit: str = "m",
+        uncertainty: UncertaintySettings | None = None,
+        diagnose: bool = True,
+    ) -> Iterator[Explanation]:
+        """Yield the explanation of each pair in turn, as :meth:`explain` gives it.
+
+        The frame of a target that is the same array as that of the pair before is measured once.
+
+        Args:
+            pairs: source, target, and the pose where ICP starts if it is not the identity.
+            unit, uncertainty, diagnose: as for :meth:`explain`.
+
+        Raises:
+            InputError: as :meth:`explain`, when the pair's turn comes; the line names the number of the pair, from 0.
+        """
+        known, frame = None, None
+        for number, (source_points, target_points, *init) in enumerate(pairs):
+            try:
+                if frame is None or target_points is not known:
+                    known, frame = target_points, CanonicalFrame.of(np.asarray(target_points, np.float64), unit)
+                T_init = init[0] if init else None
+                yield self.explain(source_points, target_points, T_init, unit, frame, uncertainty, diagnose)
+            except InputError as fault:
+                raise InputError(f"pair {number}", str(fault)) from fault
 
     @torch.inference_mode()
     def embed(self, aligned: np.ndarray) -> np.ndarray:

@@ -17,6 +17,8 @@ FAULTS = [
     (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit"),
     (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: holds 3 numbers; give 4×4"),
     (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
+    (untouched, {"meshes/capsule.obj": []}, r"explain: 2 sources; print them with --json-lines"),
+    (truncated("meshes/capsule.obj"), {"meshes/capsule.obj": [], "--json": None, "--json-lines": []}, r"capsule.obj: "),
     (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),
 ]
 
@@ -41,3 +43,15 @@ def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys
     text = capsys.readouterr().out
     for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
         assert word in text
+
+
+def test_several_sources_are_a_line_each(folder, capsys):
+    sources = ["meshes/brick.stl", "meshes/cone.ply"]
+    words = ["explain", *sources, "meshes/cone.ply", "--unit", "mm", "--model", "model.pt", "--json-lines"]
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert [line["source"] for line in lines] == sources
+    assert {line["target"] for line in lines} == {"meshes/cone.ply"}
+    assert all(set(line["diagnosis"]["causes"]) == {"noise", "pose", "overlap"} for line in lines)
+    assert "meshes/brick.stl: source: 128 of 16384 points, drawn at random\n" in err

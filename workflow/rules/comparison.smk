@@ -23,7 +23,13 @@ FOUND = [
     *("metrics.csv", "cause_intervals.csv", "real_world.csv"),
     *("active_learning.csv", "recovery.csv"),
 ]
+ROOT_OF_RUN = Path("results", config["run"])
 REFERENCE = ROOT / "results/reference/real/comparison.csv"
+
+
+onsuccess:
+    if (ROOT_OF_RUN / "index.html").is_file():
+        print(f"The page of the run: {ROOT_OF_RUN / 'index.html'}", file=sys.stderr)
 
 
 rule comparison:
