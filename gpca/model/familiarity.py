@@ -15,6 +15,7 @@ from gpca.seeds import generator
 
 MEASURES = ("size", "depth", "closure")
 SHARE = 0.99  # of the training samples lies within the range of each measure
+SIZE_MARGIN = 1.1  # by which a source may be larger or smaller still: a sensor may show a little less or more of it
 POINTS = 1024  # at most; of a cloud whose depth is measured
 DIRECTIONS = 32  # from which a cloud is looked at
 CELL, CELLS = 1 / 16, 64  # diameters, and cells along an axis of the picture
@@ -29,7 +30,7 @@ def measure(source: np.ndarray, target: np.ndarray) -> dict[str, float]:
 
     - size: radius of gyration of the source in that of the target.
     - closure: share of the target's points that is hidden behind others, from the direction that hides fewest: 0.3 to
-      0.5 of an object with a front and a back, about 0 of a view from one side.
+      0.5 of an object with a front and a back, 0 to 0.2 of a view from one side.
     - depth: the same share of the source in that of the target; NaN where this is a thin object.
     """
     closure = hidden_share(target)
@@ -61,7 +62,7 @@ def _frames() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Familiarity:
-    """The range (low, high) of each measure that holds `SHARE` of the training samples."""
+    """The range (low, high) of each measure, which holds `SHARE` of the training samples, or more."""
 
     ranges: Mapping[str, tuple[float, float]]
 
@@ -74,7 +75,9 @@ class Familiarity:
         for name in MEASURES:
             values = np.array([of_pair[name] for of_pair in measured])
             values = values[np.isfinite(values)]
-            ranges[name] = tuple(np.quantile(values, ends).tolist()) if len(values) else (0.0, np.inf)
+            low, high = np.quantile(values, ends).tolist() if len(values) else (0.0, np.inf)
+            margin = SIZE_MARGIN if name == "size" else 1.0
+            ranges[name] = low / margin, high * margin
         return cls(ranges)
 
     def warnings(self, source: np.ndarray, target: np.ndarray) -> list[str]:
