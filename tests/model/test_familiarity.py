@@ -33,7 +33,7 @@ def shapes(four):
     return {name: pair for name, pair in made.items() if "scissors" not in name}
 
 
-UNSEEN = ("duck", "can", "019_pitcher_base")
+UNSEEN = ("duck", "can")  # the others hold what a training should: an open vessel, a long thing, a flat one
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +96,7 @@ def test_half_of_a_sphere_is_hidden_and_little_of_one_side_of_it():
 
 def test_good_input_of_shapes_that_were_not_learnt_raises_no_warning(learnt, unseen):
     assert warned(learnt["wholes"], wholes(unseen)) == []
-    assert len(warned(learnt["views"], views(unseen))) <= 1  # of eighteen, by as few as were learnt
+    assert len(warned(learnt["views"], views(unseen))) <= 1  # of twelve, by as few as were learnt
 
 
 def test_whole_clouds_are_unlike_partial_views_and_the_other_way_round(learnt, clouds, unseen):
@@ -113,10 +113,8 @@ def test_a_target_of_one_side_is_not_the_whole_object(learnt, clouds, unseen):
     assert sum("give the whole object" in line for line in said) >= 0.9 * 42
 
 
-@pytest.mark.parametrize(
-    ("scale", "words"), [(0.3, "the source is 0."), (2.0, "the source is 2"), (3, "the source is 3")]
-)
-def test_another_scale_is_noticed(learnt, clouds, scale, words):
+@pytest.mark.parametrize("scale", [0.3, 2.0, 3.0])
+def test_another_scale_is_noticed(learnt, clouds, scale):
     for target, source in clouds:
         [line] = [line for line in warned(learnt["wholes"], [(scale * source, target)]) if "same unit" in line]
-        assert line.startswith(words)
+        assert float(line.split()[3]) == pytest.approx(scale, rel=0.1)
