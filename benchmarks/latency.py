@@ -1,6 +1,7 @@
 """How long one explanation takes, from two clouds to scores, against the same steps by plain means.
 
     python benchmarks/latency.py [--threads 1] [--points 512] [--pairs 12] [--repeats 50] [--draws 1000]
+    python benchmarks/latency.py --model results/real/model.pt [--points 512] ...
 
 Both register the same clouds and hold the same weights and posterior, in one process and in turn (A B A B …), so that
 whatever else the machine does meets both. Ours is the explainer of `python -m gpca explain` with its model loaded. The
@@ -11,6 +12,9 @@ ours embeds it once, and `speedup` is over a plain composition that does so too.
 embeds every draw, as the protocol reads. The clouds are perturbed ellipsoids, the encoder is not trained. Both sides
 draw their own numbers, so their scores differ by the error of sampling, which is printed beside the difference. The
 last line is a JSON object: median_ms, speedup, speedup_all_draws (medians over the repeats), max_score_difference.
+
+With a model of your own, whole explanations by it are timed, with and without the diagnosis, in turn. The last line is
+then a JSON object of their medians: median_ms, median_ms_gpca_alone.
 """
 
 from __future__ import annotations
@@ -38,6 +42,9 @@ def main(arguments: list[str] | None = None) -> None:
     import torch
 
     torch.set_num_threads(options.threads)
+    if options.model is not None:
+        time_model(options)
+        return
     explainer = make_explainer(options)
     plain = PlainComposition(explainer.model)
     pairs = [make_pair(options.points, "latency", n) for n in range(options.pairs)]
@@ -73,10 +80,37 @@ def main(arguments: list[str] | None = None) -> None:
     print(json.dumps({key: float(f"{value:.4g}") for key, value in result.items()}))
 
 
+def time_model(options: argparse.Namespace) -> None:
+    """Print the times of explanations by the model file that is named."""
+    from gpca.model.explainer import Explainer
+
+    explainer = Explainer.load(options.model)
+    pairs = [make_pair(options.points, "latency", n) for n in range(options.pairs)]
+    seconds: dict[bool, list[float]] = {True: [], False: []}
+    stages_s = []
+    for repeat in range(WARM_UP + options.repeats):
+        for diagnose in seconds:
+            elapsed, said = timed(
+                lambda pair, d=diagnose: explainer.explain(*pair, diagnose=d), pairs[repeat % len(pairs)]
+            )
+            if repeat >= WARM_UP:
+                seconds[diagnose].append(elapsed)
+                stages_s += [said.seconds] if diagnose else []
+    print(f"one explanation, {options.points} points, {options.threads} thread(s), {options.repeats} repeats in turn;")
+    print("ms: median (least)\n")
+    for name, diagnose in (("with diagnosis", True), ("GP-CA alone", False)):
+        print(f"{name:20}{1e3 * median(seconds[diagnose]):8.1f} ({1e3 * min(seconds[diagnose]):.1f})")
+    for stage in stages_s[0]:
+        print(f"{stage:20}{1e3 * median(of_stage[stage] for of_stage in stages_s):8.2f}")
+    result = {"median_ms": 1e3 * median(seconds[True]), "median_ms_gpca_alone": 1e3 * median(seconds[False])}
+    print(json.dumps({key: float(f"{value:.4g}") for key, value in result.items()}))
+
+
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in {"threads": 1, "points": 512, "pairs": 12, "repeats": 50, "draws": 1000}.items():
         parser.add_argument(f"--{name}", type=int, default=default, help=f"default {default}")
+    parser.add_argument("--model", type=Path, help="a model file, whose explanations are timed")
     options = parser.parse_args(arguments)
     if options.points < 64 or options.draws < 2 or min(options.threads, options.pairs, options.repeats) < 1:
         parser.error("points must be at least 64, draws 2 and the others 1")

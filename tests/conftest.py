@@ -83,6 +83,7 @@ def model(registrations, diagnoser):
     from gpca.classifier.settings import GPCSettings
     from gpca.encoders.settings import EncoderSettings
     from gpca.encoders.training import embed, make_model
+    from gpca.model.familiarity import Familiarity
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS
     from gpca.recovery.policy import RecoveryPolicy, Thresholds
@@ -95,7 +96,8 @@ def model(registrations, diagnoser):
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, iterations=40, inducing=12, draws=200), "tiny", 0)
     gpc.fit(h_S_d, train.concept)
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
-    return Model(diagnoser, network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", stand_in=True)
+    familiar = Familiarity.of((train.cloud(row), train.target(row)) for row in range(len(train)))
+    return Model(diagnoser, network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", True, familiar)
 
 
 @pytest.fixture(scope="session")

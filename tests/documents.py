@@ -6,15 +6,16 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 NOT_OURS = {"__pycache__", "data", "build", "gpca_bench.egg-info"}  # the last two are left by pip
+HIDDEN = {".ci", ".github", ".gitignore", ".pre-commit-config.yaml", ".snakemake-workflow-catalog.yml"}
 
 
 def our_files():
-    """All text files of the project; of results/ only what git keeps, of hidden ones .ci/ and .gitignore."""
+    """All text files of the project; of results/ only what git keeps, of hidden ones those of `HIDDEN`."""
     for folder, folders, names in os.walk(ROOT):
         here = Path(folder).relative_to(ROOT)
         kept = {"reference"} if here == Path("results") else set(folders) - NOT_OURS
-        folders[:] = sorted(name for name in folders if name in kept and (name[0] != "." or name == ".ci"))
-        for name in sorted(name for name in names if name[0] != "." or name == ".gitignore"):
+        folders[:] = sorted(name for name in folders if name in kept and (name[0] != "." or name in HIDDEN))
+        for name in sorted(name for name in names if name[0] != "." or name in HIDDEN):
             path = Path(folder, name)
             if path.suffix not in {".png", ".pdf", ".npz", ".pt", ".log"}:
                 yield path

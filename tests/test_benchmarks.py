@@ -226,6 +226,16 @@ def test_active_learning_compares_equal_bald_and_ends_with_its_numbers(capsys):
     assert "BALD of 30 embeddings, 20 draws" in out
 
 
+def test_latency_times_a_model_of_ones_own(model, tmp_path, capsys):
+    from benchmarks import latency
+
+    model.save(tmp_path / "model.pt")
+    latency.main(["--model", str(tmp_path / "model.pt"), "--points", "64", "--pairs", "2", "--repeats", "2"])
+    lines = capsys.readouterr().out.splitlines()
+    assert set(json.loads(lines[-1])) == {"median_ms", "median_ms_gpca_alone"}
+    assert any(line.startswith("diagnosis ") for line in lines)
+
+
 def test_latency_compares_explanations_of_equal_scores(capsys):
     from benchmarks import latency
 

@@ -2,6 +2,7 @@
 
 import csv
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -92,7 +93,7 @@ def snakemake_plans():
     parser = ArgumentParser()
     for option in ("--profile", "--configfile", "--config"):
         parser.add_argument(option)
-    for option in ("-j", "--report"):  # a report is not made in a dry run
+    for option in ("-j", "-q", "--report"):  # a report is not made in a dry run
         parser.add_argument(option, dest="unplanned")
     parser.add_argument("-n", "--report-after-run", action="store_true", dest="unplanned")
     parser.add_argument("targets", nargs="*")
@@ -143,6 +144,18 @@ def test_the_python_of_the_page_of_registration_methods_runs(registrations, caps
     clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
     exec(example, clouds | {"T_target_source_init": np.eye(4)})
     assert capsys.readouterr().out.startswith("True ")
+
+
+def test_the_tutorial_runs_to_its_end_and_warns_of_the_foreign_scale_alone(model, tmp_path, monkeypatch, capsys):
+    model.save(tmp_path / "model.pt")
+    monkeypatch.setenv("GPCA_MODEL", str(tmp_path / "model.pt"))
+    runpy.run_path(str(ROOT / "docs/tutorial.py"))
+    said = capsys.readouterr().out
+    assert [line.split()[0] for line in said.splitlines() if ": " in line and "failure 0" in line] == [
+        "noise", "pose", "overlap"
+    ]  # fmt: skip
+    assert "T_target_source, in m" in said
+    assert "warning: the source is 2" in said
 
 
 def test_every_page_of_the_docs_is_in_the_index():

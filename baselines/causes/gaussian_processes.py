@@ -66,7 +66,7 @@ class MultiLabelGPCA:
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration by the probabilities."""
         started = perf_counter()
-        judged = self._classifier.judge(self._features(registrations))
+        judged = self._classifier.judge(self._classifier.normalised(self._features(registrations)))
         scores_N_4 = np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
         return Attribution.of_scores(LABELS, scores_N_4, seconds=(perf_counter() - started) / len(registrations))
 

@@ -88,19 +88,31 @@ def mean_interval(values_R: Iterable[float], level: float = 0.95) -> tuple[float
     return mean, mean - half_width, mean + half_width
 
 
-def read_causal(path: str | Path) -> pd.Series:
-    """Return whether each sample is causal, indexed by (split, sample) as text: something made it uncertain.
+def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
+    """Return the uncertainty of each observed pair, and the 95th percentile of that of the clean ones.
 
-    Causal is what has an observed uncertainty above the 95th percentile of the clean ones in the file, which holds
-    those of one source and seed (KL divergences in nats, one row per test sample).
+    The file holds those of one source and seed (KL divergences in nats, one row per test sample). The first are
+    indexed by (split, sample) as text.
 
     Raises:
         InputError: missing, empty or unreadable file, missing column, a sample twice, an uncertainty not finite.
     """
     rows = read_csv(path, _CAUSAL_COLUMNS)
     require_samples(path, rows)
-    threshold = numbers(path, rows, "uncertainty_clean").quantile(CAUSAL_QUANTILE)
-    return (numbers(path, rows, "uncertainty_observed") > threshold).set_axis(_samples(rows))
+    limit = numbers(path, rows, "uncertainty_clean").quantile(CAUSAL_QUANTILE)
+    return numbers(path, rows, "uncertainty_observed").set_axis(_samples(rows)), float(limit)
+
+
+def read_causal(path: str | Path) -> pd.Series:
+    """Return whether each sample is causal, indexed by (split, sample) as text: something made it uncertain.
+
+    Causal is what is more uncertain than 95 % of the clean pairs.
+
+    Raises:
+        InputError: see :func:`read_uncertainties`.
+    """
+    observed, limit = read_uncertainties(path)
+    return observed > limit
 
 
 def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:

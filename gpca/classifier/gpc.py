@@ -139,6 +139,11 @@ class GPC:
         """Return what the covariance says of the embeddings, to be computed once where they are asked about often."""
         return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
 
+    @property
+    def learnt_N_d(self) -> np.ndarray:
+        """The standardised inputs of the labels that it learnt, (N, d)."""
+        return self._labelled.inputs_N_d
+
     def posterior(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation (N, C) of the latent logits q(f(h)); the latents are independent."""
         return self._latents.marginals(self.project(h_N_d))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -15,6 +16,8 @@ from gpca.seeds import seed_of
 
 QUANTILES = 100  # of each descriptor, at most
 FARTHEST = 3.0  # standard deviations; what lies beyond all training samples lies there
+NEIGHBOURS = 3  # among the training samples, by which a pair is told to be like them
+USUAL = 0.99  # share of the training samples that are no farther from their neighbours than is usual
 ABSENT, PRESENT = "absent", "present"
 
 
@@ -104,9 +107,8 @@ class PairClassifier:
             gpc.fit(inputs_N_F, np.where(present_N, PRESENT, ABSENT))
         return self
 
-    def judge(self, features_N_F: np.ndarray) -> Judgement:
-        """Return what the classifiers say."""
-        inputs_N_F = self.normalised(features_N_F)
+    def judge(self, inputs_N_F: np.ndarray) -> Judgement:
+        """Return what the classifiers say of descriptors that `normalised` has mapped."""
         (failed, _, bald), *causes = (gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes))
         return Judgement(
             failure_N=failed[:, 1],
@@ -114,6 +116,20 @@ class PairClassifier:
             causes_variances_N_3=np.column_stack([variances[:, 1] for _, variances, _ in causes]),
             bald_N=np.max([bald, *(of_cause for _, _, of_cause in causes)], axis=0),
         )
+
+    def unlikeness(self, inputs_N_F: np.ndarray) -> np.ndarray:
+        """Return how unlike the training samples each (N,) is; above 1 are 1 % of these themselves.
+
+        The mean distance to the nearest `NEIGHBOURS` training samples, in units of that which the share `USUAL` of
+        these have among one another.
+        """
+        known = self._failure.learnt_N_d
+        return _to_nearest(self._failure.project(inputs_N_F).inputs_N_d, known, 0) / self._usual_distance
+
+    @cached_property
+    def _usual_distance(self) -> float:
+        known = self._failure.learnt_N_d
+        return float(np.quantile(_to_nearest(known, known, 1), USUAL))
 
     def state(self) -> dict[str, object]:
         """Return all that was learnt, for :meth:`from_state`."""
@@ -131,3 +147,11 @@ class PairClassifier:
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
         return made
+
+
+def _to_nearest(of_N_F: np.ndarray, known_M_F: np.ndarray, skipped: int) -> np.ndarray:
+    """Return the mean distance (N,) to the nearest known samples, of which the first ones can be skipped: itself."""
+    from scipy.spatial.distance import cdist
+
+    nearest_N_M = np.sort(cdist(of_N_F, known_M_F), axis=1)
+    return nearest_N_M[:, skipped : skipped + NEIGHBOURS].mean(axis=1)

@@ -14,6 +14,7 @@ from gpca.descriptors.dataset import WIDTHS
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import require_like
+from gpca.model.familiarity import MEASURES
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import check_settings
@@ -34,6 +35,8 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     check_settings(vars(settings), "encoders", "*")
     check_settings(content["gpc"]["settings"], "explainers", "gpca")
     check_settings(content["icp"], "registrations", "icp")
+    if "familiar" in content:
+        _require_ranges(content["familiar"])
     if content["diagnoser"] is not None:
         _require_diagnoser(content["diagnoser"])
     counts = {
@@ -62,6 +65,14 @@ def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
     for name, (count, least, most) in counts.items():
         if type(count) is not int or not least <= count <= most:
             raise ValueError(f"{name}: {count!r} is no number from {least} to {most}")
+
+
+def _require_ranges(ranges: Mapping) -> None:
+    if set(ranges) != set(MEASURES):
+        raise ValueError(f"ranges of {', '.join(map(repr, ranges))}, not of {', '.join(MEASURES)}")
+    for name, (low, high) in ranges.items():
+        if not (type(low) is type(high) is float and 0 <= low <= high):
+            raise ValueError(f"range of {name}: {low!r} to {high!r} is none")
 
 
 def _require_diagnoser(state: Mapping) -> None:

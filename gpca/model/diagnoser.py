@@ -36,6 +36,7 @@ class Diagnosis:
         variances: of these over the posterior draws (Eq. 5).
         bald: of the least certain of these probabilities, nats (Eq. 7).
         expected_error: of the pose: ADD, or ADD-S of a symmetric object.
+        unlikeness: how unlike the training samples the pair is: 1 % of these are above 1.
     """
 
     failure: float
@@ -44,6 +45,7 @@ class Diagnosis:
     variances: dict[str, float]
     bald: float
     expected_error: float
+    unlikeness: float = 0.0
 
     @property
     def state(self) -> str:
@@ -91,9 +93,8 @@ class Diagnoser:
             model: (M, 3).
             T_icp: 4×4, what ICP found: takes the observed cloud to the model.
         """
-        features_1_F = self.features(observed, model, T_icp)[None]
-        judged = self.classifier.judge(features_1_F)
-        inputs_1_F = self.classifier.normalised(features_1_F)
+        inputs_1_F = self.classifier.normalised(self.features(observed, model, T_icp)[None])
+        judged = self.classifier.judge(inputs_1_F)
         log_error = float(inputs_1_F[0] @ self.error_weights[:-1] + self.error_weights[-1])
         return Diagnosis(
             failure=float(judged.failure_N[0]),
@@ -102,6 +103,7 @@ class Diagnoser:
             variances=dict(zip(CONCEPTS, judged.causes_variances_N_3[0].tolist(), strict=True)),
             bald=float(judged.bald_N[0]),
             expected_error=float(np.clip(np.exp(log_error), SMALLEST_ERROR, LARGEST_ERROR)),
+            unlikeness=float(self.classifier.unlikeness(inputs_1_F)[0]),
         )
 
     def features(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ frame, ICP, the mean embedding of random draws, posterior draws.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,13 +17,15 @@ import torch
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points, thin
+from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import require_rigid, transform
+from gpca.alignment.rigid import inverse, require_rigid, transform
 from gpca.attribution.scores import entropy
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
+from gpca.model.diagnoser import Diagnosis
 from gpca.model.explanation import Explanation
 from gpca.model.file import Model, model_path
 from gpca.model.pose_spread import MONTE_CARLO, NAMES, estimated_spread, spread_estimator, spread_of_icp
@@ -32,6 +34,8 @@ from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import UncertaintySettings
 
+GOOD_FITNESS = 0.9  # from which on an initial pose is not doubted
+INVERSE_COST = 0.5  # of that from the initial pose; where the inverse of this ends with less, it was probably meant
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
 
@@ -101,7 +105,8 @@ class Explainer:
             require_cloud_points(source, "source")
             frame = frame or CanonicalFrame.of(target, unit)
             target = frame.coordinates(self._thinned(target, "target", notes))
-            source = frame.coordinates(transform(T_init, self._thinned(source, "source", notes)))
+            seen = self._thinned(source, "source", notes)
+            source = frame.coordinates(transform(T_init, seen))
             _require_like_sizes(source, target)
             icp = self._icp(target)
         with _timed(seconds, "icp"):
@@ -123,6 +128,11 @@ class Explainer:
         told = [*scores_C, *((found.failure, *found.causes.values()) if found else ())]
         if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
             raise InputError("model", "it gives no finite numbers for these clouds", "make another one")
+        with _timed(seconds, "familiarity"):
+            warnings = self._warnings(source, target, found, fitness)
+            if T_target_source_init is not None and register is None:
+                from_inverse = frame.coordinates(transform(inverse(T_init), seen))
+                warnings += self._inverted(icp, from_inverse, fitness, rmse)
         spread = None
         if uncertainty is not None and estimate is not None:
             with _timed(seconds, "uncertainty"):
@@ -134,8 +144,6 @@ class Explainer:
                     of_pair = (source, target, at_pose, found_by, uncertainty, frame.diameter)
                     spread, fault = estimated_spread(estimate, estimator, *of_pair)
                     notes += [fault] if fault else []
-        if fitness == 0:
-            notes.append("no source point is near the target, so the scores mean nothing")
         if found is None:
             decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
         elif found.state == NOMINAL:
@@ -159,7 +167,39 @@ class Explainer:
             unit=unit,
             seconds=seconds | {"total": perf_counter() - started},
             notes=tuple(notes),
+            warnings=tuple(warnings),
         )
+
+    def explain_many(
+        self,
+        pairs: Iterable[tuple[np.ndarray, np.ndarray] | tuple[np.ndarray, np.ndarray, np.ndarray | None]],
+        unit: str = "m",
+        uncertainty: UncertaintySettings | None = None,
+        diagnose: bool = True,
+        method: str | None = None,
+        estimator: str = MONTE_CARLO,
+    ) -> Iterator[Explanation]:
+        """Yield the explanation of each pair in turn, as :meth:`explain` gives it.
+
+        The frame of a target that is the same array as that of the pair before is measured once.
+
+        Args:
+            pairs: source, target, and the pose where ICP starts if it is not the identity.
+            unit, uncertainty, diagnose, method, estimator: as for :meth:`explain`.
+
+        Raises:
+            InputError: as :meth:`explain`, when the pair's turn comes; the line names the number of the pair, from 0.
+        """
+        asked = {"uncertainty": uncertainty, "diagnose": diagnose, "method": method, "estimator": estimator}
+        known, frame = None, None
+        for number, (source_points, target_points, *init) in enumerate(pairs):
+            try:
+                if frame is None or target_points is not known:
+                    known, frame = target_points, CanonicalFrame.of(np.asarray(target_points, np.float64), unit)
+                T_init = init[0] if init else None
+                yield self.explain(source_points, target_points, T_init, unit, frame, **asked)
+            except InputError as fault:
+                raise InputError(f"pair {number}", str(fault)) from fault
 
     @torch.inference_mode()
     def embed(self, aligned: np.ndarray) -> np.ndarray:
@@ -178,6 +218,28 @@ class Explainer:
         ]
         clouds_D_N_3 = torch.from_numpy(aligned.astype(np.float32)[np.array(rows_D_N)])
         return self.model.encoder(clouds_D_N_3.to(self._device)).mean(dim=0, keepdim=True).cpu().numpy()
+
+    def _warnings(self, source: np.ndarray, target: np.ndarray, found: Diagnosis | None, fitness: float) -> list[str]:
+        """Return what makes the scores doubtful, in words."""
+        warnings = list(self.model.familiar.warnings(source, target)) if self.model.familiar else []
+        if found is not None and found.unlikeness > 1:
+            warnings.append(
+                f"the pair is {found.unlikeness:.1f} times as far from the registrations that the diagnosis was "
+                "learnt from as 99 % of these are from one another"
+            )
+        if fitness == 0:
+            warnings.append("no source point is near the target at the initial pose, so the scores mean nothing")
+        return warnings
+
+    def _inverted(self, icp: BatchedICP, from_inverse: np.ndarray, fitness: float, rmse: float) -> list[str]:
+        """Return a warning where ICP ends far better from the inverse of the initial pose."""
+        if fitness >= GOOD_FITNESS:
+            return []
+        distance = self.model.icp.correspondence_distance
+        _, *fits = (of_starts[0] for of_starts in icp.register(from_inverse, np.eye(4)[None]))
+        if clipped_cost(*fits, distance) < INVERSE_COST * clipped_cost(fitness, rmse, distance):
+            return ["the inverse of the initial pose fits far better: is it T_source_target?"]
+        return []
 
     def _thinned(self, points: np.ndarray, role: str, notes: list[str]) -> np.ndarray:
         kept = thin(points, self.model.cloud_points, role)

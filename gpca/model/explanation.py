@@ -65,7 +65,8 @@ class Explanation:
         spread: how uncertain the pose is by an estimator, where it was asked for and could tell.
         unit: that of all lengths.
         seconds: those of each stage, and ``total``.
-        notes: what a reader has to know, such as points that were left out.
+        notes: what was done to the clouds, such as points that were left out.
+        warnings: why this explanation is not to be relied on: what is unlike all that the model learnt.
     """
 
     T_target_source: np.ndarray
@@ -84,6 +85,7 @@ class Explanation:
     unit: str
     seconds: dict[str, float]
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """Return it as numbers, lists and names, for JSON."""
@@ -99,6 +101,7 @@ class Explanation:
             "diagnosis": self.diagnosis and self.diagnosis.as_dict(),
             "spread": spread,
             "notes": list(self.notes),
+            "warnings": list(self.warnings),
         }
 
     def text(self) -> str:
@@ -107,7 +110,8 @@ class Explanation:
         registered = (
             f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
         )
-        lines = [*self._diagnosed(), action, "", *self._attributed(), "", registered]
+        doubts = [f"warning   {line}" for line in self.warnings]
+        lines = [*doubts, *self._diagnosed(), action, "", *self._attributed(), "", registered]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
             by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"

@@ -22,6 +22,7 @@ from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.model.contents import require_possible
 from gpca.model.diagnoser import Diagnoser
+from gpca.model.familiarity import Familiarity
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 FORMAT, VERSION = "GP-CA model", 3
@@ -44,6 +45,7 @@ class Model:
         cloud_points: of source and of target, at most.
         policy: what to do about which causes.
         title, stand_in: of the objects that GP-CA learnt, and whether they were drawn by the package.
+        familiar: what the clouds that GP-CA learnt are like; None in older files, which say nothing of it.
     """
 
     diagnoser: Diagnoser | None
@@ -55,6 +57,7 @@ class Model:
     policy: RecoveryPolicy
     title: str
     stand_in: bool
+    familiar: Familiarity | None = None
 
     @property
     def concepts(self) -> tuple[str, ...]:
@@ -77,6 +80,8 @@ class Model:
             "title": self.title,
             "stand_in": self.stand_in,
         }
+        if self.familiar is not None:
+            content["familiar"] = {name: list(ends) for name, ends in self.familiar.ranges.items()}
         # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
         with whole_file(path) as partial, partial.open("wb") as file:
             torch.save(content, file)
@@ -113,10 +118,17 @@ class Model:
                 icp=ICPSettings(**content["icp"]),
                 policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
                 cloud_points=content["points"],
+                familiar=_familiarity(content),
                 **{name: content[name] for name in ("title", "stand_in")},
             )
         except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
             raise InputError(path, f"is a model with something missing or damaged ({fault})", REMEDY) from fault
+
+
+def _familiarity(content: Mapping) -> Familiarity | None:
+    if "familiar" not in content:
+        return None
+    return Familiarity({name: (low, high) for name, (low, high) in content["familiar"].items()})
 
 
 def _renamed(settings: Mapping, old: str, new: str) -> dict:

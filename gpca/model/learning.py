@@ -16,6 +16,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.descriptors.dataset import Descriptors
 from gpca.descriptors.groups import GROUPS
 from gpca.descriptors.settings import DescriptorSettings
+from gpca.errors import InputError
 from gpca.explainers.pair_classifier import PairClassifier
 from gpca.model.diagnoser import SMALLEST_ERROR, Diagnoser
 
@@ -77,7 +78,7 @@ def learn(
     clear = lessons.subset(lessons.label_N != BORDERLINE)
     first = _classifier(clear.subset(~clear.unseen_N), gpc, *axes, "calibration")
     unseen = clear.subset(clear.unseen_N)
-    judged = first.judge(unseen.features_N_F)
+    judged = first.judge(first.normalised(unseen.features_N_F))
     nominal_N = unseen.label_N == NOMINAL
     classifier = _classifier(clear, gpc, *axes)
     diagnoser = Diagnoser(
@@ -92,7 +93,14 @@ def learn(
 
 
 def threshold_of(failure_N: np.ndarray, false_alarms: float) -> float:
-    """Return the smallest probability of failure that at most the share `false_alarms` of nominal samples reaches."""
+    """Return the smallest probability of failure that at most the share `false_alarms` of nominal samples reaches.
+
+    Raises:
+        InputError: no samples.
+    """
+    if not len(failure_N):
+        fault = "has no nominal registration of unseen objects"
+        raise InputError("model", fault, "raise causes.test, causes.test_objects or causes.shares.nominal")
     return float(np.nextafter(np.quantile(failure_N, 1 - false_alarms, method="inverted_cdf"), 1))
 
 

@@ -1,4 +1,4 @@
-"""Step ``explain``: one registration of a user's own -> why it is uncertain and what to do, on stdout."""
+"""Step ``explain``: registrations of a user's own -> why they are uncertain and what to do, on stdout."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ from gpca.uncertainty.settings import UncertaintySettings
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and options."""
-    parser.add_argument("source", type=Path, help="what was observed: points or a mesh (PLY, PCD, OBJ, STL, OFF)")
-    parser.add_argument("target", type=Path, help="the reference that it is aligned to")
+    parser.add_argument(
+        "source", type=Path, nargs="+", help="what was observed: points or a mesh (PLY, PCD, OBJ, STL, OFF)"
+    )
+    parser.add_argument("target", type=Path, help="the reference that each of them is aligned to")
     parser.add_argument("--init", type=Path, help="text file of T_target_source where ICP starts, 4×4 numbers")
     parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="of files and pose (default m)")
     parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, or one in ./results/")
@@ -30,27 +32,39 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
         help="measure how uncertain the pose is, by an estimator such as brossard; by default Monte-Carlo",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="print one JSON object")
+    form.add_argument("--json-lines", action="store_true", help="print a JSON object in a line for each source")
 
 
 def run(options: Namespace) -> None:
-    """Read, explain and print; all that is no result goes to stderr."""
+    """Read all files, then explain and print one source after the other; all that is no result goes to stderr."""
     torch.set_num_threads(options.threads)
     if options.settings:
         raise InputError("--settings", "explain has none", "they are in the model; make another one")
+    if len(options.source) > 1 and not options.json_lines:
+        raise InputError("explain", f"{len(options.source)} sources", "print them with --json-lines")
     path = model_path(options.model)
     model = Model.load(path)
     T_init = read_pose(options.init) if options.init else None
-    source, _ = read_points(options.source, options.unit)
+    sources = [read_points(source, options.unit)[0] for source in options.source]
     target, frame = read_points(options.target, options.unit)
     uncertainty = UncertaintySettings() if options.uncertainty is not None else None
     estimator = MONTE_CARLO if options.uncertainty is None else options.uncertainty
     asked = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator}
-    explanation = Explainer(model).explain(source, target, T_init, options.unit, frame, **asked)
+    explainer = Explainer(model)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
-    for note in (*explanation.notes, f"model {path}, trained on {trained_on}"):
-        print(note, file=sys.stderr)
-    if options.json:
-        print(json.dumps(explanation.as_dict() | {"model": str(path), "trained_on": trained_on}))
-    else:
-        print(explanation.text(), end="")
+    for name, source in zip(options.source, sources, strict=True):
+        try:
+            explanation = explainer.explain(source, target, T_init, options.unit, frame, **asked)
+        except InputError as fault:
+            raise InputError(name, str(fault)) from fault
+        warnings = (f"warning: {line}" for line in explanation.warnings)
+        for line in (*explanation.notes, *warnings):
+            print(line if len(sources) == 1 else f"{name}: {line}", file=sys.stderr)
+        if options.json or options.json_lines:
+            names = {"source": str(name), "target": str(options.target), "model": str(path), "trained_on": trained_on}
+            print(json.dumps(explanation.as_dict() | names), flush=options.json_lines)
+        else:
+            print(explanation.text(), end="")
+    print(f"model {path}, trained on {trained_on}", file=sys.stderr)

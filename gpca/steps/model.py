@@ -18,6 +18,7 @@ from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import load_model
 from gpca.errors import InputError
+from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
 from gpca.model.learning import Lessons, joined, learn
 from gpca.pairs.dataset import Registrations, load_embeddings
@@ -75,11 +76,12 @@ def run(options: Namespace) -> None:
         )
         settings = EncoderSettings(**given["encoder"])
         recovery = given["recovery"]
+        registrations = Registrations.load(options.registrations)
         Model(
             diagnoser=diagnoser,
             encoder=load_model(options.encoder, settings).encoder,
             encoder_settings=settings,
-            gpc=_gpc(options, GPCSettings(**given["gpc"])),
+            gpc=_gpc(options, registrations, GPCSettings(**given["gpc"])),
             icp=ICPSettings(**icp),
             cloud_points=given["registrations"].get("cloud_points", 2048),
             policy=RecoveryPolicy.of_settings(
@@ -89,6 +91,10 @@ def run(options: Namespace) -> None:
             else RecoveryPolicy(),
             title=options.title,
             stand_in=options.stand_in,
+            familiar=Familiarity.of(
+                (registrations.cloud(row).astype(float), registrations.target(row).astype(float))
+                for row in registrations.rows("train")
+            ),
         ).save(options.out)
 
 
@@ -97,8 +103,7 @@ def _lessons(causes_file: Path, descriptors_file: Path) -> Lessons:
     return Lessons.of(causes, Descriptors.load(descriptors_file, causes.registrations))
 
 
-def _gpc(options: Namespace, settings: GPCSettings) -> GPC:
-    registrations = Registrations.load(options.registrations)
+def _gpc(options: Namespace, registrations: Registrations, settings: GPCSettings) -> GPC:
     h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
     train = registrations.rows("train")
     return GPC(CONCEPTS, settings, options.source, options.seed).fit(h_S_d[train], registrations.concept[train])

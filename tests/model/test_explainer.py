@@ -101,7 +101,7 @@ def test_the_initial_pose_is_where_icp_starts(explainer, pair):
     assert not here.notes
     lost = explainer.explain(source + 5, target)
     assert lost.fitness == 0
-    assert "no source point is near the target" in lost.notes[0]
+    assert "no source point is near the target at the initial pose, so the scores mean nothing" in lost.warnings
 
 
 def test_more_points_than_in_the_training_are_left_out_and_said_so(explainer, pair):
@@ -200,9 +200,52 @@ def test_an_explanation_is_json_and_text(explainer, pair):
     for word in (explanation.diagnosis.state, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
         assert word in text
     assert plain["diagnosis"]["state"] == explanation.diagnosis.state
-    stages = ["preparation", "icp", "diagnosis", "embedding", "attribution", "uncertainty"]
+    stages = ["preparation", "icp", "diagnosis", "embedding", "attribution", "familiarity", "uncertainty"]
     assert list(plain["seconds"]) == [*stages, "total"]
     assert plain["seconds"]["total"] >= sum(plain["seconds"][stage] for stage in stages)
+
+
+def test_the_inverse_of_the_initial_pose_is_found_out(explainer, pair):
+    source, target = pair
+    T_source_seen = exp(np.array([[1.0, -2.0, 0.5, 0.03, 0.04, -0.1]]))[0]
+    seen = transform(inverse(T_source_seen), source)
+    doubt = "the inverse of the initial pose fits far better: is it T_source_target?"
+    assert doubt in explainer.explain(seen, target, inverse(T_source_seen)).warnings
+    assert doubt not in explainer.explain(seen, target, T_source_seen).warnings
+
+
+def test_what_is_unlike_the_training_is_said_in_text_and_in_json(model, pair):
+    source, target = pair
+    said = Explainer(model, device="cpu").explain(3 * source, target)
+    [line] = [line for line in said.warnings if "are both in the same unit and scale?" in line]
+    assert f"warning   {line}" in said.text()
+    assert said.as_dict()["warnings"] == list(said.warnings)
+    older = Explainer(replace(model, familiar=None), device="cpu").explain(3 * source, target)
+    assert line not in older.warnings
+
+
+def test_a_pair_far_from_all_that_the_diagnosis_learnt_is_said_to_be(explainer, pair, monkeypatch):
+    from gpca.explainers.pair_classifier import PairClassifier
+
+    for unlike, words in ((1.7, ["1.7"]), (0.9, [])):
+        monkeypatch.setattr(PairClassifier, "unlikeness", lambda self, inputs, unlike=unlike: np.array([unlike]))
+        said = explainer.explain(*pair)
+        assert [line.split()[3] for line in said.warnings if "that the diagnosis was learnt from" in line] == words
+        assert said.diagnosis.unlikeness == unlike
+
+
+def test_many_are_explained_as_one_by_one_and_a_fault_names_its_pair(explainer, pair):
+    source, target = pair
+    T_init = exp(np.array([[0.1, 0, 0, 0, 0, 0]]))[0]
+    first, second = explainer.explain_many([(source, target), (source, target, T_init)], diagnose=False)
+    for many, one in (
+        (first, explainer.explain(source, target, diagnose=False)),
+        (second, explainer.explain(source, target, T_init, diagnose=False)),
+    ):
+        assert many.scores == one.scores
+        np.testing.assert_array_equal(many.T_target_source, one.T_target_source)
+    with pytest.raises(InputError, match="pair 1: source: holds 10 points"):
+        list(explainer.explain_many([(source, target), (source[:10], target)], diagnose=False))
 
 
 def with_threshold(model, threshold, policy=None):

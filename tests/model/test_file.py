@@ -28,7 +28,7 @@ def test_a_loaded_model_says_the_same(model, path):
         model.gpc.attribute(embeddings(model)), loaded.gpc.attribute(embeddings(model)), strict=True
     ):
         np.testing.assert_array_equal(actual, expected)
-    for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in", "concepts"):
+    for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in", "concepts", "familiar"):
         assert getattr(loaded, name) == getattr(model, name)
 
 
@@ -44,6 +44,11 @@ def test_a_loaded_classifier_learns_what_the_saved_one_would(model, path):
 def test_the_same_model_is_written_in_the_same_bytes(model, path, tmp_path):
     Model.load(path).save(tmp_path / "again.pt")
     assert (tmp_path / "again.pt").read_bytes() == path.read_bytes()
+
+
+def test_a_model_from_before_ranges_were_kept_is_loaded_without(path):
+    changed(familiar=None)(path)
+    assert Model.load(path).familiar is None
 
 
 def changed(**changes):

@@ -9,6 +9,7 @@ from gpca.causes.shapley import ALL
 from gpca.classifier.settings import GPCSettings
 from gpca.descriptors.dataset import WIDTHS, Descriptors
 from gpca.descriptors.settings import DescriptorSettings
+from gpca.errors import InputError
 from gpca.model.learning import Lessons, fit_error, joined, learn, threshold_of
 
 SETTINGS = GPCSettings(learning_rate=0.1, iterations=40, inducing=8, draws=200)
@@ -64,7 +65,15 @@ def test_failures_are_told_from_what_is_fine_and_the_uncertainty_is_of_unseen_fa
     diagnoser, bald_N = learn(given, SETTINGS, causes, descriptors, 0.05, "tiny", 0)
     assert len(bald_N) == (given.unseen_N & (given.label_N != "nominal")).sum()
     new = lessons(30, 1)
-    alarm_N = diagnoser.classifier.judge(new.features_N_F).failure_N >= diagnoser.threshold
+    classifier = diagnoser.classifier
+    alarm_N = classifier.judge(classifier.normalised(new.features_N_F)).failure_N >= diagnoser.threshold
     np.testing.assert_array_equal(alarm_N, new.label_N != "nominal")
     assert diagnoser.points == causes.points[1]
     assert diagnoser.runs.starts == causes.starts
+
+
+def test_without_a_nominal_registration_of_unseen_objects_one_line_says_so():
+    given = lessons(30, 0)
+    failures = given.subset(~given.unseen_N | (given.label_N != "nominal"))
+    with pytest.raises(InputError, match=r"model: has no nominal registration of unseen objects; raise causes\.test"):
+        learn(failures, SETTINGS, CauseSettings(), DescriptorSettings(), 0.05, "tiny", 0)

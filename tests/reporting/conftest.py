@@ -7,10 +7,12 @@ from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.pairs.perturbation import CONCEPTS
 
+LIMITS = {"nominal": 0.02, "failed": 0.03}  # of the errors that states are told apart by
+
 
 @pytest.fixture(scope="session")
 def predicted():
-    """Write registrations, and predictions on them by dice, into a folder; return both paths."""
+    """Write registrations, and predictions on them by dice, into a folder; return their paths by name."""
 
     def write(registrations, folder, source="bricks"):
         npz, csv = folder / f"registrations/{source}/seed0.npz", folder / f"predictions/{source}/gpca/seed0.csv"
@@ -28,14 +30,17 @@ def predicted():
             icp_seconds_N=np.zeros(N),
         )
         write_predictions(csv, registrations, attribution)
-        return npz, csv
+        return {"registrations": npz, "predictions": csv}
 
     return write
 
 
 @pytest.fixture(scope="session")
 def stage_files(registrations, tmp_path_factory):
-    """Paths (registrations, embeddings, predictions); pose of sample p has score 0.5 + p / 100, all named right."""
+    """Paths (registrations, embeddings, predictions, uncertainties) and limits.
+
+    Pose of sample p has score 0.5 + p / 100, all are named right, and test sample p has an uncertainty of p / 10.
+    """
     from gpca.arrays import save_arrays
     from gpca.pairs.perturbation import CONCEPTS
 
@@ -56,7 +61,17 @@ def stage_files(registrations, tmp_path_factory):
         bald = f"{0.01 + i / 1000:.6f}"
         rows.append(",".join([head, *(f"{s:.6f}" for s in scores), "0.01,0.0144,0.0025", bald, "0.5,False,0"]))
     (folder / "predictions.csv").write_text("\n".join(rows) + "\n")
-    return tuple(folder / name for name in ("registrations.npz", "embeddings.npz", "predictions.csv"))
+    write_uncertainties(folder / "uncertainties.csv", registrations)
+    names = ("registrations.npz", "embeddings.npz", "predictions.csv", "uncertainties.csv")
+    return *(folder / name for name in names), LIMITS
+
+
+def write_uncertainties(path, registrations):
+    """Write an uncertainty of p / 10 nats for test sample p, and of 1 nat for every clean pair."""
+    samples = registrations.sample[registrations.rows("test")]
+    rows = [f"{sample},test,0,1,{sample / 10}" for sample in samples]
+    head = "sample,split,uncertainty_reference,uncertainty_clean,uncertainty_observed"
+    path.write_text("\n".join([head, *rows]) + "\n")
 
 
 @pytest.fixture

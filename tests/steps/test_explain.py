@@ -21,6 +21,7 @@ FAULTS = [
     (untouched, {"--uncertainty": "gauss"}, r"estimator 'gauss': unknown; known are .*brossard"),
     (untouched, {"--uncertainty": "cello"}, r"'cello': learns from registrations of training objects, and there are"),
     (untouched, {"--uncertainty": ""}, r"estimator '': unknown"),
+    (untouched, {"meshes/cone.ply": ["meshes/cone.ply"]}, r"explain: 2 sources; print them with --json-lines"),
     (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),
 ]
 
@@ -62,3 +63,15 @@ def test_another_method_finds_the_pose_and_the_model_says_why(folder, capsys):
     assert sum(explanation["scores"].values()) == pytest.approx(1)
     assert main(arguments("explain", {"--method": "gicp", "--json": None})) == 0
     assert "registration   gicp, fitness " in capsys.readouterr().out
+
+
+def test_several_sources_are_a_line_each(folder, capsys):
+    sources = ["meshes/brick.stl", "meshes/cone.ply"]
+    words = ["explain", *sources, "meshes/cone.ply", "--unit", "mm", "--model", "model.pt", "--json-lines"]
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert [line["source"] for line in lines] == sources
+    assert {line["target"] for line in lines} == {"meshes/cone.ply"}
+    assert all(set(line["diagnosis"]["causes"]) == {"noise", "pose", "overlap"} for line in lines)
+    assert "meshes/brick.stl: source: 128 of 16384 points, drawn at random\n" in err

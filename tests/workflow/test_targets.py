@@ -121,7 +121,7 @@ EDITS = {
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
         jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED,
+        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED,
     "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
     "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
@@ -162,7 +162,7 @@ def test_the_rules_that_use_a_module_depend_on_it_and_no_other(planned, module):
     assert without_ends(planned.behind(module)) == EDITS[module]
 
 
-@pytest.mark.parametrize("name", ["gpca/reporting/page/samples.py", "gpca/reporting/page/templates/page.js"])
+@pytest.mark.parametrize("name", ["gpca/reporting/page/findings.py", "gpca/reporting/page/templates/page.js"])
 def test_what_the_page_alone_uses_makes_the_page_alone(planned, name):
     assert planned.behind(name) == {"page": 1}
 

@@ -1,4 +1,7 @@
 # The numbers that the paper prints beside those of the run, and the page of the run.
+from os.path import relpath
+
+from gpca.code_files import ROOT
 from gpca.comparison.published import read_published
 
 COLLECTED = [
@@ -14,6 +17,20 @@ COMPARED = sorted(
 # Sources whose first registrations the page shows in 3-D -> the form of GP-CA that explains them there.
 SAMPLED = {source: NAMES["gpca"] for source in SOURCES if NAMES["gpca"]}
 SAMPLED |= {FRAMES: NAMES["first_backbone"]}
+UNCERTAIN = [source for source in SAMPLED if source in SOURCES]
+# What the page says first comes from these; where all objects of the run are stand-ins, the verdicts are those of the
+# reference on real ones.
+FOUND = [
+    *("metrics.csv", "cause_intervals.csv", "real_world.csv"),
+    *("active_learning.csv", "recovery.csv"),
+]
+ROOT_OF_RUN = Path("results", config["run"])
+REFERENCE = ROOT / "results/reference/real/comparison.csv"
+
+
+onsuccess:
+    if (ROOT_OF_RUN / "index.html").is_file():
+        print(f"The page of the run: {ROOT_OF_RUN / 'index.html'}", file=sys.stderr)
 
 
 rule comparison:
@@ -48,6 +65,8 @@ rule comparison:
 rule page:
     input:
         comparison="<results>/comparison.csv",
+        found=[f"<results>/{name}" for name in FOUND],
+        reference=[relpath(REFERENCE)] if REFERENCE.is_file() else [],
         results=[f"<results>/{file}" for result in RESULTS for file in result.all_files],
         registrations=collect(
             f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SAMPLED
@@ -56,6 +75,10 @@ rule page:
             f"<results>/predictions/{source}/{explainer}/seed{SEEDS[0]}.csv"
             for source, explainer in SAMPLED.items()
         ],
+        uncertainty=collect(
+            f"<results>/uncertainty/{{source}}/causal/seed{SEEDS[0]}.csv",
+            source=UNCERTAIN,
+        ),
         code=code_files("gpca.reporting.page.page", "gpca.reporting.script"),
     output:
         page="<results>/index.html",
@@ -78,6 +101,10 @@ rule page:
             for result in RESULTS
         ],
         samples=list(SAMPLED),
+        uncertain=UNCERTAIN,
+        titles={
+            name: SHOWN[name] for name in ("explainers", "cause_explainers", "budget")
+        },
         sources={**SHOWN["sources"], FRAMES: SHOWN["frames"]},
         # Not where data lie: that changes no number, and is nobody's business.
         config={

@@ -1,18 +1,29 @@
-"""Every table and figure, the comparison and some registrations -> index.html."""
+"""What was found, every table and figure, the comparison and some registrations -> index.html."""
 
 from pathlib import Path
 
+from gpca.reporting.page.findings import Titles
 from gpca.reporting.page.page import Run, Shown, write_page
 from gpca.reporting.script import job
 
 with job(snakemake):
     given, files = snakemake.params, snakemake.input
+    samples = {
+        source: {"registrations": registrations, "predictions": predictions}
+        for source, registrations, predictions in zip(
+            given.samples, files.registrations, files.predictions, strict=True
+        )
+    }
+    for source, uncertainty in zip(given.uncertain, files.uncertainty, strict=True):
+        samples[source]["uncertainty"] = uncertainty
     run = Run(
         name=given.run,
         seeds=given.config["seeds"],
         sources=given.sources,
         results=[Shown(*fields) for fields in given.shown],
-        samples=dict(zip(given.samples, zip(files.registrations, files.predictions, strict=True), strict=True)),
+        samples=samples,
+        titles=Titles(**given.titles),
+        reference=next(iter(files.reference), None),
         config=given.config,
         command=f"snakemake -j2 {snakemake.output.page}",
     )

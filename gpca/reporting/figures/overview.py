@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gpca.causes.truth import FAILED
 from gpca.errors import InputError
 from gpca.reporting.figures.cloud_views import draw_clouds
 from gpca.reporting.figures.diagram import Canvas
@@ -33,6 +34,8 @@ def draw_overview(
     registrations_npz: str | Path,
     embeddings_npz: str | Path,
     predictions_csv: str | Path,
+    uncertainty_csv: str | Path,
+    limits: Mapping[str, float],
     title: str,
     encoder: str,
     treatments: Mapping[str, str],
@@ -42,11 +45,14 @@ def draw_overview(
     """Draw what the stages make of one registration, from its clouds to what follows.
 
     The figure shows the clouds before and after ICP, the embedding, the scores ± their deviations, and BALD among all
-    test samples. What follows is the action against the concept named, or a question to a person and a new training.
+    test samples. What follows is the action against the concept named, if the registration failed, or a question to a
+    person and a new training.
 
     Args:
         registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
             sample of the concept `CONCEPT` that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns.
+        uncertainty_csv: The uncertainties of the design ``causal``.
+        limits: Those of the errors that states are told apart by, from the config.
         title: The title of the source.
         encoder: The name that the figure gives the encoder.
         treatments: The action of recovery for each concept.
@@ -55,7 +61,7 @@ def draw_overview(
     Raises:
         InputError: an unusable file, files of different samples, or a concept without a treatment.
     """
-    stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv)
+    stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(CONCEPT, registrations_npz)
     sample = stages.predictions.iloc[row]
     if (named := sample["concept_predicted"]) not in treatments:
@@ -83,8 +89,12 @@ def draw_overview(
     canvas.text(1.62, 0.02, "BALD (nats)", va="bottom")
     canvas.arrow((2.2, 0.6), (2.02, 0.6))
     canvas.arrow((1.22, 0.6), (0.96, 0.6), words="low")
-    colour = CONCEPT_COLOURS[named]
-    canvas.box(0.02, 0.32, 0.92, 0.56, f"Act on {named}:\n{short_action(treatments[named])}", colour)
+    # GP-CA always names a concept; acting on it makes sense only where something is wrong.
+    failed = stages.state(row) == FAILED
+    follows = (
+        f"Act on {named}:\n{short_action(treatments[named])}" if failed else f"No action on\n{named}: it did\nnot fail"
+    )
+    canvas.box(0.02, 0.32, 0.92, 0.56, follows, CONCEPT_COLOURS[named] if failed else GREY)
     canvas.arrow((1.62, 0.88), (1.62, 1.08))
     canvas.text(1.66, 0.97, "high", ha="left", va="center")
     canvas.box(0.02, 1.08, 1.9, 0.37, "Ask a person for the concept\nof a few such cases", GREY, dashed=True)

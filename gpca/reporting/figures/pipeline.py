@@ -41,6 +41,8 @@ def draw_pipeline(
     registrations_npz: str | Path,
     embeddings_npz: str | Path,
     predictions_csv: str | Path,
+    uncertainty_csv: str | Path,
+    limits: Mapping[str, float],
     curve_files: Iterable[str | Path],
     title: str,
     encoder: str,
@@ -53,6 +55,8 @@ def draw_pipeline(
     Args:
         registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
             sample of the concept `CONCEPT` that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns.
+        uncertainty_csv: The uncertainties of the design ``causal``.
+        limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
             :func:`gpca.reporting.figures.active_learning.draw_learning_curves`.
         title: The title of the source.
@@ -63,7 +67,7 @@ def draw_pipeline(
     Raises:
         InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
     """
-    stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv)
+    stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(CONCEPT, registrations_npz)
     curves = {name: curve for (_, name, setting), curve in mean_curves(curve_files).items() if setting == SETTING}
     if not any(name in curves for name in TITLES):
@@ -87,13 +91,13 @@ def draw_pipeline(
 def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, asked: Round) -> None:
     sample = stages.predictions.iloc[row]
     middle_in = 2.66
-    captions_in = 2.1
+    captions_in = 2.17
     canvas.text(0.1, 3.27, "Online inference", ha="left", va="top", fontweight="bold")
     seen = stages.seen(row)
     corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
     captions = {"init": "initial pose $T_0$: ", "icp": r"aligned $\hat{T}\mathcal{P}$: "}
     for left_in, (which, pair) in zip((0.12, 1.56), seen.items(), strict=True):
-        draw_clouds(canvas.panel(left_in, 2.16, 1.06, 0.98), *pair, 1.0, (corners.min(axis=0), corners.max(axis=0)))
+        draw_clouds(canvas.panel(left_in, 2.2, 1.06, 0.94), *pair, 1.0, (corners.min(axis=0), corners.max(axis=0)))
         canvas.text(left_in + 0.53, captions_in, captions[which] + stages.words(row, which), va="top")
     canvas.arrow((1.2, middle_in), (1.54, middle_in), words="ICP")
     canvas.arrow((2.66, middle_in), (2.8, middle_in))

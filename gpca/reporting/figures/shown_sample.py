@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.causes.settings import Limits
 from gpca.causes.truth import FAILED
 from gpca.csv_file import numbers
 from gpca.errors import InputError
@@ -19,7 +21,7 @@ from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.concepts import severity_text
 from gpca.reporting.figures.frame_views import draw_scores
 from gpca.reporting.figures.style import GREY, SMALL_PT, blues
-from gpca.reporting.pose_state import registration_error, state_of_error
+from gpca.reporting.pose_state import observed_uncertainties, registration_error, state_of_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,15 +29,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stages:
-    """Holds S registrations of one source and seed, their embeddings h (S, d), and what GP-CA said of each."""
+    """Holds S registrations of one source and seed, and what the stages made of each.
+
+    Attributes:
+        registrations: The registrations.
+        h_S_d: Their embeddings.
+        predictions: What GP-CA said of each.
+        u_S: Their uncertainty in nats, NaN where it is not known.
+        limits: The limits of the errors that their states are told apart by.
+    """
 
     registrations: Registrations
     h_S_d: np.ndarray
     predictions: pd.DataFrame
+    u_S: np.ndarray
+    limits: Limits
 
     @classmethod
-    def load(cls, registrations_npz: str | Path, embeddings_npz: str | Path, predictions_csv: str | Path) -> Stages:
-        """Read what the stages wrote.
+    def load(
+        cls,
+        registrations_npz: str | Path,
+        embeddings_npz: str | Path,
+        predictions_csv: str | Path,
+        uncertainty_csv: str | Path,
+        limits: Mapping[str, float],
+    ) -> Stages:
+        """Read what the stages wrote; the limits are those of the config's section ``causes``.
 
         Raises:
             InputError: an unusable file, or files of different samples; predictions without variances or BALD.
@@ -52,7 +71,8 @@ class Stages:
             if column not in predictions:
                 raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
             predictions[column] = numbers(predictions_csv, predictions, column)
-        return cls(registrations, arrays["h"], predictions)
+        u_S, _ = observed_uncertainties(uncertainty_csv, registrations)
+        return cls(registrations, arrays["h"], predictions, u_S, Limits(**limits))
 
     def choose(self, concept: str, path: str | Path) -> int:
         """Return the row that is shown, a test sample of the concept named right after a failed registration.
@@ -66,7 +86,7 @@ class Stages:
             raise InputError(path, f"holds no test sample of '{concept}'", "raise registrations.test")
         right = test[test["concept_predicted"] == concept]
         kept = test if right.empty else right
-        failed = kept[[state_of_error(self.error(row)) == FAILED for row in kept.index]]
+        failed = kept[[self.state(row) == FAILED for row in kept.index]]
         worst = kept.assign(fit=self.registrations.fitness[kept.index]).nsmallest((len(kept) + 1) // 2, "fit")
         ranked = (worst if failed.empty else failed).sort_values([f"score_{concept}", "sample"], kind="stable")
         return int(ranked.index[(len(ranked) - 1) // 2])
@@ -74,6 +94,10 @@ class Stages:
     def error(self, row: int) -> float:
         """Return how far off a row is after ICP, in diameters."""
         return registration_error(self.registrations, row)
+
+    def state(self, row: int) -> str:
+        """Return what the error of a row after ICP is called."""
+        return state_of_error(self.error(row), self.limits)
 
     def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:
         """Return target and source (·, 3) of a row, the source where the pose ``init`` or ``icp`` puts it."""
@@ -93,11 +117,11 @@ class Stages:
         return {which: (target @ view.T, source @ view.T) for which, (target, source) in pairs.items()}
 
     def words(self, row: int, which: str) -> str:
-        """Return what the registrations say of a pose: of ``init`` what was perturbed, of ``icp`` how far it is off."""
+        """Return what is known of a pose: of ``init`` what was perturbed, of ``icp`` how far off it is, and u."""
         if which == "init":
             return severity_text(self.registrations, row, str(self.registrations.concept[row]))
-        error = self.error(row)
-        return f"{state_of_error(error)}, ADD-S {100 * error:.1f} % $d$"
+        uncertain = "" if np.isnan(self.u_S[row]) else f"\n$u$ = {self.u_S[row]:.1f} nats"
+        return f"{self.state(row)}, ADD-S {100 * self.error(row):.1f} % $d${uncertain}"
 
 
 def draw_embedding(axes, h_d: np.ndarray) -> None:

@@ -30,8 +30,15 @@ _COLUMNS = (
 _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
 
 
-def page_comparison(path: str | Path) -> dict | None:
+def page_comparison(path: str | Path, reference: str | Path | None = None) -> dict | None:
     """Return the rows of ``comparison.csv`` in words, its tables, and verdicts with tone and number; None without it.
+
+    Where no number of the run is judged, as on stand-ins, the rows are those of the reference, and each has what the
+    run gives as ``this_run``.
+
+    Args:
+        path: The file of the run.
+        reference: That of a run on real objects.
 
     Raises:
         InputError: an unreadable file, a missing column, no rows, a number that is none.
@@ -39,13 +46,25 @@ def page_comparison(path: str | Path) -> dict | None:
     if not Path(path).is_file():
         return None
     rows = read_csv(path, _COLUMNS)
+    words = [_words(path, row) for row in rows.to_dict("records")]
+    of_reference = reference is not None and not set(TONES) & set(rows["verdict"])
+    if of_reference:
+        here = {_key(row): row["reproduced"] for row in words}
+        rows = read_csv(reference, _COLUMNS)
+        words = [_words(reference, row) for row in rows.to_dict("records")]
+        words = [row | {"this_run": here.get(_key(row), "")} for row in words]
     counts = Counter(rows["verdict"])
     order = [*TONES, *sorted(set(counts) - set(TONES))]
     return {
-        "rows": [_words(path, row) for row in rows.to_dict("records")],
+        "of_reference": of_reference,
+        "rows": words,
         "tables": list(dict.fromkeys(rows["table"])),
         "verdicts": [(verdict, TONES.get(verdict, ""), counts[verdict]) for verdict in order if counts[verdict]],
     }
+
+
+def _key(row: Mapping[str, str]) -> tuple[str, ...]:
+    return row["table"], row["row"], row["column"]
 
 
 def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Writes a run as one plain web page that works from disk: comparison, tables, figures, registrations in 3-D."""
+"""Writes a run as one plain web page that works from disk: findings, comparison, tables, figures, registrations."""
 
 from __future__ import annotations
 
@@ -9,16 +9,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gpca.causes.settings import Limits
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.provenance import sha256_of_settings
 from gpca.reporting.page.comparison import page_comparison
+from gpca.reporting.page.findings import Titles, findings_of
 from gpca.reporting.page.markdown_table import read_markdown_table
 from gpca.reporting.page.samples import POINTS, RULE, page_samples
 from gpca.reporting.registry import SUFFIXES, by_section
 
 TEMPLATES = Path(__file__).parent / "templates"
-_CSS_PIXELS = 130 / 300  # A figure's pixel, of 300 in an inch, takes so many: a little larger than in print.
+KEY_FIGURES = ("causes_example", "fig2_overview")  # The page opens with the first of these that the run has.
+_CSS_PIXELS = 170 / 300  # A figure's pixel, of 300 in an inch, takes so many: its letters are as large as the text's.
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,10 @@ class Run:
         seeds: The seeds of its repeats.
         sources: The ``{"title": str, "stand_in": bool}`` of each name.
         results: Its tables and figures, in order.
-        samples: The files of registrations, and of GP-CA's predictions on them, of each source.
+        samples: The files of each source whose registrations are shown, by name
+            (:func:`gpca.reporting.page.samples.page_samples`).
+        titles: What readers call the explainers of the run.
+        reference: The ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged.
         config: The whole configuration.
         command: The command that makes what is missing.
     """
@@ -50,7 +56,9 @@ class Run:
     seeds: Sequence[int]
     sources: Mapping[str, Mapping]
     results: Sequence[Shown]
-    samples: Mapping[str, tuple[str, str]]
+    samples: Mapping[str, Mapping[str, str]]
+    titles: Titles
+    reference: str | None
     config: Mapping
     command: str
 
@@ -58,7 +66,7 @@ class Run:
 def write_page(folder: str | Path, run: Run) -> None:
     """Write ``index.html`` of a finished run into its folder, and ``page/plotly.min.js`` beside it.
 
-    The comparison is shown where the folder has a ``comparison.csv``.
+    Comparison and findings are shown where the folder has the collected files, such as ``comparison.csv``.
 
     Args:
         folder: The folder ``results/{run}``.
@@ -75,12 +83,19 @@ def write_page(folder: str | Path, run: Run) -> None:
         section: [_content(folder, result) for result in results]
         for section, results in by_section(run.results).items()
     }
+    shown = {result.name for result in run.results}
+    limits = Limits(**run.config["causes"]["limits"])
+    key_figure = next((result for name in KEY_FIGURES for result in run.results if result.name == name), None)
     text = render(
         run=run,
+        findings=findings_of(folder, run.titles, shown),
+        key_figure=key_figure and _content(folder, key_figure),
         sections=sections,
-        comparison=page_comparison(folder / "comparison.csv"),
+        comparison=page_comparison(folder / "comparison.csv", run.reference),
         samples=[
-            sample for source, files in run.samples.items() for sample in page_samples(*files, run.sources[source])
+            sample
+            for source, files in run.samples.items()
+            for sample in page_samples(files, run.sources[source], limits)
         ],
         provenance=read_provenance(_provenance_files(folder, run)),
     )
@@ -112,7 +127,7 @@ def require_complete(folder: Path, run: Run) -> None:
     """Raise an InputError that names every result of the run that is not there, and the command that makes it."""
     needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
     missing = [name for name in needed if not (folder / name).is_file()]
-    missing += [str(path) for files in run.samples.values() for path in files if not Path(path).is_file()]
+    missing += [str(path) for files in run.samples.values() for path in files.values() if not Path(path).is_file()]
     if missing:
         raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
 
@@ -157,7 +172,7 @@ def _device(device: dict) -> str:
 def _provenance_files(folder: Path, run: Run) -> list[Path]:
     suffix = {"tables": "csv", "figures": "pdf"}
     files = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
-    return files + [Path(path) for of_source in run.samples.values() for path in of_source]
+    return files + [Path(path) for of_source in run.samples.values() for path in of_source.values()]
 
 
 def _content(folder: Path, result: Shown) -> dict:

@@ -10,11 +10,12 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.causes.settings import Limits
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import thinned
-from gpca.reporting.pose_state import registration_error, state_of_error
+from gpca.reporting.pose_state import observed_uncertainties, registration_error, state_of_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,31 +29,39 @@ RULE = (
 _STEPS_PER_DIAMETER = 1000  # Coordinates are whole thousandths of the diameter.
 
 
-def page_samples(registrations_npz: str | Path, predictions_csv: str | Path, source: Mapping) -> list[dict]:
+def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limits) -> list[dict]:
     """Return what the page's 3-D view needs of the samples of one source that `RULE` names, as plain JSON values.
 
     Each holds the target and the ICP-aligned source as flat lists x, y, z of at most `POINTS` points each, in
     thousandths of the object's diameter, and the 4×4 transforms (row by row, in diameters) that take the aligned source
     to its initial and to its true pose; object, concept, severity, scores, standard deviations, fitness, and how far
-    off ICP ends (ADD-S in % of the diameter) with the state that this is called.
+    off ICP ends (ADD-S in % of the diameter) with the state that this is called; the uncertainty in nats and that
+    below which 95 % of the clean pairs lie, where they are known.
 
     Args:
-        registrations_npz, predictions_csv: The files of one source and seed.
+        files: The ``registrations`` and ``predictions`` of one source and seed, and perhaps its ``uncertainty``.
         source: The ``title`` of the source, and whether it is a ``stand_in``.
+        limits: What states are told apart by.
 
     Raises:
         InputError: an unusable file, or a sample that was not predicted.
     """
-    registrations = Registrations.load(registrations_npz)
-    predictions = read_predictions(predictions_csv)
+    registrations, predictions = Registrations.load(files["registrations"]), read_predictions(files["predictions"])
+    u_S, clean = np.full(len(registrations), np.nan), np.nan
+    if "uncertainty" in files:
+        u_S, clean = observed_uncertainties(files["uncertainty"], registrations)
     test = predictions[predictions["split"] == "test"].set_index("sample")
     samples = []
     for row in first_of_each_concept(registrations):
         number = str(registrations.sample[row])
         if number not in test.index:
-            raise InputError(predictions_csv, f"lacks test sample {number} of {registrations_npz}", "make both anew")
+            fault = f"lacks test sample {number} of {files['registrations']}"
+            raise InputError(files["predictions"], fault, "make both anew")
+        error = registration_error(registrations, row)
         samples.append(
-            _sample(registrations, row, test.loc[number], concepts_of(predictions)) | {"source": dict(source)}
+            _sample(registrations, row, test.loc[number], concepts_of(predictions))
+            | {"error_percent": _number(100 * error), "state": state_of_error(error, limits)}
+            | {"uncertainty": _number(u_S[row]), "clean_uncertainty": _number(clean), "source": dict(source)}
         )
     return samples
 
@@ -77,15 +86,12 @@ def severity_words(registrations: Registrations, row: int) -> str:
 
 def _sample(registrations: Registrations, row: int, prediction: pd.Series, concepts: list[str]) -> dict:
     T_icp_target = inverse(registrations.T_target_source("icp", row))
-    error = registration_error(registrations, row)
     return {
         "object": str(registrations.object_name[row]),
         "sample": int(registrations.sample[row]),
         "concept": str(registrations.concept[row]),
         "severity": severity_words(registrations, row),
         "fitness": _number(registrations.fitness[row]),
-        "error_percent": _number(100 * error),
-        "state": state_of_error(error),
         "predicted": str(prediction["concept_predicted"]),
         "scores": [
             {

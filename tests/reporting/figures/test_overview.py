@@ -19,11 +19,19 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
     assert f"{sample['score_pose']:.2f}±0.12" in written
     assert f"{sample['score_noise']:.2f}±0.10" in written
     assert f"{sample['score_overlap']:.2f}±0.05" in written
+    assert "nats" in stages.words(row, "icp")
     assert f"aligned: {stages.words(row, 'icp')}" in written
     assert any(f"{100 * of.severity_translation[row]:.0f} % $d$" in words for words in written)
     assert f"Solids (procedural stand-in): {of.object_name[row]}" in written
     assert "Act on pose:\nReinitialise ICP" in written
     assert r"$\mathbf{h} \in \mathbb{R}^{12}$" in written
+
+
+def test_nothing_is_done_about_what_did_not_fail(stage_files, tmp_path, written, monkeypatch):
+    monkeypatch.setattr(Stages, "error", lambda self, row: 0.012)
+    draw_overview(*stage_files, "Solids", "DGCNN", TREATMENTS, tmp_path / "a.pdf", tmp_path / "a.png")
+    assert "No action on\npose: it did\nnot fail" in written
+    assert not [words for words in written if words.startswith("Act on")]
 
 
 def test_no_letter_is_smaller_than_7_pt_and_none_leaves_the_figure(stage_files, tmp_path, monkeypatch):

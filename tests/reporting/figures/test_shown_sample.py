@@ -26,31 +26,27 @@ def test_where_none_failed_the_fit_is_a_poor_one(stages, stage_files, monkeypatc
     row = stages.choose("pose", stage_files[0])
     test = stages.predictions[(stages.predictions["split"] == "test") & (stages.predictions["concept_true"] == "pose")]
     assert stages.registrations.fitness[row] <= np.median(stages.registrations.fitness[test.index])
-    assert stages.words(row, "icp") == "nominal, ADD-S 1.2 % $d$"
+    assert stages.words(row, "icp") == f"nominal, ADD-S 1.2 % $d$\n$u$ = {sample_number(stages, row) / 10:.1f} nats"
+    of_training = int(stages.registrations.rows("train")[0])
+    assert stages.words(of_training, "icp") == "nominal, ADD-S 1.2 % $d$"  # whose uncertainty is not measured
 
 
-def test_a_concept_without_test_samples_is_refused(stages, stage_files):
-    with pytest.raises(InputError, match=r"registrations\.npz: holds no test sample of 'blur'"):
-        stages.choose("blur", stage_files[0])
+def sample_number(stages, row):
+    return stages.registrations.sample[row]
 
 
-def test_clouds_are_those_of_the_file_and_icp_undone(stages):
-    of = stages.registrations
-    row = int(of.rows("test")[0])
-    target, aligned = stages.clouds(row, "icp")
-    np.testing.assert_allclose(target, of.target(row))
-    np.testing.assert_allclose(aligned, of.cloud(row), atol=1e-6)
-    _, initial = stages.clouds(row, "init")
-    step = of.T_target_source("icp", row) @ np.linalg.inv(of.T_target_source("init", row))
-    np.testing.assert_allclose(initial @ step[:3, :3].T + step[:3, 3], aligned, atol=1e-6)
+def test_states_follow_the_limits_of_the_config(stage_files, monkeypatch):
+    *files, _ = stage_files
+    monkeypatch.setattr(Stages, "error", lambda self, row: 0.012)
+    assert Stages.load(*files, {"nominal": 0.001, "failed": 0.01}).state(0) == "failed"
+    assert Stages.load(*files, {"nominal": 0.001, "failed": 0.02}).state(0) == "borderline"
 
 
-def test_one_rotation_shows_both_poses(stages):
-    row = int(stages.registrations.rows("test")[1])
-    seen = stages.seen(row)
-    np.testing.assert_allclose(seen["init"][0], seen["icp"][0])
-    for which, (_, source) in seen.items():
-        np.testing.assert_allclose(np.linalg.norm(source, axis=1), np.linalg.norm(stages.clouds(row, which)[1], axis=1))
+def test_uncertainties_of_other_samples_are_refused(stage_files, tmp_path):
+    *files, uncertainties, limits = stage_files
+    (tmp_path / "seed0.csv").write_text(uncertainties.read_text().replace("\n", "\n99").removesuffix("99"))
+    with pytest.raises(InputError, match=r"seed0\.csv: holds other samples than the registrations; make both anew"):
+        Stages.load(*files, tmp_path / "seed0.csv", limits)
 
 
 @pytest.mark.parametrize(
@@ -63,9 +59,9 @@ def test_one_rotation_shows_both_poses(stages):
     ],
 )
 def test_predictions_that_do_not_fit_are_refused(stage_files, tmp_path, old, new, message):
-    registrations, embeddings, predictions = stage_files
+    registrations, embeddings, predictions, *others = stage_files
     text = predictions.read_text()
     assert old in text
     (tmp_path / "predictions.csv").write_text(text.replace(old, new))
     with pytest.raises(InputError, match=rf"predictions\.csv: .*({message})"):
-        Stages.load(registrations, embeddings, tmp_path / "predictions.csv")
+        Stages.load(registrations, embeddings, tmp_path / "predictions.csv", *others)

@@ -43,6 +43,19 @@ def test_verdicts_are_counted_from_the_best_to_the_worst(tmp_path):
     ]
 
 
+def test_where_nothing_is_judged_the_verdicts_are_the_references(tmp_path):
+    (tmp_path / "real").mkdir()
+    reference = written(tmp_path / "real", HEAD + "".join(LINES))
+    own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
+    shown = page_comparison(written(tmp_path, HEAD + own), reference)
+    assert shown["of_reference"]
+    assert [row["verdict"] for row in shown["rows"]] == ["close", "reproduced", "not reproduced", "not run"]
+    assert [row["this_run"] for row in shown["rows"]] == ["88.8", "", "", ""]
+    judged = page_comparison(written(tmp_path, HEAD + own + LINES[1]), reference)
+    assert not judged["of_reference"]
+    assert [row["verdict"] for row in judged["rows"]] == ["not comparable", "reproduced"]
+
+
 def test_there_need_not_be_a_comparison(tmp_path):
     assert page_comparison(tmp_path / "comparison.csv") is None
 

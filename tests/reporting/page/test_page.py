@@ -14,10 +14,12 @@ from gpca.files import whole_file
 from gpca.processor import describe
 from gpca.provenance import record_provenance
 from gpca.reporting.figures.style import save_figure, use_style
+from gpca.reporting.page.findings import Titles
 from gpca.reporting.page.page import Run, Shown, read_provenance, write_page
 from gpca.reporting.tables.table import Cell, Column, Table
 
 from .test_comparison import HEAD, LINES
+from .test_findings import write_metrics
 
 TABLES = ["table2_per_concept", "table1_single_baselines", "table4_mine"]
 FIGURES = ["objects_bricks", "reliability"]
@@ -73,6 +75,7 @@ def folder(registrations, predicted, tmp_path_factory):
         panel.plot(np.arange(5))
         save_figure(figure, folder / f"figures/{name}.pdf", folder / f"figures/{name}.png")
     (folder / "comparison.csv").write_text(HEAD + "".join(LINES))
+    write_metrics(folder / "metrics.csv", [("bricks", "gpca", "accuracy", 0.9), ("cones", "gpca", "accuracy", 0.75)])
     predicted(registrations, folder)
     write_page(folder, run_of(folder))
     return folder
@@ -103,9 +106,18 @@ def run_of(folder, **changes):
         },
         "results": results(),
         "samples": {
-            "bricks": (folder / "registrations/bricks/seed0.npz", folder / "predictions/bricks/gpca/seed0.csv")
+            "bricks": {
+                "registrations": folder / "registrations/bricks/seed0.npz",
+                "predictions": folder / "predictions/bricks/gpca/seed0.csv",
+            }
         },
-        "config": {"run": "tiny", "note": "</script><script>alert(1)</script>"},
+        "titles": Titles({"gpca": {"title": "GP-CA", "oracle": False}}, {}, 3),
+        "reference": None,
+        "config": {
+            "run": "tiny",
+            "note": "</script><script>alert(1)</script>",
+            "causes": {"limits": {"nominal": 0.02, "failed": 0.03}},
+        },
         "command": "snakemake -j2 results/tiny/index.html",
     }
     return Run(**entries | changes)
@@ -156,7 +168,31 @@ def test_every_table_and_figure_is_shown_with_its_caption_in_the_papers_order(pa
     assert page.text.count("A footnote.") == len(TABLES)
 
 
-def test_the_comparison_comes_first_with_its_verdicts_counted_and_named(page):
+def test_the_page_opens_with_what_was_found_and_ends_with_where_it_comes_from(page):
+    order = ["findings", "comparison", "objects_bricks", "registrations", "provenance"]
+    assert [name for name in page.ids if name in order] == order
+    assert "<dt>75 to 90 %</dt><dd>Under the paper's protocol" in page.text.replace("&#39;", "'")
+    folded = page.text.index("<details>")
+    assert page.text.index('id="provenance"') < folded < page.text.index("SHA-256") < page.text.index("</details>")
+    assert page.text.count("SHA-256") == page.text[folded:].count("SHA-256")
+
+
+def test_a_run_on_stand_ins_shows_the_verdicts_of_the_reference_as_such(copied):
+    folder, _ = copied
+    reference = folder.parent / "reference.csv"
+    reference.write_text(HEAD + "".join(LINES))
+    own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
+    (folder / "comparison.csv").write_text(HEAD + own)
+    write_page(folder, run_of(folder, reference=reference))
+    text = (folder / "index.html").read_text()
+    assert "These are the verdicts <strong>of the reference run on real objects</strong>" in text
+    assert re.search(r'aria-pressed="true"><b>1</b> close<', text)
+    assert "not comparable" not in text
+    assert '<td data-label="This run" class="number">88.8</td>' in text
+    assert "The objects of this run are stand-ins, so none of its numbers is judged" in text
+
+
+def test_the_comparison_comes_with_its_verdicts_counted_and_named(page):
     assert page.text.index('id="comparison"') < page.text.index('id="objects_bricks"')
     for verdict in ("reproduced", "close", "not reproduced", "not run"):
         assert re.search(rf'data-verdict="{verdict}" aria-pressed="true"><b>1</b> {verdict}<', page.text)
@@ -302,7 +338,7 @@ def test_a_browser_draws_both_clouds_and_has_nothing_to_complain_about(folder, t
     chromium(folder / "index.html", tmp_path, f"--screenshot={tmp_path / 'page.png'}", "--window-size=1000,5000")
     with Image.open(tmp_path / "page.png") as image:
         pixels = np.asarray(image.convert("RGB")).astype(int)
-    for colour in ((200, 16, 46), (0, 114, 178)):  # of target and source
+    for colour in ((213, 94, 0), (0, 114, 178)):  # of target and source
         of_colour = (np.abs(pixels - colour).max(axis=2) < 12).sum(axis=1)
         assert (of_colour > 0).sum() > 100  # rows of pixels: a cloud, not the key below it
 

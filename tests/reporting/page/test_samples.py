@@ -5,12 +5,18 @@ import pandas as pd
 import pytest
 
 from gpca.alignment.rigid import inverse, transform
+from gpca.causes.settings import Limits
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.concepts import source_before_icp
 from gpca.reporting.page.samples import OF_EACH_CONCEPT, POINTS, first_of_each_concept, page_samples, severity_words
 
+from ..conftest import write_uncertainties
+
 SOURCE = {"title": "Bricks", "stand_in": True}
+
+
+LIMITS = Limits(nominal=0.02, failed=0.03)
 
 
 @pytest.fixture
@@ -20,7 +26,7 @@ def files(registrations, predicted, tmp_path):
 
 @pytest.fixture
 def samples(files):
-    return page_samples(*files, SOURCE)
+    return page_samples(files, SOURCE, LIMITS)
 
 
 def moved(sample, which):
@@ -58,12 +64,12 @@ def test_the_transforms_take_the_source_to_its_initial_and_to_its_true_pose(samp
 def test_a_large_cloud_is_thinned_evenly(registrations, predicted, tmp_path):
     many = np.repeat(registrations.points, 20, axis=0)
     large = replace(registrations, points=many, offsets=registrations.offsets * 20)
-    for sample in page_samples(*predicted(large, tmp_path), SOURCE):
+    for sample in page_samples(predicted(large, tmp_path), SOURCE, LIMITS):
         assert len(sample["points"]) == 3 * POINTS
 
 
 def test_scores_and_deviations_are_those_of_the_predictions(samples, files):
-    rows = pd.read_csv(files[1])
+    rows = pd.read_csv(files["predictions"])
     rows = rows[rows["split"] == "test"].set_index("sample")
     for sample in samples:
         row = rows.loc[sample["sample"]]
@@ -75,11 +81,11 @@ def test_scores_and_deviations_are_those_of_the_predictions(samples, files):
 
 
 def test_an_abstention_has_no_scores(registrations, files):
-    rows = pd.read_csv(files[1], dtype=str, keep_default_na=False)
+    rows = pd.read_csv(files["predictions"], dtype=str, keep_default_na=False)
     rows["abstained"], rows["concept_predicted"] = "True", ""
     rows[[f"score_{c}" for c in CONCEPTS]] = ""
-    rows.to_csv(files[1], index=False)
-    shown = page_samples(*files, SOURCE)
+    rows.to_csv(files["predictions"], index=False)
+    shown = page_samples(files, SOURCE, LIMITS)
     assert {sample["predicted"] for sample in shown} == {""}
     assert {score["mean"] for sample in shown for score in sample["scores"]} == {None}
 
@@ -92,10 +98,10 @@ def test_the_words_say_what_was_done(registrations):
 
 
 def test_predictions_of_other_samples_are_refused(files):
-    rows = pd.read_csv(files[1], dtype=str)
-    rows[rows["split"] == "train"].to_csv(files[1], index=False)
+    rows = pd.read_csv(files["predictions"], dtype=str)
+    rows[rows["split"] == "train"].to_csv(files["predictions"], index=False)
     with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; make both anew"):
-        page_samples(*files, SOURCE)
+        page_samples(files, SOURCE, LIMITS)
 
 
 def test_the_page_says_how_far_off_icp_ends(samples, registrations):
@@ -107,3 +113,13 @@ def test_the_page_says_how_far_off_icp_ends(samples, registrations):
         assert sample["state"] == ("nominal" if sample["error_percent"] < 2 else "failed" if sample["error_percent"] > 3
                                    else "borderline")  # fmt: skip
     assert len({sample["state"] for sample in samples}) > 1
+    assert {sample["uncertainty"] for sample in samples} == {None}
+
+
+def test_states_follow_the_limits_and_uncertainties_are_those_of_the_file(files, registrations, tmp_path):
+    write_uncertainties(tmp_path / "u.csv", registrations)
+    strict = Limits(nominal=1e-6, failed=1e-5)
+    for sample in page_samples(files | {"uncertainty": tmp_path / "u.csv"}, SOURCE, strict):
+        assert sample["state"] == "failed"
+        assert sample["uncertainty"] == sample["sample"] / 10
+        assert sample["clean_uncertainty"] == 1

@@ -115,7 +115,9 @@ function showRegistrations() {
       ...rows,
       element("p", "footnote", `Mean of the posterior draws ± their standard deviation; the true cause is bold. `
         + `ICP ends ${sample.error_percent.toFixed(1)} % of the diameter off (ADD-S: ${sample.state}); `
-        + `its fitness is ${sample.fitness}.`),
+        + `its fitness is ${sample.fitness}`
+        + (sample.uncertainty === null ? "." : `, its uncertainty u ${sample.uncertainty.toFixed(1)} nats `
+          + `(of 95 % of the clean pairs: at most ${sample.clean_uncertainty.toFixed(1)}).`)),
     );
   }
 
@@ -128,7 +130,7 @@ function showRegistrations() {
       icp: coordinates(sample.points),
       truth: coordinates(sample.points, sample.truth),
     };
-    const traces = [cloud("target", "#c8102e", target), cloud("source", "#0072b2", inPose[pose])];
+    const traces = [cloud("target", "#d55e00", target), cloud("source", "#0072b2", inPose[pose])];
     const scene = axes([target, ...Object.values(inPose)]);
     const layout = { scene, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false };
     const config = { displaylogo: false, responsive: true, modeBarButtons: [["toImage", "resetCameraDefault3d"]] };

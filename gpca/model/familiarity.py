@@ -1,0 +1,103 @@
+"""Whether two clouds are like those that a model learnt: what is unlike them cannot be explained, only guessed at.
+
+Three numbers of simple geometry, whose ranges over the training samples are kept with the model. None depends on the
+pose but that of size, which is measured about the clouds' own centres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.seeds import generator
+
+MEASURES = ("size", "depth", "closure")
+SHARE = 0.99  # of the training samples lies within the range of each measure
+SIZE_MARGIN = 1.1  # by which a source may be larger or smaller still: a sensor may show a little less or more of it
+POINTS = 1024  # at most; of a cloud whose depth is measured
+DIRECTIONS = 32  # from which a cloud is looked at
+CELL, CELLS = 1 / 16, 64  # diameters, and cells along an axis of the picture
+BEHIND = 0.1  # diameters behind the foremost point of a cell, from which on a point is hidden
+FLAT = 0.15  # closure below which a thin object looks the same as one side of it
+
+Pair = tuple[np.ndarray, np.ndarray]
+
+
+def measure(source: np.ndarray, target: np.ndarray) -> dict[str, float]:
+    """Return `MEASURES` of a pair of clouds (N, 3) and (M, 3), both in diameters of the target.
+
+    - size: radius of gyration of the source in that of the target.
+    - closure: share of the target's points that is hidden behind others, from the direction that hides fewest: 0.3 to
+      0.5 of an object with a front and a back, 0 to 0.2 of a view from one side.
+    - depth: the same share of the source in that of the target; NaN where this is a thin object.
+    """
+    closure = hidden_share(target)
+    radii = [np.sqrt(cloud.var(axis=0).sum()) for cloud in (source, target)]
+    depth = hidden_share(source) / closure if closure >= FLAT else np.nan
+    return {"size": float(radii[0] / radii[1]), "depth": float(depth), "closure": closure}
+
+
+def hidden_share(points: np.ndarray) -> float:
+    """Return the share of points (N, 3) that are hidden behind others, from the direction that hides fewest."""
+    points = points[generator("familiarity").permutation(len(points))[:POINTS]] - points.mean(axis=0)
+    z_D_N, u_D_N, v_D_N = np.moveaxis(_frames() @ points.T, 1, 0)
+    cell_D_N = [np.clip((w_D_N / CELL).astype(int) + CELLS // 2, 0, CELLS - 1) for w_D_N in (u_D_N, v_D_N)]
+    number_D_N = (np.arange(DIRECTIONS)[:, None] * CELLS + cell_D_N[0]) * CELLS + cell_D_N[1]
+    foremost = np.full(DIRECTIONS * CELLS**2, -np.inf)
+    np.maximum.at(foremost, number_D_N, z_D_N)
+    return float((z_D_N < foremost[number_D_N] - BEHIND).mean(axis=1).min())
+
+
+def _frames() -> np.ndarray:
+    """Return (D, 3, 3) axes: a direction of view, spread evenly over the sphere (Fibonacci), and two across it."""
+    steps = np.arange(DIRECTIONS) + 0.5
+    height, turn = 1 - 2 * steps / DIRECTIONS, np.pi * (1 + np.sqrt(5)) * steps
+    ring = np.sqrt(1 - height**2)
+    z_D_3 = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    u_D_3 = np.stack([-np.sin(turn), np.cos(turn), np.zeros(DIRECTIONS)], axis=1)
+    return np.stack([z_D_3, u_D_3, np.cross(z_D_3, u_D_3)], axis=1)
+
+
+@dataclass(frozen=True)
+class Familiarity:
+    """The range (low, high) of each measure, which holds `SHARE` of the training samples, or more."""
+
+    ranges: Mapping[str, tuple[float, float]]
+
+    @classmethod
+    def of(cls, pairs: Iterable[Pair]) -> Familiarity:
+        """Measure the training samples: source and target of each, in diameters."""
+        measured = [measure(*pair) for pair in pairs]
+        ends = ((1 - SHARE) / 2, (1 + SHARE) / 2)
+        ranges = {}
+        for name in MEASURES:
+            values = np.array([of_pair[name] for of_pair in measured])
+            values = values[np.isfinite(values)]
+            low, high = np.quantile(values, ends).tolist() if len(values) else (0.0, np.inf)
+            margin = SIZE_MARGIN if name == "size" else 1.0
+            ranges[name] = low / margin, high * margin
+        return cls(ranges)
+
+    def warnings(self, source: np.ndarray, target: np.ndarray) -> list[str]:
+        """Return a line for each measure of the pair that lies outside its range; see :func:`measure`."""
+        measured = measure(source, target)
+        below, above = (
+            {name for name, (low, high) in self.ranges.items() if beyond(measured[name], low, high)}
+            for beyond in (lambda value, low, _: value < low, lambda value, _, high: value > high)
+        )
+        said = []
+        if "size" in below | above:
+            between = " to ".join(f"{end:.2g}" for end in self.ranges["size"])
+            said.append(
+                f"the source is {measured['size']:.2g} times as large as the target, in training it was {between} "
+                "times: are both in the same unit and scale?"
+            )
+        if "depth" in above:
+            said.append("the source shows the object from all sides, but GP-CA learnt partial views")
+        if "depth" in below:
+            said.append("the source shows the object from one side alone, but GP-CA learnt clouds of more of it")
+        if "closure" in below:
+            said.append("the target looks like a view from one side: give the whole object")
+        return said
