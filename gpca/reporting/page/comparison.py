@@ -27,11 +27,14 @@ _COLUMNS = (
     "verdict",
     "reason",
 )
+REPEAT, DEVIATION = "repeat", "standard deviation"  # Rows that are counted apart, whatever their verdict.
 _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
 
 
 def page_comparison(path: str | Path) -> dict | None:
     """Return the rows of ``comparison.csv`` in words, its tables, and verdicts with tone and number; None without it.
+
+    Repeats of a value and standard deviations are counted apart from the verdicts.
 
     Raises:
         InputError: an unreadable file, a missing column, no rows, a number that is none.
@@ -39,10 +42,11 @@ def page_comparison(path: str | Path) -> dict | None:
     if not Path(path).is_file():
         return None
     rows = read_csv(path, _COLUMNS)
-    counts = Counter(rows["verdict"])
-    order = [*TONES, *sorted(set(counts) - set(TONES))]
+    words = [_words(path, row) for row in rows.to_dict("records")]
+    counts = Counter(row["group"] for row in words)
+    order = [*TONES, *sorted(set(counts) - {*TONES, DEVIATION, REPEAT}), DEVIATION, REPEAT]
     return {
-        "rows": [_words(path, row) for row in rows.to_dict("records")],
+        "rows": words,
         "tables": list(dict.fromkeys(rows["table"])),
         "verdicts": [(verdict, TONES.get(verdict, ""), counts[verdict]) for verdict in order if counts[verdict]],
     }
@@ -56,8 +60,12 @@ def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
         published += f" to {printed['upper']}"
     if printed["deviation"]:
         published += f" ± {printed['deviation']}"
+    repeat_of = row.get("repeat_of", "")
+    apart = REPEAT if repeat_of else DEVIATION if row.get("statistic") == "deviation" else ""
     bound = "> " if row.get("at_least", "").lower() == "true" else ""
-    return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict", "reason")} | {
+    return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict")} | {
+        "group": apart or row["verdict"],
+        "reason": "; ".join(filter(None, (f"repeat of {repeat_of}" if repeat_of else "", row["reason"]))),
         "tone": TONES.get(row["verdict"], ""),
         "objects": ", ".join(filter(None, (row.get("objects", ""), row.get("hardware", "")))),
         "published": published,
