@@ -5,6 +5,7 @@ import pytest
 import yaml
 
 from gpca.code_files import ROOT
+from gpca.comparison.chance import ALL, chance
 from gpca.comparison.published import read_published
 from gpca.comparison.reasons import NONE_YET, read_reasons
 from gpca.comparison.values import read_results
@@ -38,20 +39,11 @@ def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
     assert len(rows) == len(shown) == 112
     kept = (rows["verdict"] != "not run").to_numpy()  # the file behind Table V is too large to be kept
     assert set(rows.loc[~kept, "table"]) <= {"V"}
-    for column in (
-        "table",
-        "row",
-        "column",
-        "published",
-        "paper_low",
-        "paper_high",
-        "reproduced",
-        "ci_low",
-        "repeat_of",
-    ):
+    numbers = ("published", "paper_low", "paper_high", "reproduced", "ci_low")
+    for column in ("table", "row", "column", *numbers, "repeat_of"):
         assert rows.loc[kept, column].tolist() == pytest.approx(shown.loc[kept, column].tolist(), nan_ok=True)
     # Predictions are not kept either: where they widen the interval, the verdict may have become another.
-    kept &= shown["cluster_low"].isna().to_numpy()
+    kept = kept & shown["cluster_low"].isna().to_numpy()
     assert kept.sum() > 50
     for column in ("verdict", "reason"):
         assert rows.loc[kept, column].tolist() == shown.loc[kept, column].tolist()
@@ -77,6 +69,14 @@ def test_the_readme_counts_the_verdicts_of_the_reference(shown):
     assert counts_table(shown, TOLERANCES) in readme
     words = " ".join(readme.replace("*", "").split())
     assert summary(shown) in words
+    chances = chance(shown, TOLERANCES)
+    of_all = chances.pop(ALL)
+    told = (
+        f"{of_all.agree} numbers are reproduced or close, and {of_all.expected:.1f} would be with our values shuffled"
+    )
+    assert told in words
+    assert f"(p = {of_all.p:.2f}): levels agree, which row is which does not, but for the kernels of Table IV." in words
+    assert min(chances, key=lambda table: chances[table].p) == "IV"
     missed = shown[(shown["verdict"] == "not reproduced") & (shown["repeat_of"] == "")]
     times = missed[missed["unit"].isin(["s", "ms"])]
     assert (times["factor"] < 1).all()
