@@ -104,8 +104,8 @@ def deviation_interval(deviation: float, n: int) -> tuple[float, float]:
     return tuple(deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
 
 
-def _of_tidy(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
-    """Take the statistic over the seeds of what the counterpart names in a tidy file; of a deviation, by chi-square."""
+def of_seeds(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, bool]:
+    """Return what the counterpart names in a tidy file, by seed, and whether it is a lower bound in some of them."""
     rows = rows[(rows["table"] == counterpart.table) & (rows["concept"] == counterpart.concept)]
 
     def of_metric(source: str, method: str, metric: str) -> pd.Series:
@@ -121,7 +121,23 @@ def _of_tidy(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
             if (censoring := CENSORED_BY.get(counterpart.metrics[0])) is not None:
                 at_least |= bool((of_metric(source, method, censoring) < 1).any())
         sources.append(sum(methods[1:], methods[0]))
-    value_R = (sum(sources[1:], sources[0]) / len(sources)).to_numpy()
+    return sum(sources[1:], sources[0]) / len(sources), at_least
+
+
+def runtime_mean(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[float, float, int] | None:
+    """Return the sum of the components' mean seconds on one device, its standard error, and the repeats."""
+    rows = rows[rows["device"] == counterpart.concept].set_index("component")
+    if not set(counterpart.methods) <= set(rows.index):
+        return None
+    rows = rows.loc[list(counterpart.methods)]
+    n = int(rows["repeats"].min())
+    return float(rows["mean_s"].sum()), math.sqrt((rows["deviation_s"] ** 2).sum() / n), n
+
+
+def _of_tidy(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
+    """Take the statistic over the seeds; the interval of a deviation is that of its chi-square."""
+    by_seed, at_least = of_seeds(rows, counterpart)
+    value_R = by_seed.to_numpy()
     if not len(value_R) or np.isnan(value_R).any():
         return None
     n = len(value_R)
@@ -138,13 +154,10 @@ def _of_runtime(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | No
     """Add up the mean seconds of the components on one device, measured apart from one another."""
     from scipy.stats import t as student_t
 
-    rows = rows[rows["device"] == counterpart.concept].set_index("component")
-    if not set(counterpart.methods) <= set(rows.index):
+    if (found := runtime_mean(rows, counterpart)) is None:
         return None
-    rows = rows.loc[list(counterpart.methods)]
-    n = int(rows["repeats"].min())
-    mean = float(rows["mean_s"].sum())
+    mean, error, n = found
     if n < 2:
         return Reproduced(mean, math.nan, math.nan, n)
-    half_width = float(student_t.ppf(0.975, n - 1) * math.sqrt((rows["deviation_s"] ** 2).sum() / n))
+    half_width = float(student_t.ppf(0.975, n - 1) * error)
     return Reproduced(mean, mean - half_width, mean + half_width, n)

@@ -37,6 +37,7 @@ rule comparison:
         collected=[f"<results>/{name}" for name in COMPARED],
         predictions=COMPARED_PREDICTIONS,
         code=code_files(
+            "gpca.comparison.claim_verdicts",
             "gpca.comparison.clusters",
             "gpca.reporting.tables.comparison",
             "gpca.reporting.script",
@@ -44,6 +45,7 @@ rule comparison:
     output:
         csv="<results>/comparison.csv",
         md="<results>/comparison.md",
+        claims="<results>/claims.csv",
     log:
         "<logs>/comparison.log",
     benchmark:

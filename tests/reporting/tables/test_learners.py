@@ -1,7 +1,6 @@
 import pytest
 
 from gpca.errors import InputError
-from gpca.reporting.tables.learner_claims import table5_claims
 from gpca.reporting.tables.learners import table5_learners, table5_shift
 
 REAL = {"ycb": {"title": "YCB", "stand_in": False}, "linemod": {"title": "LINEMOD", "stand_in": False}}
@@ -26,7 +25,7 @@ def test_table5_shift_has_every_kind_of_shift(diagnostics):
     assert table.cells[0, "accuracy_objects"].test_samples == 3 * 40
 
 
-@pytest.mark.parametrize("make", [table5_learners, table5_shift, table5_claims])
+@pytest.mark.parametrize("make", [table5_learners, table5_shift])
 def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(diagnostics, make):
     table = make(diagnostics, STAND_INS, LEARNERS)
     assert "on procedural stand-ins" in table.caption
