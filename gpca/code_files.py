@@ -9,6 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent  # the folder that holds both packages: a checkout, or site-packages
 PACKAGES = ("gpca", "baselines")
 BESIDE = {  # what a module reads from its own folder
+    "gpca.comparison.claims": "claims.yaml",
     "gpca.comparison.published": "published.csv",
     "gpca.comparison.reasons": "reasons.csv",
     "gpca.reporting.figures.style": "matplotlibrc",

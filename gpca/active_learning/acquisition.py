@@ -197,4 +197,4 @@ STRATEGIES = {
     "typiclust": Strategy("TypiClust", typiclust, needs_scores=False),
 }
 
-STREAMS = {"stream_random": "Stream, random", "stream_bald": "Stream, BALD over a threshold (paper)"}
+STREAMS = {"stream_random": "Stream, random", "stream_bald": "Stream, BALD over a threshold"}

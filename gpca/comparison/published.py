@@ -19,17 +19,8 @@ FILES = ("metrics.csv", "timings.csv", "active_learning.csv", "kernels.csv", "di
 STATISTICS = ("mean", "deviation")  # over the seeds
 _COUNTERPART = ("in_file", "in_table", "source", "method", "metric", "concept", "statistic")
 PUBLISHED_COLUMNS = (
-    "table",
-    "row",
-    "column",
-    "value",
-    "upper",
-    "decimals",
-    "unit",
-    "device",
-    "place",
-    *_COUNTERPART,
-    "note",
+    *("table", "row", "column", "value", "upper", "decimals", "paper_n", "unit", "device", "place"),
+    *(*_COUNTERPART, "same_as", "note"),
 )
 
 
@@ -128,7 +119,13 @@ class Counterpart:
 
 @dataclass(frozen=True)
 class Number:
-    """One printed number, or the range from `value` to `upper`, with `decimals` digits (-1: in tens)."""
+    """One printed number, or the range from `value` to `upper`, with `decimals` digits (-1: in tens).
+
+    Attributes:
+        paper_n: of how many samples it is a share, or of how many repeats a standard deviation; 0 where that cannot be
+            told.
+        same_as: key of an earlier number beside which the suite sets the same value of its own.
+    """
 
     table: str
     row: str
@@ -141,6 +138,8 @@ class Number:
     place: str
     counterpart: Counterpart | None
     note: str
+    paper_n: int = 0
+    same_as: tuple[str, str, str] | None = None
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -165,8 +164,9 @@ def read_published(path: str | Path = PUBLISHED) -> list[Number]:
 
     Raises:
         InputError: missing or unreadable file, wrong columns, unknown table, row, column, unit, file or statistic,
-            something that is not a number, a range upside down, more digits than `decimals`, half a counterpart, none
-            and no note, the same cell twice. It names the line.
+            something that is not a number, a range upside down, more digits than `decimals`, a share that none of
+            `paper_n` samples rounds to, half a counterpart, none and no note, the same cell twice, `same_as` of none
+            above. It names the line.
     """
     numbers: list[Number] = []
     first: dict[tuple[str, str, str], int] = {}
@@ -175,6 +175,8 @@ def read_published(path: str | Path = PUBLISHED) -> list[Number]:
         number = _number(where, fields)
         if number.key in first:
             raise InputError(where, f"holds {_named(number.key)} again", f"line {first[number.key]} has it")
+        if number.same_as and number.same_as not in first:
+            raise InputError(where, f"'same_as' {_named(number.same_as)} is no number above", "take names of this file")
         first[number.key] = line
         numbers.append(number)
     if not numbers:
@@ -228,21 +230,35 @@ def _number(where: str, fields: dict[str, str]) -> Number:
     remedy = "give one"
     value = finite_number(where, "value", fields["value"], remedy)
     upper = finite_number(where, "upper", fields["upper"], remedy) if fields["upper"] else value
-    try:
-        decimals = int(fields["decimals"])
-    except ValueError:
-        raise InputError(where, f"'decimals' is '{fields['decimals']}'", "give a whole number") from None
+    decimals = _whole(where, "decimals", fields["decimals"])
+    paper_n = _whole(where, "paper_n", fields["paper_n"] or "0", least=0)
     if upper < value:
         raise InputError(where, f"'upper' {upper:g} lies below 'value' {value:g}", "swap them")
     if any(round(bound, decimals) != bound for bound in (value, upper)):
         raise InputError(where, f"a value with more digits than {decimals} decimals", "correct one of them")
+    if paper_n and fields["unit"] == "%" and fields["statistic"] == "mean":
+        nearest = 100 * round(value / 100 * paper_n) / paper_n
+        if abs(nearest - value) > 0.5 * 10.0**-decimals + 1e-9:
+            raise InputError(where, f"no share of {paper_n} samples rounds to {value:g} %", "correct 'paper_n'")
     return Number(
         **{name: fields[name] for name in ("table", "row", "column", "unit", "device", "place", "note")},
         value=value,
         upper=upper,
         decimals=decimals,
         counterpart=_counterpart(where, fields),
+        paper_n=paper_n,
+        same_as=tuple(fields["same_as"].split(" / ")) if fields["same_as"] else None,
     )
+
+
+def _whole(where: str, name: str, text: str, least: float = -math.inf) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = None
+    if number is None or number < least:
+        raise InputError(where, f"'{name}' is '{text}'", "give a whole number")
+    return number
 
 
 def _counterpart(where: str, fields: dict[str, str]) -> Counterpart | None:

@@ -2,36 +2,36 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.active_learning.metrics import CENSORED_BY
-from gpca.attribution.metrics import mean_interval, read_metrics
-from gpca.comparison.published import TIMES, UNITS, Counterpart, Number
+from gpca.comparison.published import TIMES, Counterpart, Number
 from gpca.comparison.reasons import Reason, reason_of
+from gpca.comparison.sampling import Printed, printed_of
+from gpca.comparison.values import RUNTIME, Reproduced, value_of_run
 from gpca.errors import InputError
-from gpca.model.runtime_file import read_runtime
 from gpca.objects.title import STAND_IN, title_of
 from gpca.settings import NotNegative
 
 if TYPE_CHECKING:
     import pandas as pd
 
-REPRODUCED, CLOSE, NOT_REPRODUCED = "reproduced", "close", "not reproduced"
+REPRODUCED, CLOSE, INCONCLUSIVE, NOT_REPRODUCED = "reproduced", "close", "inconclusive", "not reproduced"
 NOT_COMPARABLE, NOT_RUN = "not comparable", "not run"
-VERDICTS = (REPRODUCED, CLOSE, NOT_REPRODUCED, NOT_COMPARABLE, NOT_RUN)
+JUDGED = (REPRODUCED, CLOSE, INCONCLUSIVE, NOT_REPRODUCED)
+VERDICTS = (*JUDGED, NOT_COMPARABLE, NOT_RUN)
+TOO_WIDE = "too wide an interval: it reaches farther than what is close, and does not exclude it"
+ONE_REPEAT = "one repeat, so no interval"
+LOWER_BOUND = "some repeats ended before they were done, so the mean is a lower bound"
 COMPARISON_COLUMNS = (
-    *("table", "row", "column", "unit", "published", "upper", "deviation", "decimals"),
-    *("reproduced", "ci_low", "ci_high", "n", "at_least", "difference", "factor"),
-    *("verdict", "reason", "objects", "hardware"),
+    *("table", "row", "column", "statistic", "unit", "published", "upper", "decimals"),
+    *("paper_low", "paper_high", "deviation", "reproduced", "ci_low", "ci_high", "cluster_low", "cluster_high"),
+    *("n", "at_least", "difference", "factor", "verdict", "repeat_of", "reason", "objects", "hardware"),
 )
-RUNTIME = "runtime.csv"
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,6 @@ class Tolerance:
             raise InputError("tolerance", f"{self.reproduced:g} and {self.close:g}", f"it has to be {least}")
 
 
-@dataclass(frozen=True)
-class Reproduced:
-    """A run's value, the bounds of its 95 % interval (NaN where there is none), repeats; perhaps a lower bound only."""
-
-    value: float
-    low: float
-    high: float
-    n: int
-    at_least: bool = False
-
-
 def compare(
     numbers: Sequence[Number],
     results: Mapping[str, pd.DataFrame],
@@ -66,16 +55,18 @@ def compare(
     tolerances: Mapping[str, Tolerance],
     reasons: Sequence[Reason],
     hardware: str = "",
+    clusters: Mapping[Counterpart, tuple[float, float]] | None = None,
 ) -> pd.DataFrame:
     """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
 
     Args:
         numbers: printed ones.
-        results: file name -> its rows, as :func:`read_results` reads them.
+        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them.
         objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
         tolerances: one for each unit.
         reasons: why printed numbers were not reached.
         hardware: what times were measured on, where their file does not say.
+        clusters: counterpart -> bounds over objects and seeds (:mod:`gpca.comparison.clusters`).
 
     Raises:
         InputError: a unit without tolerance.
@@ -85,25 +76,30 @@ def compare(
     deviations: dict[Counterpart | None, Number] = {
         n.counterpart: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"
     }
-    records = []
+    records, values = [], {}
     for number in numbers:
         if number.unit not in tolerances:
             raise InputError("config key comparison.tolerances", f"no unit '{number.unit}'", "give its tolerance")
         deviation = deviations.get(_deviation_of(number.counterpart))
-        found = value_of_run(number, results)
+        printed = printed_of(number, deviation)
+        found = values[number.key] = value_of_run(number, results, clusters)
         tolerance = tolerances[number.unit]
-        spread = deviation.value if deviation else 0.0
-        verdict, reason = _judge(number, found, spread, objects, tolerance, reasons)
+        verdict, reason = _judge(number, printed, found, objects, tolerance, reasons)
+        first = values.get(number.same_as) if number.same_as else None
+        repeats = first is not None and found is not None and (first.value, first.n) == (found.value, found.n)
         records.append(
             {
                 **dict(zip(("table", "row", "column"), number.key, strict=True)),
+                "statistic": number.counterpart.statistic if number.counterpart else "mean",
                 "unit": number.unit,
                 "published": number.value,
                 "upper": number.upper if number.upper > number.value else np.nan,
-                "deviation": deviation.value if deviation else np.nan,
                 "decimals": number.decimals,
+                **_sampling(printed),
+                "deviation": deviation.value if deviation else np.nan,
                 **_columns(number, found, tolerance),
                 "verdict": verdict,
+                "repeat_of": " / ".join(number.same_as) if repeats else "",
                 "reason": reason,
                 "objects": _objects(number.counterpart, objects),
                 "hardware": _hardware(number, results, hardware),
@@ -112,75 +108,64 @@ def compare(
     return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64"})
 
 
-def verdict_of(number: Number, found: Reproduced, tolerance: Tolerance, deviation: float = 0.0) -> str | None:
-    """Return reproduced, close or not reproduced; None of a lower bound that tells neither.
+def verdict_of(printed: Printed, found: Reproduced, tolerance: Tolerance) -> str:
+    """Return one of `JUDGED`.
 
-    The printed number is a band: from half its last digit, and its printed standard deviation, below to as much above.
-    What a run has is reproduced where it lies in the band or within `tolerance.reproduced` of it, or where its 95 %
-    interval meets the band and is no wider than `tolerance.close` to either side. It is close within
-    `tolerance.close`, or where a wider interval meets the band.
+    The printed number is a band, half its last digit to either side. The difference of the run's value from the band
+    has an interval, of both samplings (Newcombe's square-and-add). Where that reaches farther from the difference than
+    `tolerance.close`, nothing can be said but that the number is not reproduced, if the whole interval lies beyond
+    `tolerance.close`. Else the number is reproduced where the difference is within `tolerance.reproduced` or its
+    interval holds 0, and close where it is within `tolerance.close`.
     """
     scale = _log if tolerance.factor else float
     near, far = (scale(bound) for bound in (tolerance.reproduced, tolerance.close))
-    margin = number.rounding + deviation
-    least, most = scale(number.value - margin), scale(number.upper + margin)
+    least, most = scale(printed.value - printed.rounding), scale(printed.upper + printed.rounding)
     value = scale(found.value)
-    low = scale(found.low)
-    high = scale(found.high)
-    distance = max(0.0, least - value, value - most)
     if found.at_least:
-        return NOT_REPRODUCED if value - most > far else None
-    meets = low <= most and high >= least  # False of NaN
-    half_width = high - value if tolerance.factor else max(high - value, value - low)
-    if distance <= near or (meets and half_width <= far):
+        return NOT_REPRODUCED if value - most > far else INCONCLUSIVE
+    apart = _apart(value, min(max(value, least), most))
+    found_low, found_high = (scale(bound) for bound in found.interval())
+    below = math.hypot(_apart(value, found_low), _apart(scale(printed.high), scale(printed.upper)))
+    above = math.hypot(_apart(found_high, value), _apart(scale(printed.value), scale(printed.low)))
+    low, high = apart - below, apart + above
+    if not max(below, above) <= far:  # NaN too
+        return NOT_REPRODUCED if low > far or high < -far else INCONCLUSIVE
+    if abs(apart) <= near or low <= 0 <= high:
         return REPRODUCED
-    return CLOSE if distance <= far or meets else NOT_REPRODUCED
+    return CLOSE if abs(apart) <= far else NOT_REPRODUCED
 
 
-def value_of_run(number: Number, results: Mapping[str, pd.DataFrame]) -> Reproduced | None:
-    """Return what the run has in place of the number, in its unit; None where it has nothing."""
-    counterpart = number.counterpart
-    if counterpart is None or counterpart.file not in results:
-        return None
-    of_file = _of_runtime if counterpart.file == RUNTIME else _of_tidy
-    found = of_file(results[counterpart.file], counterpart)
-    if found is None:
-        return None
-    unit = UNITS[number.unit]
-    value, low, high = (unit.factor * bound for bound in (found.value, found.low, found.high))
-    low, high = (bound if math.isnan(bound) else min(max(bound, unit.least), unit.most) for bound in (low, high))
-    return Reproduced(value, low, high, found.n, found.at_least)
-
-
-def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
-    """Read a run's collected files, by name; one that a later step refuses raises its InputError here."""
-    return {Path(path).name: (read_runtime if Path(path).name == RUNTIME else read_metrics)(path) for path in paths}
-
-
-def measured_on(paths: Iterable[str | Path]) -> str:
-    """Return the processor that made ``timings.csv``, by its provenance; empty where that is not beside it."""
-    sidecars = [Path(f"{path}.provenance.json") for path in paths if Path(path).name == "timings.csv"]
-    return next(
-        (json.loads(path.read_text(encoding="utf-8"))["device"]["name"] for path in sidecars if path.is_file()), ""
-    )
+def judged_once(comparison: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of means, without those that repeat a value of the run that is judged in another row."""
+    return comparison[(comparison["statistic"] == "mean") & (comparison["repeat_of"] == "")]
 
 
 def counts(comparison: pd.DataFrame) -> dict[str, int]:
-    """Return verdict -> how many numbers have it."""
+    """Return verdict -> how many rows have it."""
     return {verdict: int((comparison["verdict"] == verdict).sum()) for verdict in VERDICTS}
 
 
-def _judge(number, found, deviation, objects, tolerance, reasons) -> tuple[str, str]:
+def _judge(number, printed, found, objects, tolerance, reasons) -> tuple[str, str]:
     if number.counterpart is None:
         return NOT_COMPARABLE, number.note
     if any(objects[source]["stand_in"] for source in number.counterpart.sources if source in objects):
         return NOT_COMPARABLE, STAND_IN
     if found is None:
         return NOT_RUN, f"{number.counterpart.file} holds no such value"
-    verdict = verdict_of(number, found, tolerance, deviation)
-    if verdict is None:
-        return NOT_COMPARABLE, "some repeats ended before they were done, so the mean is a lower bound"
+    verdict = verdict_of(printed, found, tolerance)
+    if verdict == INCONCLUSIVE:
+        no_interval = math.isnan(found.interval()[0])
+        return verdict, LOWER_BOUND if found.at_least else ONE_REPEAT if no_interval else TOO_WIDE
     return verdict, "" if verdict == REPRODUCED else reason_of(number, reasons)
+
+
+def _sampling(printed: Printed) -> dict[str, float]:
+    """Return the bounds that the paper's sampling leaves; NaN where they are not told."""
+    told = (printed.low, printed.high) != (printed.value, printed.upper)
+    return {
+        name: round(bound, 6) if told else np.nan
+        for name, bound in (("paper_low", printed.low), ("paper_high", printed.high))
+    }
 
 
 def _columns(number: Number, found: Reproduced | None, tolerance: Tolerance) -> dict[str, object]:
@@ -194,63 +179,13 @@ def _columns(number: Number, found: Reproduced | None, tolerance: Tolerance) -> 
         "reproduced": round(found.value, 6),
         "ci_low": round(found.low, 6),
         "ci_high": round(found.high, 6),
+        "cluster_low": round(found.cluster_low, 6),
+        "cluster_high": round(found.cluster_high, 6),
         "n": found.n,
         "at_least": found.at_least,
         "difference": round(found.value - printed, 6),
         "factor": round(found.value / printed, 6) if tolerance.factor else np.nan,
     }
-
-
-def _of_tidy(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
-    """Take the statistic over the seeds of what the counterpart names in a tidy file; of a deviation, by chi-square."""
-    rows = rows[(rows["table"] == counterpart.table) & (rows["concept"] == counterpart.concept)]
-
-    def of_metric(source: str, method: str, metric: str) -> pd.Series:
-        chosen = (rows["source"] == source) & (rows["method"] == method) & (rows["metric"] == metric)
-        return rows[chosen].set_index("seed")["value"]
-
-    sources, at_least = [], False
-    for source in counterpart.sources:
-        methods = []
-        for method in counterpart.methods:
-            value_R, *divisor_R = (of_metric(source, method, metric) for metric in counterpart.metrics)
-            methods.append(value_R / divisor_R[0] if divisor_R else value_R)
-            if (censoring := CENSORED_BY.get(counterpart.metrics[0])) is not None:
-                at_least |= bool((of_metric(source, method, censoring) < 1).any())
-        sources.append(sum(methods[1:], methods[0]))
-    value_R = (sum(sources[1:], sources[0]) / len(sources)).to_numpy()
-    if not len(value_R) or np.isnan(value_R).any():
-        return None
-    n = len(value_R)
-    if counterpart.statistic == "deviation":
-        return _deviation(value_R) if n > 1 else None
-    mean, low, high = mean_interval(value_R)
-    return Reproduced(mean, math.nan, math.nan, n, True) if at_least else Reproduced(mean, low, high, n)
-
-
-def _deviation(value_R: np.ndarray) -> Reproduced:
-    from scipy.stats import chi2
-
-    n = len(value_R)
-    deviation = float(value_R.std(ddof=1))
-    low, high = (deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
-    return Reproduced(deviation, low, high, n)
-
-
-def _of_runtime(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
-    """Add up the mean seconds of the components on one device, measured apart from one another."""
-    from scipy.stats import t as student_t
-
-    rows = rows[rows["device"] == counterpart.concept].set_index("component")
-    if not set(counterpart.methods) <= set(rows.index):
-        return None
-    rows = rows.loc[list(counterpart.methods)]
-    n = int(rows["repeats"].min())
-    mean = float(rows["mean_s"].sum())
-    if n < 2:
-        return Reproduced(mean, math.nan, math.nan, n)
-    half_width = float(student_t.ppf(0.975, n - 1) * math.sqrt((rows["deviation_s"] ** 2).sum() / n))
-    return Reproduced(mean, mean - half_width, mean + half_width, n)
 
 
 def _objects(counterpart: Counterpart | None, objects: Mapping[str, Mapping]) -> str:
@@ -277,3 +212,8 @@ def _deviation_of(counterpart: Counterpart | None) -> Counterpart | None:
 
 def _log(value: float) -> float:
     return math.log(value) if value > 0 else value if math.isnan(value) else -math.inf
+
+
+def _apart(one: float, other: float) -> float:
+    """Return one minus the other; 0 of equal infinities, as logarithms of 0 are."""
+    return 0.0 if one == other else one - other

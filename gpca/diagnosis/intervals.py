@@ -1,8 +1,4 @@
-"""Intervals of the measures over objects and seeds, and of the differences between explainers on the same samples.
-
-Objects and seeds are crossed: an object is tested in several seeds, a seed tests several objects. The pigeonhole
-bootstrap (Owen 2007) draws both with replacement and weighs a sample by the product of how often its own were drawn.
-"""
+"""Intervals of the measures over objects and seeds, and of the differences between explainers on the same samples."""
 
 from __future__ import annotations
 
@@ -12,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.attribution.bootstrap import bounds, pigeonhole_weights
 from gpca.csv_file import numbers, read_csv
 from gpca.diagnosis.judged import CEILING, Judged, joined, read_judged
 from gpca.diagnosis.measures import MEASURES, SMALLER_IS_BETTER, measure
@@ -21,8 +18,6 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
-REPEATS = 500
-LEVEL = 0.95
 COLUMNS = (
     *("source", "method", "metric", "samples", "seeds", "value", "low", "high"),
     *("rival", "difference", "difference_low", "difference_high"),
@@ -63,7 +58,8 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
 
 def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:
     any_samples = next(iter(samples_of.values()))
-    weights_B_N = np.vstack([np.ones(len(any_samples)), pigeonhole_weights(any_samples, source)])
+    drawn_B_N = pigeonhole_weights(generator("cause intervals", source), any_samples.seed, any_samples.instance)
+    weights_B_N = np.vstack([np.ones(len(any_samples)), drawn_B_N])
     values = {explainer: measure(samples, weights_B_N) for explainer, samples in samples_of.items()}
     seeds = len(set(any_samples.seed.tolist()))
     rows = []
@@ -77,26 +73,7 @@ def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:
                 continue
             rival = next((name for name in ranked if name != explainer), "") if explainer != CEILING else ""
             apart = found[metric] - values[rival][metric] if rival else np.full(len(weights_B_N), np.nan)
-            of_value, of_difference = _bounds(found[metric][1:]), _bounds(apart[1:])
+            of_value, of_difference = bounds(found[metric][1:]), bounds(apart[1:])
             own = (source, explainer, metric, len(any_samples), seeds)
             rows.append((*own, found[metric][0], *of_value, rival, apart[0], *of_difference))
     return rows
-
-
-def pigeonhole_weights(samples: Judged, source: str) -> np.ndarray:
-    """Return how often each sample is drawn, (`REPEATS`, N)."""
-    random = generator("cause intervals", source)
-    weights_B_N = np.ones((REPEATS, len(samples)))
-    for factor_N in (samples.seed, samples.instance):
-        names, number_N = np.unique(factor_N, return_inverse=True)
-        drawn_B_K = random.multinomial(len(names), np.full(len(names), 1 / len(names)), size=REPEATS)
-        weights_B_N *= drawn_B_K[:, number_N]
-    return weights_B_N
-
-
-def _bounds(values_B: np.ndarray) -> tuple[float, float]:
-    known = values_B[np.isfinite(values_B)]
-    if not len(known):
-        return np.nan, np.nan
-    low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return float(low), float(high)

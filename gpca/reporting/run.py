@@ -62,8 +62,15 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     of_model = {**shown, REAL_WORLD: of_frames}[config["model"]["source"]]
     entries = {name: explainer_entry(name) for name in config["explainers"]}
     first_reduction = next(iter(frames["reductions"]))
+    explainers = {name: entry.title for name, entry in entries.items()}
+    learners = {name: explainer_entry(name).title.removesuffix(" on the embedding") for name in config["learners"]}
+    strategies = {
+        name: STRATEGIES[name].title if name in STRATEGIES else STREAMS[name] for name in learning["strategies"]
+    }
     return {
         "sources": shown,
+        "compared_sources": {**shown, REAL_WORLD: of_frames, "model": of_model},
+        "compared_titles": learners | strategies | explainers,
         "source_titles": {name: title_of(entry) for name, entry in shown.items()},
         "shown_title": title_of(shown[config["figures"]["source"]]),
         "frames": of_frames,
@@ -81,15 +88,11 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "estimator_pairs": config["estimator_pairs"],
         "global_start": config["method_pairs"]["global_start"],
         "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
-        "explainer_titles": {name: entry.title for name, entry in entries.items()},
+        "explainer_titles": explainers,
         "cause_explainers": {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]},
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
-        "learners": {
-            name: explainer_entry(name).title.removesuffix(" on the embedding") for name in config["learners"]
-        },
-        "strategies": {
-            name: STRATEGIES[name].title if name in STRATEGIES else STREAMS[name] for name in learning["strategies"]
-        },
+        "learners": learners,
+        "strategies": strategies,
         "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
         "target": learning["target"],
         "batch": learning["batch"],

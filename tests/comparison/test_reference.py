@@ -118,9 +118,9 @@ def test_labels_and_epochs_may_differ_by_a_ratio(folders):
 def test_yes_and_no_are_results_and_not_names(folders):
     heads = ("learner", "accurate", "mean", "ci_low", "ci_high", "n_seeds", "n_test")
     for folder in folders:
-        write(folder / "tables/table5_claims.csv", heads, [("gpca", "yes", 1.0, "", "", 1, 9)])
-    change(folders[0] / "tables/table5_claims.csv", "gpca,yes", "gpca,no")
-    assert outcomes(folders)["tables/table5_claims.csv"].verdict == "identical"
+        write(folder / "tables/table5_answers.csv", heads, [("gpca", "yes", 1.0, "", "", 1, 9)])
+    change(folders[0] / "tables/table5_answers.csv", "gpca,yes", "gpca,no")
+    assert outcomes(folders)["tables/table5_answers.csv"].verdict == "identical"
 
 
 def test_the_largest_difference_is_measured_by_what_is_allowed(folders):

@@ -1,116 +1,117 @@
-"""Verdicts: the rule at its edges, what is taken from a run, and the page."""
+"""Verdicts: the rule at its edges, which each can be, and the page."""
 
-import json
 import math
 from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 import pytest
-import yaml
 
-from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
-from gpca.code_files import ROOT
-from gpca.comparison.published import Counterpart, Number
 from gpca.comparison.reasons import NONE_YET, Reason
+from gpca.comparison.sampling import Printed
+from gpca.comparison.values import Reproduced
 from gpca.comparison.verdicts import (
     COMPARISON_COLUMNS,
+    ONE_REPEAT,
+    TOO_WIDE,
     VERDICTS,
-    Reproduced,
     Tolerance,
     compare,
     counts,
-    measured_on,
-    read_results,
-    value_of_run,
+    judged_once,
     verdict_of,
 )
 from gpca.errors import InputError
-from gpca.model.runtime_file import RUNTIME_COLUMNS as RUNTIME_COLUMNS
 from gpca.reporting.tables.comparison import comparison_markdown, summary
+
+from .made_up import ACCURACY, OBJECTS, TIME, TOLERANCES, compared, number, runtime, tidy
 
 NAN = math.nan
 POINTS = Tolerance(1, 3)
 FACTOR = Tolerance(1.5, 3, factor=True)
-SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
-TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items()}
-OBJECTS = {name: {"title": name.upper(), "stand_in": False} for name in ("ycb", "linemod", "real_rgbd", "model")}
-ACCURACY = Counterpart("metrics.csv", "attribution", ("ycb",), ("gpca_paper",), ("accuracy",), "all", "mean")
-LABELS = Counterpart(
-    "active_learning.csv", "active_learning/pretrained", ("ycb",), ("random",), ("labels_to_target",), "overlap", "mean"
-)
-TIME = Counterpart("runtime.csv", "components", ("model",), ("icp", "features"), ("seconds",), "CPU", "mean")
-
-
-def number(value=90.0, upper=None, decimals=1, unit="%", counterpart=ACCURACY, row="YCB", note=""):
-    return Number("I", row, "GP-CA", value, upper or value, decimals, unit, "", "Table I", counterpart, note)
-
-
-def tidy(values, source="ycb", method="gpca_paper", metric="accuracy", concept="all", table="attribution"):
-    rows = [(table, source, method, metric, concept, seed, value) for seed, value in enumerate(values)]
-    return pd.DataFrame(rows, columns=list(TIDY))
-
-
-def compared(numbers, results, objects=OBJECTS, reasons=(), **more):
-    return compare(numbers, results, objects, TOLERANCES, reasons, **more)
 
 
 # --- the rule ---
 
 
+def printed(value=90.0, upper=None, decimals=1, low=None, high=None):
+    upper = upper or value
+    return Printed(value, upper, 0.5 * 10.0**-decimals, value if low is None else low, upper if high is None else high)
+
+
 @pytest.mark.parametrize(
     ("value", "half_width", "verdict"),
     [
-        (90.0, NAN, "reproduced"),
-        (91.04, NAN, "reproduced"),  # a tolerance of 1, and half a digit of rounding
-        (91.06, NAN, "close"),
-        (88.96, 0.0, "reproduced"),
+        (90.0, 0.0, "reproduced"),
+        (91.04, 0.0, "reproduced"),  # a tolerance of 1, and half a digit of rounding
+        (91.06, 0.0, "close"),
+        (88.96, 0.1, "reproduced"),
         (92.0, 1.9, "close"),
-        (92.0, 2.0, "reproduced"),  # the interval meets the printed value
-        (93.04, NAN, "close"),
-        (93.06, NAN, "not reproduced"),
+        (92.0, 2.0, "reproduced"),  # the interval holds the printed value
+        (93.04, 0.0, "close"),
+        (93.06, 0.0, "not reproduced"),
         (86.94, 0.1, "not reproduced"),
-        (86.0, 4.0, "close"),  # meets it, but so wide an interval says little
-        (86.0, 3.9, "not reproduced"),
+        (90.0, 3.0, "reproduced"),
+        (90.0, 3.1, "inconclusive"),  # the same mean, but it could be anything near
+        (86.0, 3.1, "inconclusive"),
+        (83.0, 3.9, "not reproduced"),  # however wide, all of it is beyond
+        (90.0, NAN, "inconclusive"),
+        (50.0, NAN, "inconclusive"),
     ],
 )
 def test_the_rule_in_percentage_points(value, half_width, verdict):
     found = Reproduced(value, value - half_width, value + half_width, 5)
-    assert verdict_of(number(90.0), found, POINTS) == verdict
+    assert verdict_of(printed(90.0), found, POINTS) == verdict
 
 
 @pytest.mark.parametrize(
     ("value", "verdict"),
-    [(82.96, "reproduced"), (94.5, "reproduced"), (97.0, "close"), (97.1, "not reproduced"), (81, "close")],
+    [(84.96, "reproduced"), (92.9, "reproduced"), (95.0, "close"), (95.1, "not reproduced"), (83, "close")],
 )
-def test_a_printed_range_and_a_printed_deviation_widen_the_band(value, verdict):
-    found = Reproduced(value, NAN, NAN, 1)
-    assert verdict_of(number(86.0, upper=92.0), found, POINTS, deviation=2.0) == verdict
+def test_a_printed_range_is_a_band(value, verdict):
+    assert verdict_of(printed(86.0, upper=92.0), Reproduced(value, value, value, 5), POINTS) == verdict
+
+
+def test_the_papers_own_error_adds_to_that_of_the_run():
+    found = Reproduced(94.0, 92.8, 95.2, 5)  # 4 points above, less half a digit
+    assert verdict_of(printed(90.0), found, POINTS) == "not reproduced"
+    assert verdict_of(printed(90.0, low=88.0, high=92.0), found, POINTS) == "not reproduced"  # 1.2 and 2 make 2.3
+    assert verdict_of(printed(90.0, low=87.0, high=93.0), found, POINTS) == "inconclusive"  # 1.2 and 3 make 3.2
+    near = Reproduced(92.2, 91.0, 93.4, 5)
+    assert verdict_of(printed(90.0), near, POINTS) == "close"
+    assert verdict_of(printed(90.0, low=88.0, high=92.0), near, POINTS) == "reproduced"
+
+
+def test_the_wider_of_the_intervals_over_seeds_and_over_objects_counts():
+    found = Reproduced(92.0, 91.5, 92.5, 5)
+    assert verdict_of(printed(90.0), found, POINTS) == "close"
+    assert verdict_of(printed(90.0), replace(found, cluster_low=89.9, cluster_high=92.1), POINTS) == "reproduced"
+    assert verdict_of(printed(90.0), replace(found, cluster_low=80.0, cluster_high=92.1), POINTS) == "inconclusive"
+    assert replace(found, cluster_low=80.0, cluster_high=92.1).interval() == (80.0, 92.5)
+    assert Reproduced(92.0, NAN, NAN, 1, cluster_low=91.0, cluster_high=93.0).interval() == (91.0, 93.0)
 
 
 @pytest.mark.parametrize(
     ("value", "low", "high", "verdict"),
     [
-        (0.67, NAN, NAN, "reproduced"),
-        (1.5, NAN, NAN, "reproduced"),
-        (1.6, NAN, NAN, "close"),
-        (0.35, NAN, NAN, "close"),
-        (3.2, NAN, NAN, "not reproduced"),
+        (0.67, 0.66, 0.68, "reproduced"),
+        (1.5, 1.5, 1.5, "reproduced"),
+        (1.6, 1.59, 1.61, "close"),
+        (0.35, 0.35, 0.35, "close"),
+        (3.2, 3.1, 3.3, "not reproduced"),
         (0.004, 0.003, 0.005, "not reproduced"),
-        (0.5, -0.2, 1.2, "reproduced"),  # its upper end is within a factor of 3
-        (0.3, -0.6, 1.2, "close"),
+        (0.5, -0.2, 1.2, "inconclusive"),  # down to nothing: no factor
+        (0.02, -0.1, 0.1, "not reproduced"),
+        (0.0, 0.0, 0.0, "not reproduced"),
     ],
 )
-def test_times_are_compared_by_factor(value, low, high, verdict):
-    printed = number(1.0, decimals=2, unit="s", counterpart=TIME)
-    assert verdict_of(printed, Reproduced(value, low, high, 5), FACTOR) == verdict
+def test_times_and_counts_are_compared_by_factor(value, low, high, verdict):
+    assert verdict_of(printed(1.0, decimals=2), Reproduced(value, low, high, 5), FACTOR) == verdict
 
 
 def test_a_lower_bound_is_judged_only_where_it_is_beyond():
-    printed = number(14, decimals=0, unit="labels", counterpart=LABELS)
-    tolerance = Tolerance(4, 12)
-    assert verdict_of(printed, Reproduced(27, NAN, NAN, 5, at_least=True), tolerance) == "not reproduced"
-    assert verdict_of(printed, Reproduced(14, NAN, NAN, 5, at_least=True), tolerance) is None
+    labels = printed(14, decimals=0)
+    assert verdict_of(labels, Reproduced(44, NAN, NAN, 5, at_least=True), FACTOR) == "not reproduced"
+    assert verdict_of(labels, Reproduced(14, NAN, NAN, 5, at_least=True), FACTOR) == "inconclusive"
 
 
 @pytest.mark.parametrize("given", [(3, 1), (-1, 1), (0.9, 2, True)])
@@ -119,104 +120,28 @@ def test_tolerances_have_an_order(given):
         Tolerance(*given)
 
 
-# --- what stands beside a number ---
-
-
-def test_the_mean_and_its_interval_come_in_the_printed_unit():
-    found = value_of_run(number(), {"metrics.csv": tidy([0.90, 0.92, 0.94])})
-    assert (found.value, found.n) == (pytest.approx(92), 3)
-    assert found.high - found.value == pytest.approx(4.30265 * 2 / np.sqrt(3), rel=1e-5)
-    assert value_of_run(number(), {"metrics.csv": tidy([0.9, 0.99, 1.0])}).high == 100
-
-
-def test_shares_of_a_confusion_are_ratios_seed_by_seed():
-    rows = pd.concat(
-        [
-            tidy([20, 30], metric="predicted_as_pose", concept="overlap"),
-            tidy([100, 60], metric="test_samples", concept="overlap"),
-            tidy([1, 1], metric="test_samples"),
-        ]
-    )
-    counterpart = replace(ACCURACY, metrics=("predicted_as_pose", "test_samples"), concept="overlap")
-    assert value_of_run(number(counterpart=counterpart), {"metrics.csv": rows}).value == pytest.approx(35)
-
-
-def test_several_sources_are_averaged_seed_by_seed():
-    rows = pd.concat([tidy([0.9, 0.9]), tidy([0.7, 0.5], source="linemod")])
-    found = value_of_run(number(counterpart=replace(ACCURACY, sources=("ycb", "linemod"))), {"metrics.csv": rows})
-    assert found.value == pytest.approx(75)
-    assert found.n == 2
-    assert value_of_run(number(counterpart=replace(ACCURACY, sources=("ycb", "cups"))), {"metrics.csv": rows}) is None
-
-
-def test_a_deviation_has_the_interval_of_its_chi_square():
-    from scipy.stats import chi2
-
-    values = np.array([0.80, 0.82, 0.84, 0.86, 0.88])
-    found = value_of_run(number(counterpart=replace(ACCURACY, statistic="deviation")), {"metrics.csv": tidy(values)})
-    assert found.value == pytest.approx(100 * values.std(ddof=1))
-    assert chi2.cdf(4 * (found.value / found.high) ** 2, 4) == pytest.approx(0.025)
-    assert chi2.cdf(4 * (found.value / found.low) ** 2, 4) == pytest.approx(0.975)
-    assert (
-        value_of_run(number(counterpart=replace(ACCURACY, statistic="deviation")), {"metrics.csv": tidy([0.8])}) is None
-    )
-
-
-def test_labels_of_runs_that_missed_the_target_are_a_lower_bound():
-    table = {"method": "random", "concept": "overlap", "table": "active_learning/pretrained"}
-    labels = tidy([60, 20], metric="labels_to_target", **table)
-    rows = pd.concat([labels, tidy([0, 1], metric="reached", **table)])
-    printed = number(350, 550, -1, "labels", LABELS)
-    found = value_of_run(printed, {"active_learning.csv": rows})
-    assert (found.value, found.at_least, math.isnan(found.low)) == (40, True, True)
-    [row] = compared([printed], {"active_learning.csv": rows}).itertuples()
-    assert (row.verdict, row.at_least) == ("not comparable", True)
-    assert "lower bound" in row.reason
-    rows = pd.concat([labels, tidy([1, 1], metric="reached", **table)])
-    assert not value_of_run(printed, {"active_learning.csv": rows}).at_least
-
-
-def runtime(**seconds):
-    rows = [(name, "CPU", "A processor", 1, 100, mean, 0.1 * mean, mean) for name, mean in seconds.items()]
-    rows += [(name, "GPU", "A GPU", 1, 100, mean / 10, 0.1 * mean, mean) for name, mean in seconds.items()]
-    return pd.DataFrame(rows, columns=list(RUNTIME_COLUMNS))
-
-
-def test_times_of_components_add_up():
-    printed = number(4.2, unit="s", counterpart=TIME)
-    results = {"runtime.csv": runtime(icp=3.0, features=1.0, scores=7.0)}
-    found = value_of_run(printed, results)
-    assert (found.value, found.n) == (pytest.approx(4.0), 100)
-    assert found.high - found.value == pytest.approx(1.98422 * np.sqrt(0.3**2 + 0.1**2) / 10, rel=1e-5)
-    assert value_of_run(printed, {"runtime.csv": runtime(icp=3.0)}) is None
-    [row] = compared([printed], results).itertuples()
-    assert (row.verdict, row.hardware, row.objects) == ("reproduced", "A processor", "MODEL")
-    assert row.factor == pytest.approx(4.0 / 4.2)
-
-
-def test_times_per_sample_name_the_processor_of_their_record(tmp_path):
-    path = tmp_path / "timings.csv"
-    assert measured_on([path]) == ""
-    (tmp_path / "timings.csv.provenance.json").write_text(json.dumps({"device": {"name": "Some cores"}}))
-    assert measured_on([tmp_path / "metrics.csv", path]) == "Some cores"
-    counterpart = replace(ACCURACY, file="timings.csv", metrics=("seconds_per_sample",))
-    rows = {"timings.csv": tidy([2.0, 3.0], metric="seconds_per_sample")}
-    [row] = compared([number(2, 4, 0, "s", counterpart)], rows, hardware="Some cores").itertuples()
-    assert (row.verdict, row.hardware) == ("reproduced", "Some cores")
-
-
 # --- verdicts and reasons ---
 
 
 def test_every_verdict_and_its_reason():
-    results = {"metrics.csv": pd.concat([tidy([0.9, 0.9]), tidy([0.98, 0.98], method="gpca")])}
-    other = replace(ACCURACY, methods=("gpca",))
+    results = {
+        "metrics.csv": pd.concat(
+            [tidy([0.9, 0.9]), tidy([0.98, 0.98], method="gpca"), tidy([0.8, 0.99], method="wide"),
+             tidy([0.9], method="one")]
+        )
+    }  # fmt: skip
+
+    def of(method):
+        return replace(ACCURACY, methods=(method,))
+
     numbers = [
         number(row="YCB"),
-        number(row="close", counterpart=replace(ACCURACY), value=92.0),
-        number(row="far", counterpart=other),
+        number(row="close", value=92.0),
+        number(row="far", counterpart=of("gpca")),
+        number(row="wide", counterpart=of("wide")),
+        number(row="one", counterpart=of("one")),
         number(row="none", counterpart=None, note="nobody measured it"),
-        number(row="not run", counterpart=replace(ACCURACY, methods=("shap_additive",))),
+        number(row="not run", counterpart=of("shap_additive")),
         number(row="no file", counterpart=TIME, unit="s"),
     ]
     rows = compared(numbers, results, reasons=[Reason("I", "far", "*", "Other data.")])
@@ -225,12 +150,28 @@ def test_every_verdict_and_its_reason():
         ("reproduced", ""),
         ("close", NONE_YET),
         ("not reproduced", "Other data."),
+        ("inconclusive", TOO_WIDE),
+        ("inconclusive", ONE_REPEAT),
         ("not comparable", "nobody measured it"),
         ("not run", "metrics.csv holds no such value"),
         ("not run", "runtime.csv holds no such value"),
     ]
     assert list(rows["difference"][:3]) == pytest.approx([0, -2, 8])
-    assert counts(rows) == dict(zip(VERDICTS, (1, 1, 1, 1, 2), strict=True))
+    assert counts(rows) == dict(zip(VERDICTS, (1, 1, 2, 1, 1, 2), strict=True))
+
+
+def test_a_value_is_judged_once_and_its_repeats_are_marked():
+    first, other = number(), number(row="other", counterpart=replace(ACCURACY, methods=("gpca",)))
+    repeat = number(99.0, row="again", counterpart=replace(ACCURACY, methods=("same",)), same_as=first.key)
+    results = {
+        "metrics.csv": pd.concat([tidy([0.9, 0.9]), tidy([0.9, 0.9], method="gpca"), tidy([0.9, 0.9], method="same")])
+    }
+    rows = compared([first, other, repeat], results)
+    assert rows["repeat_of"].tolist() == ["", "", "I / YCB / GP-CA"]
+    assert rows["verdict"].tolist() == ["reproduced", "reproduced", "not reproduced"]
+    assert counts(judged_once(rows)) == dict.fromkeys(VERDICTS, 0) | {"reproduced": 2}
+    results = {"metrics.csv": pd.concat([tidy([0.9, 0.9]), tidy([0.9, 0.92], method="same")])}
+    assert compared([first, repeat], results)["repeat_of"].tolist() == ["", ""]  # the run has made it another value
 
 
 def test_stand_ins_are_shown_but_never_compared():
@@ -244,22 +185,20 @@ def test_stand_ins_are_shown_but_never_compared():
     assert "only real ones are compared" in summary(rows)
 
 
-def test_a_printed_deviation_belongs_to_the_mean_of_the_same_counterpart():
-    deviation = replace(number(3.0, counterpart=replace(ACCURACY, statistic="deviation")), column="Std. Dev.")
-    rows = compared([number(94.5), deviation], {"metrics.csv": tidy([0.88, 0.9, 0.92])})
-    assert (rows["deviation"][0], rows["verdict"][0]) == (3.0, "close")
+def test_a_printed_deviation_belongs_to_the_mean_of_the_same_counterpart_and_is_counted_apart():
+    spread = replace(ACCURACY, statistic="deviation")
+    deviation = replace(number(3.0, counterpart=spread, paper_n=5), column="Std. Dev.")
+    rows = compared([number(94.5), deviation], {"metrics.csv": tidy([0.89, 0.9, 0.91])})
+    assert (rows["deviation"][0], rows["statistic"].tolist()) == (3.0, ["mean", "deviation"])
+    assert rows["paper_high"][0] == pytest.approx(94.5 + 2.776445 * 3 / 5**0.5)  # Student's of five repeats
     assert math.isnan(rows["deviation"][1])
+    assert len(judged_once(rows)) == 1
+    assert "1 are standard deviations: 1 inconclusive." in summary(rows)
 
 
 def test_a_unit_without_tolerance_is_named():
     with pytest.raises(InputError, match=r"comparison\.tolerances: no unit '%'; give its tolerance"):
         compare([number()], {}, OBJECTS, {}, [])
-
-
-def test_a_results_file_that_is_none_is_refused(tmp_path):
-    (tmp_path / "metrics.csv").write_text("table,source\n")
-    with pytest.raises(InputError, match=r"metrics\.csv"):
-        read_results([tmp_path / "metrics.csv"])
 
 
 # --- the page ---
@@ -273,19 +212,24 @@ def test_the_page_counts_first_and_gives_each_reason_once():
         replace(number(1.0, 2.0, 0, "s", TIME), table="VII", row="ICP alignment", column="Time"),
     ]
     results = {"metrics.csv": tidy([0.9, 0.9]), "runtime.csv": runtime(icp=0.001, features=0.003)}
-    page = comparison_markdown(compared(numbers, results, reasons=[Reason("*", "*", "*", "Other | data.")]), SETTINGS)
+    page = comparison_markdown(compared(numbers, results, reasons=[Reason("*", "*", "*", "Other | data.")]), TOLERANCES)
     first, second, *_ = [line for line in page.splitlines() if line]
     assert first == "# Published and reproduced"
-    assert second == "Of 4 printed numbers: 1 reproduced, 0 close, 3 not reproduced, 0 not comparable, 0 not run."
-    assert "| YCB | GP-CA | % | 90.0 | 90.0 (90.0 to 90.0) | 2 | +0.0 | **reproduced** |" in page
-    assert "| LINEMOD | GP-CA | % | 97.0 | 90.0 (90.0 to 90.0) | 2 | -7.0 | not reproduced [1] |" in page
+    assert second == (
+        "Of 4 printed numbers, 4 are judged as means, each value here once: 1 reproduced, 3 not reproduced."
+    )
+    assert "| YCB | GP-CA | % | 90.0 | 90.0 (90.0 to 90.0) | – | 2 | +0.0 | **reproduced** |" in page
+    assert "| LINEMOD | GP-CA | % | 97.0 | 90.0 (90.0 to 90.0) | – | 2 | -7.0 | not reproduced [1] |" in page
     assert (
-        "| ICP alignment | Time | s | 1 to 2 | 0.004 (0.0039 to 0.0041) | 100 | × 0.004 | not reproduced [1] |" in page
+        "| ICP alignment | Time | s | 1 to 2 | 0.004 (0.0039 to 0.0041) | – | 100 | × 0.004 | not reproduced [1] |"
+        in page
     )
     assert page.count("1. Other | data.") == 2
-    assert "|  | reproduced | close | not reproduced | not comparable | not run |\n" in page
-    assert "| Table I: Single-concept attribution | 1 |  | 2 |  |  |\n" in page
-    assert "| All | 1 | 0 | 3 | 0 | 0 |\n" in page
+    verdicts = "reproduced | close | inconclusive | not reproduced | not comparable | not run"
+    assert f"|  | {verdicts} | by chance | p | ρ |\n" in page
+    assert "| Table I: Single-concept attribution | 1 |  |  | 2 |  |  | 1.0 | 1.00 | – |\n" in page
+    assert "| All | 1 | 0 | 0 | 3 | 0 | 0 | 1.0 | 1.00 | – |\n" in page
+    assert "1 numbers are reproduced or close, and 1.0 would be by chance" in page
     assert "## Table VII: Runtime" in page
     assert "Objects here: MODEL. Hardware here: A processor." in page
     assert "Intel i7-12700K and NVIDIA RTX 3090" in page

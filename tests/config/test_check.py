@@ -45,7 +45,7 @@ FAULTS = [
     ("sources.ycb.famly", "ycb", "sources.ycb.famly: unknown; did you mean family?"),
     ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
     ("recovery.thresholds.dominnat", 0.4, "recovery.thresholds.dominnat: unknown; did you mean dominant?"),
-    ("comparison.tolerances.labels.close", 1, "comparison.tolerances.labels: tolerance: 4 and 1; it has to be 0 <= "),
+    ("comparison.tolerances.labels.close", 1, "comparison.tolerances.labels: tolerance: 1.5 and 1; it has to be 1 <="),
     ("comparison.tolerances.s.reproduced", 0.5, "comparison.tolerances.s: tolerance: 0.5 and 3; it has to be 1 <= "),
     ("comparison.tolerances.weeks", {"reproduced": 1, "close": 2}, "comparison.tolerances.weeks: unknown; known are %"),
     ("reference.tolerances.share", -1, "reference.tolerances.share: -1 is less than the minimum of 0"),

@@ -3,24 +3,12 @@ import pytest
 
 from gpca.attribution.metrics import write_metrics
 from gpca.diagnosis import intervals
-from gpca.diagnosis.intervals import collect, pigeonhole_weights, read_intervals
+from gpca.diagnosis.intervals import collect, read_intervals
 from gpca.diagnosis.judged import CEILING
 from gpca.errors import InputError
 
 from .conftest import random_judged
 from .files import write_run
-
-
-def test_a_draw_of_objects_and_seeds_weighs_a_sample_by_both(judged):
-    weights = pigeonhole_weights(judged, "tiny")
-    assert np.array_equal(weights, pigeonhole_weights(judged, "tiny"))
-    assert not np.array_equal(weights, pigeonhole_weights(judged, "other"))
-    for seed, instance in ((100, "cup"), (101, "drill")):
-        same = weights[:, (judged.seed == seed) & (judged.instance == instance)]
-        assert (same == same[:, :1]).all()
-    one_each = [weights[:, np.flatnonzero((judged.seed == s) & (judged.instance == i))[0]]
-                for s in (100, 101) for i in ("cup", "can", "drill")]  # fmt: skip
-    assert (np.sum(one_each, axis=0) == 2 * 3).all()  # as many seeds and objects are drawn as there are
 
 
 def test_of_two_explainers_the_better_leads_by_what_the_other_lacks():

@@ -39,7 +39,7 @@ def test_every_config_loads_offline_and_asks_for_all_results(
         "tables/table6_backbones.tex",
         "poses/real_rgbd/seed0.csv",
         "tables/table4_kernels.md",
-        "tables/table5_claims.tex",
+        "tables/claims.tex",
         "diagnostics.csv",
         "kernels.csv",
         "registration_methods.csv",

@@ -19,7 +19,7 @@ TABLES1 = jobs("table1_single_baselines", "table1_extended", "table2_per_concept
 COLLECTORS = jobs("metrics", "timings", "table1_extended", "fig_attribution_confusions")
 TABLES3 = jobs("table3_active_learning", "table3_extended", "table3_stream")
 LEARNED = jobs("active_learning", "active_learning_curves") + TABLES3
-TABLES5 = jobs("table5_learners", "table5_shift", "table5_claims")
+TABLES5 = jobs("table5_learners", "table5_compact", "table5_shift")
 DIAGNOSED = jobs("diagnostics", "coverage_risk", "reliability", "uncertainty_vs_distance", fit_learners=2) + TABLES5
 TABLES4 = jobs("table4_kernels", "table4_grid")
 KERNELS = jobs("fit_kernel_grid", "kernels", "kernel_learning_curves") + TABLES4

@@ -2,6 +2,7 @@
 from os.path import relpath
 
 from gpca.code_files import ROOT
+from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import read_published
 
 COLLECTED = [
@@ -14,6 +15,22 @@ COMPARED = sorted(
     {number.counterpart.file for number in read_published() if number.counterpart}
     & set(COLLECTED)
 )
+# Predictions of single samples that these are shares of, where the config makes them.
+PREDICTED = {
+    *(
+        ("predictions", source, name)
+        for source in SOURCES
+        for name in config["explainers"]
+    ),
+    *(("predictions", FRAMES, name) for name in NAMES["backbone"]),
+    *(("learners", source, name) for source in SOURCES for name in LEARNER_SETTINGS),
+}
+COMPARED_PREDICTIONS = [
+    f"<results>/{'/'.join(folder)}/seed{seed}.csv"
+    for folder in folders_behind(read_published())
+    if folder in PREDICTED
+    for seed in SEEDS
+]
 # Sources whose first registrations the page shows in 3-D -> the form of GP-CA that explains them there.
 SAMPLED = {source: NAMES["gpca"] for source in SOURCES if NAMES["gpca"]}
 SAMPLED |= {FRAMES: NAMES["first_backbone"]}
@@ -36,14 +53,17 @@ onsuccess:
 rule comparison:
     input:
         collected=[f"<results>/{name}" for name in COMPARED],
+        predictions=COMPARED_PREDICTIONS,
         code=code_files(
-            "gpca.comparison.verdicts",
+            "gpca.comparison.claim_verdicts",
+            "gpca.comparison.clusters",
             "gpca.reporting.tables.comparison",
             "gpca.reporting.script",
         ),
     output:
         csv="<results>/comparison.csv",
         md="<results>/comparison.md",
+        claims="<results>/claims.csv",
     log:
         "<logs>/comparison.log",
     benchmark:

@@ -1,8 +1,12 @@
-"""A run's collected numbers beside the printed ones -> comparison.csv and .md."""
+"""A run's collected numbers beside the printed ones and the paper's sentences -> comparison.csv, .md, claims.csv."""
 
+from gpca.comparison.claim_verdicts import judge
+from gpca.comparison.claims import read_claims
+from gpca.comparison.clusters import cluster_intervals
 from gpca.comparison.published import read_published
 from gpca.comparison.reasons import read_reasons
-from gpca.comparison.verdicts import Tolerance, compare, measured_on, read_results
+from gpca.comparison.values import measured_on, read_results
+from gpca.comparison.verdicts import Tolerance, compare
 from gpca.files import whole_file
 from gpca.reporting.script import job
 from gpca.reporting.tables.comparison import comparison_markdown
@@ -11,15 +15,19 @@ with job(snakemake):
     given, params = snakemake.input, snakemake.params
     numbers = read_published()
     tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in params.tolerances.items()}
+    results = read_results(given.collected)
     comparison = compare(
         numbers,
-        read_results(given.collected),
+        results,
         params.objects,
         tolerances,
         read_reasons(numbers),
         measured_on(given.collected),
+        cluster_intervals(numbers, given.predictions),
     )
-    with whole_file(snakemake.output.csv) as partial:
-        comparison.to_csv(partial, index=False, lineterminator="\n")
+    claims = judge(read_claims(), results, params.objects, given.predictions)
+    for frame, path in ((comparison, snakemake.output.csv), (claims, snakemake.output.claims)):
+        with whole_file(path) as partial:
+            frame.to_csv(partial, index=False, lineterminator="\n")
     with whole_file(snakemake.output.md) as partial:
-        partial.write_text(comparison_markdown(comparison, params.tolerances), encoding="utf-8")
+        partial.write_text(comparison_markdown(comparison, tolerances), encoding="utf-8")

@@ -27,6 +27,7 @@ _COLUMNS = (
     "verdict",
     "reason",
 )
+REPEAT, DEVIATION = "repeat", "standard deviation"  # Rows that are counted apart, whatever their verdict.
 _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high", "difference")
 
 
@@ -34,7 +35,7 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
     """Return the rows of ``comparison.csv`` in words, its tables, and verdicts with tone and number; None without it.
 
     Where no number of the run is judged, as on stand-ins, the rows are those of the reference, and each has what the
-    run gives as ``this_run``.
+    run gives as ``this_run``. Repeats of a value and standard deviations are counted apart.
 
     Args:
         path: The file of the run.
@@ -53,8 +54,8 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
         rows = read_csv(reference, _COLUMNS)
         words = [_words(reference, row) for row in rows.to_dict("records")]
         words = [row | {"this_run": here.get(_key(row), "")} for row in words]
-    counts = Counter(rows["verdict"])
-    order = [*TONES, *sorted(set(counts) - set(TONES))]
+    counts = Counter(row["group"] for row in words)
+    order = [*TONES, *sorted(set(counts) - {*TONES, DEVIATION, REPEAT}), DEVIATION, REPEAT]
     return {
         "of_reference": of_reference,
         "rows": words,
@@ -75,8 +76,12 @@ def _words(path: str | Path, row: Mapping[str, str]) -> dict[str, str]:
         published += f" to {printed['upper']}"
     if printed["deviation"]:
         published += f" ± {printed['deviation']}"
+    repeat_of = row.get("repeat_of", "")
+    apart = REPEAT if repeat_of else DEVIATION if row.get("statistic") == "deviation" else ""
     bound = "> " if row.get("at_least", "").lower() == "true" else ""
-    return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict", "reason")} | {
+    return {name: row[name] for name in ("table", "row", "column", "unit", "n", "verdict")} | {
+        "group": apart or row["verdict"],
+        "reason": "; ".join(filter(None, (f"repeat of {repeat_of}" if repeat_of else "", row["reason"]))),
         "tone": TONES.get(row["verdict"], ""),
         "objects": ", ".join(filter(None, (row.get("objects", ""), row.get("hardware", "")))),
         "published": published,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.diagnosis.intervals import REPEATS
+from gpca.attribution.bootstrap import REPEATS
 from gpca.diagnosis.judged import CEILING, POOLED
 from gpca.objects.title import title_of
 from gpca.reporting.tables.builder import TableBuilder, rows_where

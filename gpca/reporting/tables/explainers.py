@@ -35,6 +35,7 @@ EXTENDED = {  # Each of these metrics has a column in table1_extended.
     "test_samples": Column("n", decimals=0, interval=False, limits=(0, inf)),
 }
 _SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # These are printed in %.
+_LEAST_CAUSAL = 30  # causal samples of all seeds; the accuracy on fewer says nothing
 _NOTHING = ("metrics", "hold no accuracy", "run its explainers first")  # The error of a table without rows says this.
 
 
@@ -83,14 +84,16 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
         ),
         "causal_accuracy": (
             "Causal: accuracy on the n causal samples whose uncertainty lies above the 95th percentile of the clean "
-            "ones of their dataset and seed."
+            f"ones of their dataset and seed; {EMPTY} where there are fewer than {_LEAST_CAUSAL} in all seeds."
         ),
         "icp_calls": "ICP calls: ICP runs per sample beyond the observed registration.",
         "seconds_per_sample": (
             "Seconds: all that one sample takes, the observed registration included; "
             "the one column that differs from run to run."
         ),
-        "test_samples": "n: test samples of a seed.",
+        "test_samples": (
+            "n: test samples of a seed; fewer where each takes hundreds of ICP calls (uncertainty.*.samples, config)."
+        ),
     }
     return table.build(
         caption="Single-concept attribution by every explainer" + table.stand_in_clause(sources),
@@ -136,7 +139,8 @@ def _cell(
     of_cell = rows_where(metrics, source=source, method=explainer, concept=concept)
     values_R = rows_where(of_cell, metric=metric)["value"].to_numpy() * (100 if metric in _SHARES else 1)
     counted = "causal_samples" if metric.startswith("causal") else "test_samples"
-    return cell_of_repeats(values_R, int(rows_where(of_cell, metric=counted)["value"].sum()))
+    samples = int(rows_where(of_cell, metric=counted)["value"].sum())
+    return None if metric == "causal_accuracy" and samples < _LEAST_CAUSAL else cell_of_repeats(values_R, samples)
 
 
 def _repeats(table: TableBuilder, metrics: pd.DataFrame, explainers: Iterable[str]) -> str:

@@ -85,7 +85,10 @@ class Table:
     compared: tuple[Sequence[tuple[int, str]], ...] = ()
 
     def best(self) -> set[tuple[int, str]]:
-        """Return the keys of the cells with the best printed mean of their group; none of a group of one."""
+        """Return the keys of the cells with the best printed mean of their group.
+
+        None are of a group of one, nor where more than half of a large group share the best: that tells nothing apart.
+        """
         best: set[tuple[int, str]] = set()
         for group in self.compared:
             cells = {key: self.cells[key] for key in group if key in self.cells}
@@ -94,7 +97,8 @@ class Table:
             }
             if printed and len(cells) > 1:
                 choose = min if self.columns[next(iter(printed))[1]].least_is_best else max
-                best |= {key for key, mean in printed.items() if mean == choose(printed.values())}
+                chosen = {key for key, mean in printed.items() if mean == choose(printed.values())}
+                best |= chosen if len(chosen) <= 5 or 2 * len(chosen) <= len(cells) else set()
         return best
 
     def write(self, csv_path: str | Path, md_path: str | Path, tex_path: str | Path) -> None:

@@ -56,6 +56,16 @@ def test_where_nothing_is_judged_the_verdicts_are_the_references(tmp_path):
     assert [row["verdict"] for row in judged["rows"]] == ["not comparable", "reproduced"]
 
 
+def test_repeats_and_standard_deviations_are_counted_apart(tmp_path):
+    head = HEAD.replace("verdict,", "verdict,repeat_of,statistic,")
+    repeat = LINES[0].replace(",close,", ",close,I / YCB / SA,mean,")
+    deviation = LINES[1].replace(",reproduced,", ",reproduced,,deviation,")
+    shown = page_comparison(written(tmp_path, head + repeat + deviation))
+    assert shown["verdicts"] == [("standard deviation", "", 1), ("repeat", "", 1)]
+    assert shown["rows"][0]["reason"] == "repeat of I / YCB / SA; too few epochs"
+    assert (shown["rows"][0]["group"], shown["rows"][0]["verdict"]) == ("repeat", "close")
+
+
 def test_there_need_not_be_a_comparison(tmp_path):
     assert page_comparison(tmp_path / "comparison.csv") is None
 

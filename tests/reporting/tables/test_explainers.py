@@ -114,6 +114,17 @@ def test_ties_at_the_printed_precision_are_all_bold():
     assert replace(table, compared=([(0, "c")], [(1, "a")], [(0, "a"), (1, "a")])).best() == set()
 
 
+def test_a_best_that_most_of_a_large_group_share_is_not_bold():
+    cells = {(row, "a"): Cell(0.0 if row < 7 else 1.0, 0, 3, 1) for row in range(12)}
+    columns = {"a": Column("A", least_is_best=True)}
+    rows = tuple((("x", str(row)),) for row in range(12))
+    table = Table("t", "T", {"source": "S"}, rows, "column", columns, cells, compared=(list(cells),))
+    assert table.best() == set()  # seven of twelve
+    assert replace(table, compared=([key for key in cells if key[0] > 1],)).best() == {
+        (row, "a") for row in range(2, 7)
+    }
+
+
 def test_latex_needs_no_letters_that_it_lacks_and_has_minus_signs():
     from gpca.reporting.tables.table import _tex
 

@@ -1,0 +1,36 @@
+"""Bootstrap intervals of what is measured on samples of several objects in several seeds.
+
+Objects and seeds are crossed: an object is tested in several seeds, a seed tests several objects. The pigeonhole
+bootstrap (Owen 2007) draws both with replacement and weighs a sample by the product of how often its own were drawn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+REPEATS = 500
+LEVEL = 0.95
+
+
+def pigeonhole_weights(random: np.random.Generator, *factors: np.ndarray) -> np.ndarray:
+    """Return how often each of N samples is drawn, (`REPEATS`, N).
+
+    Args:
+        random: draws the levels of the factors, one factor after the other.
+        factors: of every sample its level of one factor, (N,) each, e.g. its seed and its object.
+    """
+    weights_B_N = np.ones((REPEATS, len(factors[0])))
+    for factor_N in factors:
+        names, number_N = np.unique(factor_N, return_inverse=True)
+        drawn_B_K = random.multinomial(len(names), np.full(len(names), 1 / len(names)), size=REPEATS)
+        weights_B_N *= drawn_B_K[:, number_N]
+    return weights_B_N
+
+
+def bounds(values_B: np.ndarray) -> tuple[float, float]:
+    """Return the bounds of `LEVEL` of the draws; those without a value are left out, and NaN is returned for none."""
+    known = values_B[np.isfinite(values_B)]
+    if not len(known):
+        return np.nan, np.nan
+    low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(low), float(high)

@@ -1,0 +1,106 @@
+"""What the paper says in sentences, with the differences in this run that support or refute each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from gpca.comparison.claim_verdicts import CLAIM_VERDICTS
+from gpca.comparison.verdicts import NOT_RUN
+from gpca.objects.title import title_of
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.table import Cell, Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_TESTS = {"greater": "greater", "less": "less", "not_worse": "not worse", "equivalent": "the same"}
+
+
+@dataclass(frozen=True)
+class Difference(Column):
+    """Shows a difference, or a factor, with the bounds of its interval and three digits."""
+
+    def text(self, cell: Cell) -> str:
+        """Return e.g. ``-1.2 (-2.1 to 0.3)``."""
+        low, high = cell.bounds or (math.nan, math.nan)
+        interval = "" if math.isnan(low) else f" ({low:.3g} to {high:.3g})"
+        return f"{cell.mean:.3g}{interval}"
+
+
+def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mapping[str, str]) -> Table:
+    """Return a row per comparison, below the sentence that it belongs to.
+
+    Args:
+        verdicts: as :func:`gpca.comparison.claim_verdicts.read_verdicts` reads them.
+        sources: source -> title and whether it is a stand-in.
+        titles: method -> what the tables call it.
+
+    Raises:
+        InputError: nothing that was run.
+    """
+    table = TableBuilder(
+        "claims",
+        {
+            "claim": "The paper",
+            "claim_verdict": "Verdict",
+            "source": "Dataset",
+            "table": "Samples",
+            "compared": "Compared",
+            "expected": "Expected",
+            "verdict": "Holds",
+        },
+    )
+    seen: set[str] = set()
+    for row in verdicts[verdicts["verdict"] != NOT_RUN].itertuples():
+        first = row.claim not in seen
+        seen.add(row.claim)
+        compared = f"{titles.get(row.one, row.one)} against {titles.get(row.other, row.other)}"
+        source = title_of(sources[row.source]) if row.source in sources else row.source
+        table.add_row(
+            [
+                (row.claim, f"{row.sentence} ({row.place})" if first else ""),
+                (row.claim_verdict, row.claim_verdict if first else ""),
+                (row.source, source),
+                (row.table, row.table.rpartition("/")[2].replace("_", " ")),
+                (f"{row.one} against {row.other}", compared),
+                (row.test, _expected(row)),
+                (row.verdict, row.verdict),
+            ],
+            {"difference": Cell(row.value, row.high - row.value, int(row.n), 0, bounds=(row.low, row.high))},
+        )
+    table.require_rows("claims.csv", "holds nothing that was run", "run what the claims compare")
+    open_ones = verdicts[verdicts["claim_verdict"] == NOT_RUN].drop_duplicates("claim")
+    return table.build(
+        caption="What the paper says in sentences, and whether the differences in this run support it",
+        column_head="quantity",
+        columns={"difference": Difference("First minus second, or their ratio", limits=(-math.inf, math.inf))},
+        footnotes=(
+            counted(verdicts),
+            "In brackets the 95 % interval over the seeds, of differences of the same seed. A sentence is supported if "
+            "all of its comparisons are, and refuted if one is with an interval that allows for their number. Not "
+            "worse and the same: the whole interval lies within the margin. docs/comparison.md has the whole rule.",
+            *(_not_run(row) for row in open_ones.itertuples()),
+        ),
+    )
+
+
+def counted(verdicts: pd.DataFrame) -> str:
+    """Return how many sentences have each verdict, in words."""
+    counts = verdicts.drop_duplicates("claim")["claim_verdict"].value_counts(sort=False)
+    told = (f"{counts[verdict]} {verdict}" for verdict in CLAIM_VERDICTS if verdict in counts)
+    return f"Of {counts.sum()} sentences: {', '.join(told)}."
+
+
+def _expected(row) -> str:
+    margin = float(row.margin)
+    if row.ratio == "True":
+        return f"{_TESTS[row.test]}, by × {margin:g}"
+    unit = "" if row.unit in ("correlation", "risk", "share") else f" {row.unit}"
+    return f"{_TESTS[row.test]}, by {margin:g}{unit}" if margin else _TESTS[row.test]
+
+
+def _not_run(row) -> str:
+    return f"Not run: {row.sentence} ({row.place}){': ' if row.note else ''}{row.note}."

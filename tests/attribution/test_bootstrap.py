@@ -1,0 +1,28 @@
+import numpy as np
+import pytest
+
+from gpca.attribution.bootstrap import bounds, pigeonhole_weights
+from gpca.seeds import generator
+
+SEED = np.repeat([100, 101], 6)
+OBJECT = np.tile(["cup", "can", "drill"], 4)
+
+
+def draws(*axes):
+    return pigeonhole_weights(generator(*axes), SEED, OBJECT)
+
+
+def test_a_draw_of_objects_and_seeds_weighs_a_sample_by_both():
+    weights = draws("tiny")
+    assert np.array_equal(weights, draws("tiny"))
+    assert not np.array_equal(weights, draws("other"))
+    for seed, name in ((100, "cup"), (101, "drill")):
+        same = weights[:, (seed == SEED) & (name == OBJECT)]
+        assert (same == same[:, :1]).all()
+    assert (weights[:, [0, 1, 2, 6, 7, 8]].sum(axis=1) == 2 * 3).all()  # as many of both are drawn as there are
+
+
+def test_bounds_are_those_of_the_draws_that_have_a_value():
+    values = np.append(np.arange(101.0), np.nan)
+    assert bounds(values) == pytest.approx((2.5, 97.5))
+    assert np.isnan(bounds(np.array([np.nan]))).all()

@@ -1,0 +1,47 @@
+import pandas as pd
+import pytest
+
+from gpca.comparison.claim_verdicts import CLAIM_COLUMNS
+from gpca.errors import InputError
+from gpca.reporting.tables.claims import claims
+
+OF_CLAIM = {"claim": "best", "sentence": "Ours is best.", "place": "Sec. IV", "test": "greater", "unit": "%",
+            "margin": "1", "ratio": "False", "table": "learners/in_distribution", "one": "a", "other": "b", "n": 5.0,
+            "note": "", "claim_verdict": "refuted"}  # fmt: skip
+ROWS = [
+    OF_CLAIM | {"source": "ycb", "value": 2.0, "low": 1.5, "high": 2.5, "verdict": "supported"},
+    OF_CLAIM | {"source": "cups", "value": -2.0, "low": -2.5, "high": -1.5, "verdict": "refuted"},
+    OF_CLAIM | {"claim": "fewer", "sentence": "It needs less.", "test": "less", "unit": "labels", "margin": "1.25",
+                "ratio": "True", "source": "ycb", "value": 0.5, "low": 0.4, "high": 0.625, "verdict": "supported",
+                "claim_verdict": "supported"},
+    {"claim": "open", "sentence": "It works.", "place": "Sec. V", "verdict": "not run", "claim_verdict": "not run",
+     "note": "nobody ran it"},
+]  # fmt: skip
+SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
+
+
+def table(rows=ROWS):
+    return claims(pd.DataFrame(rows, columns=list(CLAIM_COLUMNS)), SOURCES, {"a": "Ours"})
+
+
+def test_a_sentence_stands_once_above_its_comparisons():
+    page = table().markdown()
+    assert (
+        "| Ours is best. (Sec. IV) | refuted | YCB | in distribution | Ours against b | greater, by 1 % | supported | "
+        "2 (1.5 to 2.5) |" in page
+    )
+    assert "|  |  | Cups (procedural stand-in) | in distribution | Ours against b |" in page
+    assert "less, by × 1.25 | supported | 0.5 (0.4 to 0.625) |" in page
+    assert "Of 3 sentences: 1 supported, 1 refuted, 1 not run." in page
+    assert "Not run: It works. (Sec. V): nobody ran it." in page
+    assert "nan" not in page
+
+
+def test_the_csv_has_the_bounds_of_factors_too():
+    records = table().records()
+    assert records[3][-6:] == (0.5, 0.4, 0.625, 5, 0, False)
+
+
+def test_nothing_that_was_run_makes_no_table():
+    with pytest.raises(InputError, match="holds nothing that was run for claims"):
+        table(ROWS[-1:])
