@@ -1,5 +1,4 @@
-# GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names; every table, figure
-# and stage is a target by its name: `snakemake -j2 table2`, `fig5`, `objects`, `paper` (what the paper shows).
+# GP-CA Bench. `snakemake -j2 all` makes all that the config names; each table, figure and stage is a target: `table2`.
 import sys
 
 sys.path.insert(0, str(workflow.current_basedir))
@@ -43,6 +42,7 @@ include: "workflow/rules/uncertainty.smk"
 include: "workflow/rules/explainers.smk"
 include: "workflow/rules/active_learning.smk"
 include: "workflow/rules/diagnostics.smk"
+include: "workflow/rules/controls.smk"
 include: "workflow/rules/model.smk"
 include: "workflow/rules/recovery.smk"
 include: "workflow/rules/results.smk"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gpca.config.checks.explainers import (
+    check_controls,
     check_diagnosis,
     check_encoders,
     check_explainers,
@@ -70,6 +71,7 @@ def check(config: dict) -> dict[str, dict]:
     check_diagnosis(whole)
     check_strategies(whole)
     check_learners(whole)
+    check_controls(whole)
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs)

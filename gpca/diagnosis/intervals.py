@@ -63,7 +63,8 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
 
 def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:
     any_samples = next(iter(samples_of.values()))
-    weights_B_N = np.vstack([np.ones(len(any_samples)), pigeonhole_weights(any_samples, source)])
+    factors = (any_samples.seed, any_samples.instance)
+    weights_B_N = np.vstack([np.ones(len(any_samples)), pigeonhole_weights(factors, "cause intervals", source)])
     values = {explainer: measure(samples, weights_B_N) for explainer, samples in samples_of.items()}
     seeds = len(set(any_samples.seed.tolist()))
     rows = []
@@ -77,24 +78,31 @@ def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:
                 continue
             rival = next((name for name in ranked if name != explainer), "") if explainer != CEILING else ""
             apart = found[metric] - values[rival][metric] if rival else np.full(len(weights_B_N), np.nan)
-            of_value, of_difference = _bounds(found[metric][1:]), _bounds(apart[1:])
+            of_value, of_difference = bounds_of(found[metric][1:]), bounds_of(apart[1:])
             own = (source, explainer, metric, len(any_samples), seeds)
             rows.append((*own, found[metric][0], *of_value, rival, apart[0], *of_difference))
     return rows
 
 
-def pigeonhole_weights(samples: Judged, source: str) -> np.ndarray:
-    """Return how often each sample is drawn, (`REPEATS`, N)."""
-    random = generator("cause intervals", source)
-    weights_B_N = np.ones((REPEATS, len(samples)))
-    for factor_N in (samples.seed, samples.instance):
+def pigeonhole_weights(factors: Iterable[np.ndarray], *axes: object) -> np.ndarray:
+    """Return how often each sample is drawn, (`REPEATS`, N), by crossed factors (N,), such as its seed and its object.
+
+    Args:
+        factors: every level of each is drawn as often as chance has it; a sample counts the product of its levels'.
+        axes: name the draws; the same axes and levels give the same draws.
+    """
+    random = generator(*axes)
+    weights_B_N: np.ndarray | None = None
+    for factor_N in factors:
         names, number_N = np.unique(factor_N, return_inverse=True)
         drawn_B_K = random.multinomial(len(names), np.full(len(names), 1 / len(names)), size=REPEATS)
-        weights_B_N *= drawn_B_K[:, number_N]
+        own_B_N = drawn_B_K[:, number_N].astype(float)
+        weights_B_N = own_B_N if weights_B_N is None else weights_B_N * own_B_N
+    assert weights_B_N is not None
     return weights_B_N
 
 
-def _bounds(values_B: np.ndarray) -> tuple[float, float]:
+def bounds_of(values_B: np.ndarray) -> tuple[float, float]:
     known = values_B[np.isfinite(values_B)]
     if not len(known):
         return np.nan, np.nan

@@ -12,9 +12,9 @@ from .files import write_run
 
 
 def test_a_draw_of_objects_and_seeds_weighs_a_sample_by_both(judged):
-    weights = pigeonhole_weights(judged, "tiny")
-    assert np.array_equal(weights, pigeonhole_weights(judged, "tiny"))
-    assert not np.array_equal(weights, pigeonhole_weights(judged, "other"))
+    weights = pigeonhole_weights((judged.seed, judged.instance), "tiny")
+    assert np.array_equal(weights, pigeonhole_weights((judged.seed, judged.instance), "tiny"))
+    assert not np.array_equal(weights, pigeonhole_weights((judged.seed, judged.instance), "other"))
     for seed, instance in ((100, "cup"), (101, "drill")):
         same = weights[:, (judged.seed == seed) & (judged.instance == instance)]
         assert (same == same[:, :1]).all()

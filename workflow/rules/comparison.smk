@@ -4,6 +4,7 @@ from gpca.comparison.published import read_published
 COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
+    "controls.csv",
 ]
 # Those of them that hold a counterpart of a printed number.
 COMPARED = sorted(

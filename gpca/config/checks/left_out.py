@@ -26,6 +26,7 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
+        "controls.explainers": ("explainer", explainers()),
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
         "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
         "recovery.actions": ("action", ACTIONS),
