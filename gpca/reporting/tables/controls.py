@@ -29,8 +29,8 @@ TITLES = {
 CHANGE = "_change"  # behind a control's name: the key of the column of its differences
 UNSEEN = "unseen_objects"
 INTERVAL = (
-    f"± is half the width of the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws), whose bounds the "
-    "CSV holds."
+    f"± is half the width of the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws), whose bounds "
+    "the CSV holds."
 )
 ALL_TOGETHER = (POOLED, "All together")
 
@@ -64,13 +64,13 @@ def table10_controls(
     if UNSEEN in names:
         columns |= {f"{name}_auroc": Column(words, 2, False, (0.0, 1.0)) for name, words in _AUROCS.items()}
     return table.build(
-        caption="Accuracy (%) of single-concept attribution where a shortcut is closed, and in brackets what that changes"
+        caption="Accuracy (%) of single-concept attribution with a shortcut closed, in brackets what that changes"
         + stand_in_clause(sources.values()),
         column_head="control",
         columns=columns,
         footnotes=(
-            f"In brackets: points more or less than by the paper's protocol, over {plural(table.most_seeds(), 'seed')}. "
-            + INTERVAL,
+            f"In brackets: points gained or lost against the paper's protocol, over "
+            f"{plural(table.most_seeds(), 'seed')}. {INTERVAL}",
             "Matched density: a random number of points of every cloud, in training and test. Unseen objects: encoder "
             "and explainer learnt from other objects. Other sources: they learnt from one other source. Wrong labels: "
             "of the explainer's training samples. Shuffled labels teach nothing, and guessing gives 33.3.",
@@ -118,14 +118,14 @@ def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
                 found = rows_where(of_explainer, control=control, source=tested, trained_on=trained_on)
                 cells[tested] = cell_of(found.iloc[0]) if len(found) else None
             table.add_row([(explainer, words), (trained_on, title)], cells)
-        elsewhere = rows_where(of_explainer, control=TRANSFER, source=POOLED, trained_on=POOLED)
-        if len(elsewhere):
-            table.add_row([(explainer, words), (POOLED, "each other (mean)")], {POOLED: cell_of(elsewhere.iloc[0])})
+        elsewhere = rows_where(of_explainer, control=TRANSFER, trained_on=POOLED).set_index("source")
+        cells = {name: cell_of(elsewhere.loc[name]) for name in (*titles, POOLED) if name in elsewhere.index}
+        table.add_row([(explainer, words), (POOLED, "another (mean)")], cells)
     table.require_rows("intervals", "hold no transfer", "run the controls of two sources first")
     return table.build(
         caption="Accuracy (%) from each source to each other" + stand_in_clause(sources.values()),
         column_head="tested",
-        columns={**{name: Column(f"on {title}") for name, title in titles.items()}, POOLED: Column("elsewhere")},
+        columns={**{name: Column(f"on {title}") for name, title in titles.items()}, POOLED: Column("mean")},
         footnotes=(
             "Encoder and explainer learnt from one source and are asked about the test samples of another; what they "
             f"learnt from is the paper's protocol. Over {plural(table.most_seeds(), 'seed')}; " + INTERVAL,
