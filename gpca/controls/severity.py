@@ -58,11 +58,13 @@ def read_samples(path: str | Path) -> pd.DataFrame:
     """Read what :func:`sample_table` returned.
 
     Raises:
-        InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
+        InputError: missing, empty or unreadable file, missing column, a value that is no finite number, a sample twice.
     """
     rows = read_csv(path, SAMPLE_COLUMNS)
     for column in (*SEVERITIES, "error"):
         rows[column] = numbers(path, rows, column, least=0)
+    if rows["sample"].duplicated().any():
+        raise InputError(path, "holds a sample twice", "make it anew")
     return rows
 
 

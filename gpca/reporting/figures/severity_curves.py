@@ -60,8 +60,10 @@ def draw_severity_curves(
     upper, lower = figure.subfigures(2, 1, height_ratios=[heights_in[0] + 0.55, sum(heights_in[1:]) + 0.2])
     panels = upper.subplots(1, len(CURVES), sharey=True)
     for panel, (concept, label) in zip(panels, CURVES.items(), strict=True):
-        _draw_curves(panel, severities[severities["concept"] == concept], shown, explainers)
-        panel.set(xlabel=label, title=concept, ylim=(0, 102))
+        of_concept = severities[severities["concept"] == concept]
+        _draw_curves(panel, of_concept, shown, explainers)
+        limits = (100 * of_concept["low"].min(), 100 * of_concept["high"].max())
+        panel.set(xlabel=label, title=concept, ylim=(0, 102), xlim=limits if len(of_concept) else None)
     panels[0].set_ylabel("accuracy, success (%)")
     handles, labels = panels[0].get_legend_handles_labels()
     upper.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL_PT, columnspacing=1.2)
