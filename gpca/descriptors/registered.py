@@ -14,6 +14,7 @@ from gpca.progress import progress
 from gpca.seeds import generator
 
 SMALLEST = 1e-5  # diameters; nothing is nearer that could be told from zero
+LEAST = 0.02  # of the model's spacing, to which lengths are raised: a flat face is not infinitely thin
 COARSE = slice(0, QUANTILES, 3)  # five of the thirteen quantiles say as much of a relation
 WIDTHS = {"distances": 4 * QUANTILES, "relations": 35, "densities": 2}
 
@@ -80,22 +81,22 @@ def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> 
     to_model, to_observed, from_plane, thickness = distances.reshape(4, QUANTILES)[:, COARSE]
     from_observed_plane, cosine, model_thickness = planes[: 3 * QUANTILES].reshape(3, QUANTILES)[:, COARSE]
     spacing, usual_thickness = planes[3 * QUANTILES + 1], np.median(model_thickness)
+
+    def log_ratio(lengths: np.ndarray, to: np.ndarray | float) -> np.ndarray:
+        return np.log(np.maximum(lengths, LEAST * spacing)) - np.log(np.maximum(to, LEAST * spacing))
+
     moved = log(inverse(pair.T_init)[None])[0]
     return np.concatenate(
         [
-            _log_ratio(to_model, spacing),
-            _log_ratio(to_observed, spacing),
-            _log_ratio(from_plane, usual_thickness),
-            _log_ratio(thickness, model_thickness),
-            _log_ratio(from_observed_plane, usual_thickness),
+            log_ratio(to_model, spacing),
+            log_ratio(to_observed, spacing),
+            log_ratio(from_plane, usual_thickness),
+            log_ratio(thickness, model_thickness),
+            log_ratio(from_observed_plane, usual_thickness),
             cosine,
             [np.sqrt(np.square(moved[:3]).sum()), np.sqrt(np.square(moved[3:]).sum())],
             displacements(pair.T_init[None], pair.observed),
             pair.fitness_n,
-            _log_ratio(pair.inlier_rmse_n, spacing),
+            log_ratio(pair.inlier_rmse_n, spacing),
         ]
     )
-
-
-def _log_ratio(lengths: np.ndarray, to: np.ndarray | float) -> np.ndarray:
-    return np.log(np.maximum(lengths, SMALLEST)) - np.log(np.maximum(to, SMALLEST))

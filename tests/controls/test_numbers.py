@@ -117,7 +117,7 @@ def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
     rows = read_severities(tmp_path / "severities.csv").set_index(["concept", "method"])
     assert rows.loc[("pose", REGISTRATION)]["value"].tolist() == [0, 0]
     assert rows.loc[("pose", REGISTRATION)]["other_low"].tolist() == pytest.approx([0.05, 0.175])
-    assert rows.loc[("overlap", REGISTRATION)][["low", "high", "value"]].to_numpy().tolist() == [[0.4, 0.6, 1.0]]
+    assert rows.loc[("overlap", REGISTRATION)][["low", "high", "value"]].tolist() == [0.4, 0.6, 1.0]
     noise = rows.loc[("noise", "gpca")]
     assert noise["samples"].sum() == 40  # of four files
     assert (noise["value"] * noise["samples"]).sum() == pytest.approx(36)  # by the paper's protocol alone
