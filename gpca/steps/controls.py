@@ -12,8 +12,8 @@ from baselines.registry import explainer_entry, require_settings
 from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
 from gpca.controls.experiment import Experiment, Rival
+from gpca.controls.samples import sample_table
 from gpca.controls.settings import PAPER, RETRAINED, ControlSettings
-from gpca.controls.severity import sample_table
 from gpca.controls.variants import left_out, variant
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings

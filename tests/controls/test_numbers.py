@@ -12,7 +12,8 @@ from gpca.controls.intervals import collect as collect_intervals
 from gpca.controls.intervals import read_intervals
 from gpca.controls.judged import read_controls
 from gpca.controls.metrics import collect
-from gpca.controls.severity import REGISTRATION, read_severities, sample_table
+from gpca.controls.samples import sample_table
+from gpca.controls.severity import REGISTRATION, read_severities
 from gpca.controls.severity import collect as collect_severities
 from gpca.csv_file import write_csv
 from gpca.diagnosis.judged import POOLED
