@@ -1,5 +1,4 @@
-# GP-CA Bench. `snakemake -j2 all` makes every table and figure of the run that the config names; every table, figure
-# and stage is a target by its name: `snakemake -j2 table2`, `fig5`, `objects`, `paper` (what the paper shows).
+# GP-CA Bench. `snakemake -j2 all` makes all that the config names; each table, figure and stage is a target: `table2`.
 import sys
 
 sys.path.insert(0, str(workflow.current_basedir))
@@ -33,20 +32,28 @@ pathvars:
     benchmarks=f"results/{config['run']}/benchmarks",
 
 
-STAGES = (
-    "common objects registrations methods causes estimators frames encoders uncertainty explainers active_learning diagnostics "
-    "model recovery results comparison targets"
-)
-for stage in STAGES.split():
-
-    include: f"workflow/rules/{stage}.smk"
+include: "workflow/rules/common.smk"
+include: "workflow/rules/objects.smk"
+include: "workflow/rules/registrations.smk"
+include: "workflow/rules/methods.smk"
+include: "workflow/rules/causes.smk"
+include: "workflow/rules/estimators.smk"
+include: "workflow/rules/frames.smk"
+include: "workflow/rules/encoders.smk"
+include: "workflow/rules/uncertainty.smk"
+include: "workflow/rules/explainers.smk"
+include: "workflow/rules/active_learning.smk"
+include: "workflow/rules/diagnostics.smk"
+include: "workflow/rules/controls.smk"
+include: "workflow/rules/model.smk"
+include: "workflow/rules/recovery.smk"
+include: "workflow/rules/results.smk"
+include: "workflow/rules/comparison.smk"
+include: "workflow/rules/targets.smk"
 
 
 rule all:
     default_target: True
     input:
-        [f"<results>/{name}" for name in COLLECTED],
+        [f"<results>/{name}" for name in COLLECTED + ENDS],
         [f"<results>/{result.main_file}" for result in RESULTS],
-        "<results>/model.pt",
-        "<results>/comparison.md",
-        "<results>/index.html",

@@ -16,7 +16,7 @@ import numpy as np
 from gpca.attribution.scores import Attribution
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
 
 
@@ -60,15 +60,23 @@ class AnalyticalGPC:
         attribution = self._gpca.explain(described)
         return replace(attribution, seconds_N=attribution.seconds_N + seconds)
 
+    def describe(self, registrations: Registrations) -> Registrations:
+        """Attach the features, the point-count ratio last, unless they are attached already."""
+        settings = {"shape_points": self._shape_points, "neighbours": self._neighbours}
+        return measured(
+            registrations,
+            self._prefix,
+            lambda: {"features": analytical_features(registrations, *self._axes, **settings)},
+        )
+
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the features (N, F) of :func:`gpca.explainers.analytical_features.analytical_features`."""
-        return analytical_features(
-            registrations,
-            *self._axes,
-            shape_points=self._shape_points,
-            neighbours=self._neighbours,
-            point_count=self._point_count,
-        )
+        features_N_F = self.describe(registrations).attached[f"{self._prefix}features"]
+        return features_N_F if self._point_count else features_N_F[:, :-1]
+
+    @property
+    def _prefix(self) -> str:
+        return "_".join(map(str, (*self._axes, self._shape_points, self._neighbours, "")))
 
     def _with_features(self, registrations: Registrations) -> Registrations:
         return replace(registrations, attached={"embedding": self.features(registrations)})

@@ -14,7 +14,7 @@ import numpy as np
 from baselines.attached import attached
 from baselines.concept_classifier import ConceptClassifier, standardised_regression
 from gpca.attribution.scores import Attribution
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
@@ -37,6 +37,10 @@ class Residuals:
     def __init__(self, classifier, floor: float) -> None:
         self._classifier = ConceptClassifier(classifier)
         self._floor = floor
+
+    def describe(self, registrations: Registrations) -> Registrations:
+        """Attach the residuals of both directions, unless they are attached already."""
+        return measured(registrations, "residuals_", lambda: {"both_ways": residuals(registrations)})
 
     def fit(self, registrations: Registrations) -> None:
         """Fit the classifier to the labelled registrations."""
@@ -65,10 +69,14 @@ def features(registrations: Registrations, floor: float) -> np.ndarray:
     from gpca.uncertainty.spread import log_determinant
 
     log_determinant_N = log_determinant(attached(registrations, "covariance", None, 6, 6)[:, OBSERVED], floor)
+    found = measured(registrations, "residuals_", lambda: {"both_ways": residuals(registrations)})
+    return np.column_stack([found.attached["residuals_both_ways"], log_determinant_N])
+
+
+def residuals(registrations: Registrations) -> np.ndarray:
+    """Return (N, 2): log forward and log backward residual of every registration, of diameters."""
     pairs = [(registrations.cloud(i), registrations.target(i)) for i in range(len(registrations))]
-    forward_N = [log_residual(source, target) for source, target in pairs]
-    backward_N = [log_residual(target, source) for source, target in pairs]
-    return np.column_stack([forward_N, backward_N, log_determinant_N])
+    return np.array([(log_residual(source, target), log_residual(target, source)) for source, target in pairs])
 
 
 def log_residual(from_P_3: np.ndarray, to_Q_3: np.ndarray) -> float:
@@ -97,9 +105,8 @@ def residuals_forest(source: str, seed: int, trees: int = 200, floor: float = FL
     return Residuals(RandomForestClassifier(n_estimators=trees, random_state=random_state), floor)
 
 
+_OBSERVED = {"reads": "uncertainty/removal", "observed_only": True}
 EXPLAINERS = {
-    "residuals_logistic": ExplainerEntry(
-        "Residuals (logistic regression)", residuals_logistic, reads="uncertainty/removal"
-    ),
-    "residuals_forest": ExplainerEntry("Residuals (random forest)", residuals_forest, reads="uncertainty/removal"),
+    "residuals_logistic": ExplainerEntry("Residuals (logistic regression)", residuals_logistic, **_OBSERVED),
+    "residuals_forest": ExplainerEntry("Residuals (random forest)", residuals_forest, **_OBSERVED),
 }

@@ -16,9 +16,11 @@ class SoftmaxHead:
 
     Attributes:
         labels: what it names.
+        trained_with_encoder: labels that are given to ``fit`` teach it nothing.
     """
 
     labels: tuple[str, ...] = CONCEPTS
+    trained_with_encoder = True
 
     def __init__(self, source: str, seed: int) -> None:
         pass

@@ -31,6 +31,8 @@ STEPS = {
     "estimate": "causes -> what every estimator says of the test registrations' covariance, and how right it is",
     "diagnose": "causes, and descriptors or embeddings -> predictions of one explainer of causes",
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
+    "train_control": "registrations -> embeddings by an encoder that is trained under a control",
+    "controls": "registrations and embeddings -> what every explainer says under every control",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "kernel_grid": "embeddings -> every kernel, learning rate and number of iterations",

@@ -16,6 +16,7 @@ import pytest
 import yaml
 
 from gpca.__main__ import STEPS
+from gpca.controls.settings import CONTROLS
 from gpca.reporting.registry import registered
 
 from .documents import PAGES, ROOT, commands, our_files, relative
@@ -177,6 +178,7 @@ def test_every_page_of_the_docs_is_in_the_index():
         ("active_learning", 15),
         ("real_world", 5),
         ("causes", 20),
+        ("controls", 6),
     ],
 )
 def test_every_number_of_a_page_is_that_of_the_config(page, fewest):
@@ -221,6 +223,13 @@ def test_every_configured_registration_method_is_described():
     methods = yaml.safe_load((ROOT / "config/config.yaml").read_text())["methods"]
     page = (ROOT / "docs/registration.md").read_text()
     assert [name for name in methods if f"`{name}`" not in page] == []
+
+
+def test_every_control_and_every_explainer_under_controls_is_described():
+    page = (ROOT / "docs/controls.md").read_text()
+    explainers = yaml.safe_load((ROOT / "config/config.yaml").read_text())["controls"]["explainers"]
+    names = [*explainers, *(name.replace("label_noise_", "…_") for name in CONTROLS)]
+    assert [name for name in names if f"`{name}`" not in page.replace("`label_noise_5`", "`…_5`")] == []
 
 
 def test_every_configured_learner_is_described():

@@ -5,7 +5,7 @@ Written with six decimals, read as text first, so that nothing which is not a nu
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,17 +51,20 @@ def prediction_frame(registrations: Registrations, attribution: Attribution) -> 
     )
 
 
-def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
+def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFrame:
     """Read a prediction file as text, but for `score_…`, `variance_…` and `icp_calls` (numbers) and `abstained` (bool).
 
-    With `sets`, a column `set` says of which set of samples each is, and numbers may occur once in each.
+    Args:
+        path: the file.
+        labels: columns before those of the samples; a number may occur once for each combination of theirs.
 
     Raises:
         InputError: missing, empty or unreadable file; missing column; a concept without a score column; a sample
-            twice in one split (and set); a split other than train and test; a score or a number of ICP calls that is
-            not a finite number; a variance that is neither that nor empty; negative variances or numbers of calls.
+            twice in one split (and under the same labels); a split other than train and test; a score or a number of
+            ICP calls that is not a finite number; a variance that is neither that nor empty; negative variances or
+            numbers of calls.
     """
-    rows = read_csv(path, ("set", *PREDICTION_COLUMNS) if sets else PREDICTION_COLUMNS)
+    rows = read_csv(path, (*labels, *PREDICTION_COLUMNS))
     concepts = concepts_of(rows)
     if not concepts:
         raise InputError(path, "has no column score_<concept>", "make it anew")
@@ -78,7 +81,7 @@ def read_predictions(path: str | Path, sets: bool = False) -> pd.DataFrame:
             raise InputError(
                 path, f"unknown concept '{unknown}' in '{column}'", f"its concepts are {', '.join(concepts)}"
             )
-    require_samples(path, rows, ("set", "split", "sample") if sets else ("split", "sample"))
+    require_samples(path, rows, (*labels, "split", "sample"))
     rows["icp_calls"] = numbers(path, rows, "icp_calls", least=0)
     for column in (name for name in rows.columns if name.startswith(("score_", "variance_"))):
         # Every explainer that does not abstain has scores; one without variances leaves them empty.

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from gpca.config.checks.estimators import check_estimators
 from gpca.config.checks.explainers import (
+    check_controls,
     check_diagnosis,
     check_encoders,
     check_explainers,
@@ -74,6 +75,7 @@ def check(config: dict) -> dict[str, dict]:
     check_diagnosis(whole)
     check_strategies(whole)
     check_learners(whole)
+    check_controls(whole)
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs)

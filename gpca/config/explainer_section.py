@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 from gpca.classifier.settings import GPCSettings, LearningRate
 from gpca.settings import Bounds, Count, Positive
 
+DescribedPoints = Annotated[int, Bounds(minimum=16, maximum=65536)]
+
 
 @dataclass(frozen=True)
 class Analytical(GPCSettings):
@@ -62,6 +64,28 @@ class Forest:
     smallest_leaf: Count = 2
 
 
+@dataclass(frozen=True)
+class PairClassifier(GPCSettings):
+    """How many points of each cloud are described, and the settings of the GPC."""
+
+    points: DescribedPoints = 512
+
+
+@dataclass(frozen=True)
+class ForestOfPairs:
+    """A forest on distances, and how many points of each cloud these are between."""
+
+    trees: Count = 200
+    points: DescribedPoints = 512
+
+
+@dataclass(frozen=True)
+class DensityOfPairs(Probes):
+    """A logistic regression of densities, and of how many points of each cloud these are."""
+
+    points: DescribedPoints = 512
+
+
 CAUSE_EXPLAINERS = {
     "gpca": GPCSettings | None,
     "gpca_pair": GPCSettings | None,
@@ -87,4 +111,7 @@ EXPLAINERS = {
     "sa_supervised": Probes | None,
     "residuals_logistic": LogisticOfResiduals | None,
     "residuals_forest": ForestOfResiduals | None,
+    "gpca_pair": PairClassifier | None,
+    "pair_forest": ForestOfPairs | None,
+    "density": DensityOfPairs | None,
 }

@@ -14,7 +14,7 @@ from gpca.recovery.policies import ALWAYS, POLICIES
 
 # Mappings of which any entry may be false.
 LEAVABLE = (
-    *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners"),
+    *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
     *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
 )
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
@@ -45,7 +45,8 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     for key, of in LISTED.items():
         _change(whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone], list)
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    _change(whole, "explainers", lambda rows: {name: row for name, row in rows.items() if name not in without})
+    for key in ("explainers", "controls.explainers"):
+        _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
     acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
     reading = {name for name, entry in POLICIES.items() if entry.explainer in without}
     _change(whole, "recovery.policies", lambda names: [n for n in names if n not in acting | reading], list)

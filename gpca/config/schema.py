@@ -21,6 +21,7 @@ from gpca.config.explainer_section import CAUSE_EXPLAINERS, EXPLAINERS
 from gpca.config.json_schema import COMPLETE, EVERY, Keys, Named, schema_of
 from gpca.config.robot_sections import RealWorld, Recovery
 from gpca.config.source_section import NAME, Place, Source
+from gpca.controls.settings import ControlSettings
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
@@ -86,6 +87,13 @@ class Diagnosis:
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(CAUSE_EXPLAINERS)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Controls(ControlSettings):
+    """The controls, and the explainers under them, with settings beyond those that they have elsewhere."""
+
+    explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
+
+
 @dataclass(frozen=True)
 class Config:
     """Configuration of GP-CA Bench: all its sections."""
@@ -113,6 +121,7 @@ class Config:
     active_learning: Annotated[sections.ActiveLearning, LEARNING]
     kernel_grid: Annotated[sections.Grid, GRID]
     learners: Annotated[dict[str, Settings], BY_NAME]
+    controls: Annotated[Controls, Keys(required=EVERY)]
     shift: Annotated[sections.Shift, SHIFT]
     real_world: RealWorld
     model: sections.ExplainedModel

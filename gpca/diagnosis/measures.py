@@ -57,7 +57,7 @@ def _of_causes(samples: Judged, labelled_N, failed_N, weights_B_N: np.ndarray) -
     of_failed = weights_B_N[:, failed_N]
     scores_F_3, phi_F_3 = samples.scores[failed_N], samples.phi[failed_N]
     precisions = [
-        _ranking(samples.scores[labelled_N, i], samples.causes[labelled_N, i], weights_B_N[:, labelled_N])["precision"]
+        ranking(samples.scores[labelled_N, i], samples.causes[labelled_N, i], weights_B_N[:, labelled_N])["precision"]
         for i in range(len(CONCEPTS))
     ]
     without_N = samples.error[np.arange(len(samples)), ALL ^ (1 << first_N)]
@@ -73,7 +73,7 @@ def _of_causes(samples: Judged, labelled_N, failed_N, weights_B_N: np.ndarray) -
 
 
 def _of_alarm(alarm_N: np.ndarray, failed_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    found = _ranking(alarm_N, failed_N, weights_B_N)
+    found = ranking(alarm_N, failed_N, weights_B_N)
     return {
         "auroc_failed": found["area"],
         "auprc_failed": found["precision"],
@@ -81,7 +81,7 @@ def _of_alarm(alarm_N: np.ndarray, failed_N: np.ndarray, weights_B_N: np.ndarray
     }
 
 
-def _ranking(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+def ranking(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Return area under the ROC curve, average precision, and false alarms at `RECALL`; equal scores count together."""
     if not len(score_N):
         return dict.fromkeys(("area", "precision", "false_alarms"), np.full(len(weights_B_N), np.nan))

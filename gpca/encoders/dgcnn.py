@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import torch
 from torch import nn
 
@@ -34,14 +36,20 @@ class DGCNN(nn.Module):
         self.point_norm = nn.BatchNorm1d(point_features)
         self.embedding_size = 2 * point_features
 
-    def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
-        """Return embeddings (B, d) of clouds in the target's frame, in units of the object's diameter."""
-        batch, n, _ = points_B_N_3.shape
+    def forward(self, clouds: torch.Tensor | Sequence[torch.Tensor]) -> torch.Tensor:
+        """Return embeddings (B, d) of clouds in the target's frame, in units of the object's diameter.
+
+        Args:
+            clouds: (B, N, 3), or B of them (N, 3) of unlike sizes.
+        """
+        sizes = None if isinstance(clouds, torch.Tensor) else [len(cloud) for cloud in clouds]
+        x_B_N_F = clouds if isinstance(clouds, torch.Tensor) else torch.cat(list(clouds))[None]
+        batch, n, _ = x_B_N_F.shape
         features = []
-        x_B_N_F = points_B_N_3
         for edge_conv in self.edge_convs:
-            x_B_N_F = edge_conv(x_B_N_F)
+            x_B_N_F = edge_conv(x_B_N_F, sizes)
             features.append(x_B_N_F)
         x_P_F = self.point_norm(self.point_layer(torch.cat(features, dim=-1).view(batch * n, -1)))
         x_B_N_F = nn.functional.leaky_relu(x_P_F, NEGATIVE_SLOPE).view(batch, n, -1)
-        return torch.cat([x_B_N_F.max(dim=1).values, x_B_N_F.mean(dim=1)], dim=-1)
+        parts = [x_B_N_F] if sizes is None else x_B_N_F.split(sizes, dim=1)
+        return torch.cat([torch.cat([part.max(dim=1).values, part.mean(dim=1)], dim=-1) for part in parts])

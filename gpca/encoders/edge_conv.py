@@ -15,6 +15,9 @@ neighbours gathers maxima and sums together (:mod:`gpca.encoders.edge_kernels`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 import torch
 from torch import nn
 
@@ -48,6 +51,16 @@ def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
     return (rows_B_N_G @ columns_B_N_G.mT).topk(k, dim=-1, largest=False, sorted=False).indices
 
 
+def knn_indices_within(x_1_P_F: torch.Tensor, k: int, sizes: Sequence[int]) -> torch.Tensor:
+    """Return :func:`knn_indices` (1, P, k) of clouds that stand one after the other, each among its own points."""
+    starts = np.cumsum([0, *sizes[:-1]])
+    parts = [
+        knn_indices(x_1_n_F, k) + int(start)
+        for x_1_n_F, start in zip(x_1_P_F.split(list(sizes), 1), starts, strict=True)
+    ]
+    return torch.cat(parts, dim=1)
+
+
 class EdgeConv(nn.Module):
     """One EdgeConv layer: linear on edges, batch norm over edges, LeakyReLU(0.2), max over the k neighbours.
 
@@ -61,9 +74,12 @@ class EdgeConv(nn.Module):
         nn.init.kaiming_uniform_(self.weight, a=5**0.5)
         self.norm = BatchNorm(out_features)
 
-    def forward(self, x_B_N_F: torch.Tensor) -> torch.Tensor:
-        """Map features (B, N, F_in) to (B, N, F_out); the graph is rebuilt from the input features."""
-        neighbours_B_N_k = knn_indices(x_B_N_F, self.k)
+    def forward(self, x_B_N_F: torch.Tensor, sizes: Sequence[int] | None = None) -> torch.Tensor:
+        """Map features (B, N, F_in) to (B, N, F_out); the graph is rebuilt from the input features.
+
+        With `sizes`, B is 1 and the points are those of clouds of so many points, one after the other.
+        """
+        neighbours_B_N_k = knn_indices(x_B_N_F, self.k) if sizes is None else knn_indices_within(x_B_N_F, self.k, sizes)
         w1, w2 = self.weight.chunk(2, dim=1)
         ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
         if ac_B_N_2F.device.type != "cpu":

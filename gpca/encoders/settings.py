@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from gpca.errors import InputError
 from gpca.settings import Bounds, Count, PositiveShare, Share
+
+OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of unlike sizes together
 
 
 @dataclass(frozen=True)
@@ -15,6 +18,8 @@ class EncoderSettings:
     Attributes:
         backbone: name in :mod:`gpca.encoders.registry`.
         draw_points: N, points of a cloud that the encoder sees at once.
+        fewest_points: each draw from a cloud has a random number of points from this one to `draw_points`, so that
+            the density tells nothing; always `draw_points` where it is None. Only DGCNN takes such draws.
         draws: an embedding is the mean over so many draws of N points from the cloud.
         epochs, batch_size: length of the training.
         learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
@@ -30,6 +35,17 @@ class EncoderSettings:
     learning_rate: PositiveShare = 4e-3
     weight_decay: Share = 1e-2
     options: dict = field(default_factory=dict)
+    fewest_points: Annotated[int, Bounds(minimum=32)] | None = None
+
+    def __post_init__(self) -> None:
+        if self.fewest_points is None:
+            return
+        if self.backbone not in OF_ANY_SIZE:
+            fault = f"backbone '{self.backbone}' takes clouds of one size only"
+            raise InputError("encoder setting 'fewest_points'", fault, f"leave it out, or use {OF_ANY_SIZE[0]}")
+        if self.fewest_points > self.draw_points:
+            fault = f"{self.fewest_points} is above draw_points, {self.draw_points}"
+            raise InputError("encoder setting 'fewest_points'", fault, "lower it")
 
 
 @dataclass(frozen=True)

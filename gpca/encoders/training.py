@@ -26,17 +26,30 @@ from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 
 
-def draw_points(registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object) -> torch.Tensor:
+def draw_points(
+    registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object, fewest: int | None = None
+) -> torch.Tensor | list[torch.Tensor]:
     """Return `n_points` random points of each row's aligned cloud, (B, N, 3) float32.
 
     The draw of a sample is named by the axes, its split and its number. Clouds of fewer points repeat some.
+
+    Args:
+        fewest: where it is given, each cloud has a random number of points from this one to `n_points`, or all that it
+            has, and what is returned are B clouds (N, 3).
     """
-    clouds = np.empty((len(rows), n_points, 3), np.float32)
-    for cloud, row in zip(clouds, rows, strict=True):
+    clouds = []
+    for row in rows:
         points = registrations.cloud(row)
         random = generator(*axes, registrations.split[row], registrations.sample[row])
-        cloud[:] = points[random.choice(len(points), n_points, replace=len(points) < n_points, shuffle=False)]
-    return torch.from_numpy(clouds)
+        count = n_points if fewest is None else min(int(random.integers(fewest, n_points + 1)), len(points))
+        clouds.append(points[random.choice(len(points), count, replace=len(points) < count, shuffle=False)])
+    if fewest is not None:
+        return [torch.from_numpy(cloud.astype(np.float32)) for cloud in clouds]
+    return torch.from_numpy(np.stack(clouds).astype(np.float32))
+
+
+def _on(device: torch.device, clouds: torch.Tensor | list[torch.Tensor]) -> torch.Tensor | list[torch.Tensor]:
+    return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
 
 
 def train_encoder(
@@ -80,8 +93,11 @@ def train_encoder(
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
-            points_B_N_3 = draw_points(registrations, batch_rows, settings.draw_points, source, seed, "epoch", epoch)
-            logits_B_C = model(points_B_N_3.to(device))
+            clouds = draw_points(
+                *(registrations, batch_rows, settings.draw_points, source, seed, "epoch", epoch),
+                fewest=settings.fewest_points,
+            )
+            logits_B_C = model(_on(device, clouds))
             labels_B = labels_S[batch_rows].to(device)
             loss = nn.functional.cross_entropy(logits_B_C, labels_B)
             optimiser.zero_grad()
@@ -125,10 +141,10 @@ def embed(
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            model.encoder(draw_points(registrations, rows, n_points, source, seed, "embedding", draw).to(device))
+            draw_points(registrations, rows, n_points, source, seed, "embedding", draw, fewest=settings.fewest_points)
             for draw in range(settings.draws)
         ]
-        parts.append(torch.stack(draws).mean(dim=0))
+        parts.append(torch.stack([model.encoder(_on(device, clouds)) for clouds in draws]).mean(dim=0))
     h_S_d = torch.cat(parts)
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
 

@@ -8,9 +8,11 @@ An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.pairs.dataset import Registrations
@@ -26,6 +28,27 @@ class ConceptExplainer(Protocol):
         """Attribute every registration. What was perturbed is hidden from it, unless it is an oracle."""
 
 
+@runtime_checkable
+class Describing(Protocol):
+    """An explainer that measures each registration by itself before it learns: once is enough for all that follows."""
+
+    def describe(self, registrations: Registrations) -> Registrations:
+        """Attach what it measures, by :func:`measured`; ``fit`` and ``explain`` then measure nothing again."""
+
+
+def measured(
+    registrations: Registrations, prefix: str, measure: Callable[[], Mapping[str, np.ndarray]]
+) -> Registrations:
+    """Return the registrations with arrays attached whose names begin with the prefix, measured unless they are there.
+
+    The prefix has to name everything that the numbers depend on.
+    """
+    if any(name.startswith(prefix) for name in registrations.attached):
+        return registrations
+    own = {prefix + name: array for name, array in measure().items()}
+    return replace(registrations, attached={**registrations.attached, **own})
+
+
 @dataclass(frozen=True)
 class ExplainerEntry:
     """An explainer by name.
@@ -35,6 +58,7 @@ class ExplainerEntry:
         make: what makes it from source, seed and the settings of the config.
         reads: what it needs attached: ``embeddings`` those of the encoder, ``uncertainty/<design>`` the outcomes of
             that design (:mod:`gpca.uncertainty.designs`); ``registrations`` nothing.
+        observed_only: of a design's outcomes it reads those of the observed pair alone, the first.
         oracle: whether it is told the truth about what it explains: an upper bound, which its title has to say.
     """
 
@@ -42,6 +66,7 @@ class ExplainerEntry:
     make: Callable[..., ConceptExplainer]
     reads: str = "registrations"
     oracle: bool = False
+    observed_only: bool = False
 
     @property
     def design(self) -> str | None:

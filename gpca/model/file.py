@@ -71,7 +71,7 @@ class Model:
             "version": VERSION,
             "diagnoser": self.diagnoser and self.diagnoser.state(),
             "encoder": self.encoder.state_dict(),
-            "encoder_settings": _renamed(asdict(self.encoder_settings), "draw_points", "points"),
+            "encoder_settings": _renamed(_given(asdict(self.encoder_settings)), "draw_points", "points"),
             "gpc": self.gpc.state(),
             "icp": asdict(self.icp),
             "points": self.cloud_points,
@@ -163,3 +163,8 @@ def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path
             "no model", f"none in {results.absolute()}", f"{REMEDY}, or name one with --model or {VARIABLE}"
         )
     return found[0]
+
+
+def _given(settings: dict) -> dict:
+    """Return the settings that have a value."""
+    return {name: value for name, value in settings.items() if value is not None}

@@ -11,9 +11,10 @@ from typing import Any
 from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.alignment.methods.registry import left_out, method_entry
+from gpca.controls.settings import TRANSFER
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.frames.source import REAL_WORLD
-from gpca.objects.title import title_of
+from gpca.objects.title import stand_in_clause, title_of
 from gpca.recovery.policies import policy_entry
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
 from gpca.reporting.tables.kernel_grid import PRINTED
@@ -38,6 +39,9 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "estimator": list(config["estimators"]),
         "explainer": list(config["explainers"]),
         "cause_explainer": list(config["diagnosis"]["explainers"]),
+        "control_seed": controlled_seeds(config),
+        "control": list(config["controls"]["controls"]),
+        "transfer_source": list(sources) if transfers(config, sources) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
         "strategy": strategies,
@@ -90,6 +94,9 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
         "explainer_titles": explainers,
         "cause_explainers": {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]},
+        "control_explainers": {name: explainer_entry(name).title for name in config["controls"]["explainers"]},
+        "controls": list(config["controls"]["controls"]),
+        "controls_title": _title_of_all(shown),
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": learners,
         "strategies": strategies,
@@ -113,6 +120,22 @@ def installed_methods(config: Mapping) -> list[str]:
     """Return the registration methods of a config, without those whose package is missing here."""
     missing = left_out(config["methods"])
     return [name for name in config["methods"] if name not in missing]
+
+
+def _title_of_all(sources: Mapping[str, Mapping]) -> str:
+    """Return the titles of all sources, and whether there are stand-ins among them."""
+    titles = ", ".join(entry["title"] for entry in sources.values())
+    return titles + stand_in_clause(sources.values())
+
+
+def controlled_seeds(config: Mapping) -> list[int]:
+    """Return the seeds for which the controls are run."""
+    return list(config["seeds"])[: config["controls"]["seeds"]]
+
+
+def transfers(config: Mapping, sources: Mapping) -> bool:
+    """Return whether explainers are asked about sources that they did not learn from; one alone admits no transfer."""
+    return TRANSFER in config["controls"]["controls"] and len(sources) > 1
 
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:

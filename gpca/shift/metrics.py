@@ -58,7 +58,7 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     found = {}
     for path in prediction_files:
         source, learner, seed = source_method_seed(path)
-        rows = read_predictions(path, sets=True)
+        rows = read_predictions(path, ("set",))
         if unknown := set(rows["set"]) - set(TRAINED_ON):
             raise InputError(path, f"unknown set '{sorted(unknown)[0]}'", f"known are {', '.join(TRAINED_ON)}")
         p_S_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy()

@@ -25,7 +25,7 @@ from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
 from gpca.recovery.policy import RecoveryPolicy
-from gpca.settings import check_settings
+from gpca.steps import checked_sections
 
 SECTIONS = {
     "encoder": ("encoders", "*"),
@@ -57,9 +57,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Fit both classifiers and write them with the encoder and the policy."""
     torch.set_num_threads(options.threads)
-    given = {name: options.settings.get(name) or {} for name in SECTIONS}
-    for name, section in SECTIONS.items():
-        check_settings(given[name], *section)
+    given = checked_sections(options.settings, SECTIONS)
     if len(options.causes) != len(options.descriptors):
         found = f"{len(options.descriptors)} file(s) for {len(options.causes)} of causes"
         raise InputError("--descriptors", found, "give one for each, in the same order")

@@ -11,14 +11,12 @@ import torch
 from gpca.arguments import SEED
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import load_model
-from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
 from gpca.shift.samples import make_sets
 from gpca.shift.settings import ShiftSettings
-from gpca.steps import per_seed
+from gpca.steps import checked_sections, per_seed
 
 SECTIONS = {"shift": ("shift",), "registrations": ("registrations",), "encoder": ("encoders", "*")}
 
@@ -38,11 +36,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Make the sets, seed by seed."""
     torch.set_num_threads(options.threads)
-    given = {name: options.settings.get(name, {}) for name in SECTIONS}
-    if unknown := set(options.settings) - set(SECTIONS):
-        raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"known are {', '.join(SECTIONS)}")
-    for name, section in SECTIONS.items():
-        check_settings(given[name], *section)
+    given = checked_sections(options.settings, SECTIONS)
     settings = ShiftSettings.from_dicts(**given)
     encoder_settings = EncoderSettings(**given["encoder"])
     options.other_registrations = options.other_registrations or [None] * len(options.seeds)

@@ -105,6 +105,12 @@ def _sweep(
     return [runs(Knobs(*knobs)) for knobs in (UNTOUCHED, *sample_knobs(kind))]
 
 
+def _observed(
+    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Outcome]:
+    return [KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)(UNTOUCHED)]
+
+
 def _removal(
     pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
 ) -> list[Outcome]:
@@ -160,6 +166,8 @@ DESIGNS = {
     "removal": Design(
         _removal, _names(CORNERS, Remedies._fields, "observed"), reference=len(CORNERS) - 1, splits=SPLITS
     ),
+    # The observed pair alone, for explainers that need no more: the reference is itself, so the uncertainty is none.
+    "observed": Design(_observed, ("observed",), splits=SPLITS),
     # Whether the pair is uncertain at all, beside a second clean pair.
     "causal": Design(_causal, ("reference", "clean", "observed")),
 }

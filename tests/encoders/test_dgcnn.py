@@ -60,3 +60,21 @@ def test_the_gradient_reaches_every_parameter():
     (h * torch.randn(h.shape)).sum().backward()
     for name, parameter in encoder.named_parameters():
         assert parameter.grad is not None and parameter.grad.isfinite().all() and parameter.grad.any(), name
+
+
+def test_clouds_of_unlike_sizes_are_embedded_as_each_alone(encoder):
+    of_sizes = [clouds()[row, :n] for row, n in enumerate((60, 20, 41))]
+    alone = torch.cat([encoder(cloud[None]) for cloud in of_sizes])
+    torch.testing.assert_close(encoder(of_sizes), alone, atol=1e-5, rtol=1e-5)
+
+
+def test_training_takes_the_statistics_of_all_clouds_whatever_their_sizes():
+    def gradients(points):
+        torch.manual_seed(0)
+        encoder = DGCNN(k=8, point_features=32)
+        h = encoder(points)
+        (h * torch.linspace(-1, 1, h.numel()).view_as(h)).sum().backward()
+        return h, encoder.edge_convs[0].weight.grad
+
+    for one, other in zip(gradients(clouds()), gradients(list(clouds())), strict=True):
+        torch.testing.assert_close(one, other, atol=1e-3, rtol=1e-3)

@@ -139,3 +139,18 @@ def test_wrong_settings_are_refused(registrations, changed, expected):
 def test_a_training_that_diverges_is_stopped(registrations):
     with pytest.raises(InputError, match="the loss is not finite in epoch 1; lower"):
         train(registrations, settings=dataclasses.replace(SETTINGS, learning_rate=1e30))
+
+
+def test_every_draw_has_a_number_of_points_of_its_own(registrations):
+    rows = registrations.rows("train")
+    clouds = training.draw_points(registrations, rows, 64, "tiny", 0, fewest=32)
+    sizes = [len(cloud) for cloud in clouds]
+    assert min(sizes) >= 32 and max(sizes) <= 64 and len(set(sizes)) > 3
+    again = training.draw_points(registrations, rows[:1], 64, "tiny", 0, fewest=32)
+    assert torch.equal(again[0], clouds[0])
+
+
+@pytest.mark.parametrize("changes", [{"fewest_points": 65}, {"fewest_points": 32, "backbone": "pointnet"}])
+def test_draws_that_cannot_be_are_refused(changes):
+    with pytest.raises(InputError, match="fewest_points"):
+        dataclasses.replace(SETTINGS, **changes)

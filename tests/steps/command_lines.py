@@ -29,6 +29,7 @@ CAUSES = {  # of two symmetric objects with few points: only pose errors make th
     "shares": {"nominal": 0.5, "borderline": 0.1, "noise": 0, "pose": 0.4, "overlap": 0}, "several": [0, 0],
     "severities": {"noise": [0.01, 0.05]}, "clean_pairs": 20, "candidates": 50,
 }  # fmt: skip
+CONTROLS = {"controls": ["density", "shuffled", "transfer"], "draw_points": [32, 64]}
 COMMON = {"--source": "tiny"}
 STEP_OPTIONS = {
     "objects": COMMON | {
@@ -83,6 +84,19 @@ STEP_OPTIONS = {
         "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz",
         "--registration-timings": "icp.csv", "--encoder": "weights.pt", "--out": "embeddings.npz",
         "--timings": "dgcnn.csv",
+    },
+    "train_control": COMMON | {
+        "--settings": {"controls": CONTROLS, "encoder": ENCODER}, "--control": "density", "--seed": 0,
+        "--registrations": "registrations.npz", "--out": "control.npz", "--curve": "control_curve.csv",
+    },
+    "controls": COMMON | {
+        "--settings": {"controls": CONTROLS, "encoder": ENCODER, "uncertainty": {"starts": 13, "icp_points": 40},
+                       "icp": {"max_iterations": 20},
+                       "explainers": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "residuals_logistic": {}}},
+        "--seed": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoder": "weights.pt",
+        "--embeddings": "embeddings.npz", "--retrained": "density", "--retrained-embeddings": "control.npz",
+        "--others": "other", "--other-registrations": "registrations.npz", "--out": "controls.csv",
+        "--samples": "control_samples.csv",
     },
     "reduce": COMMON | {
         "--settings": {"components": 4, "epochs": 5}, "--reduction": "autoencoder", "--seeds": 0,

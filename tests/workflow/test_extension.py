@@ -14,7 +14,8 @@ SMOKE = ("--configfile", "config/smoke.yaml")
 ROW = {"sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "run_icp": 5, "attribute": 16}
 ROW |= {"sample_causes": 2, "describe": 2, "train_on_causes": 2, "diagnose": 4}
 ROW |= {"sample_model_causes": 1, "describe_model_causes": 1}
-ROW |= {"register_methods": 1, "estimate": 1, "shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
+ROW |= {"register_methods": 1, "estimate": 1, "train_control": 1}
+ROW |= {"shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
 COLLECTORS = {"metrics": 1, "timings": 1, "fig_attribution_confusions": 1, "table1_extended": 1}
 TABLES = dict.fromkeys(("table1_single_baselines", "table2_per_concept"), 1)
 TABLES |= dict.fromkeys(("active_learning", "active_learning_curves", "diagnostics"), 1)
@@ -24,6 +25,8 @@ TABLES |= dict.fromkeys(("cause_metrics", "cause_intervals", "table9_causes", "c
 TABLES |= dict.fromkeys(("nominal_reliability", "model", "time_stages", "table7_runtime", "runtime"), 1)
 TABLES |= dict.fromkeys(("registration_methods", "table11_registration", "table11_severity"), 1)
 TABLES |= dict.fromkeys(("estimator_metrics", "table12_uncertainty", "estimators"), 1)
+TABLES |= dict.fromkeys(("control_metrics", "control_intervals", "control_severities"), 1)
+TABLES |= dict.fromkeys(("table10_controls", "table10_transfer", "severity_curves", "transfer"), 1)
 TABLES |= dict.fromkeys(("coverage_risk", "reliability", "uncertainty_vs_distance"), 1)
 
 
@@ -44,7 +47,9 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
     finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     planned = finished.dry_run("all", *SMOKE, *data_dir)
-    assert without_ends(planned.jobs) == ROW | COLLECTORS | TABLES | {"objects_my_parts": 1}
+    # What was learnt from the two other sources is asked about the new one too.
+    of_row = {"objects_my_parts": 1, "explain_controls": 3}
+    assert without_ends(planned.jobs) == ROW | COLLECTORS | TABLES | of_row
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in planned.outputs
 
     for file, text in blocks_of("docs/adding.md"):
@@ -53,8 +58,8 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
             (finished.folder / file).write_text(text)
     planned = finished.dry_run("all", *SMOKE, *data_dir)
     both = {rule: 2 * count for rule, count in ROW.items()} | {"sample_objects": 1, "torus": 1}
-    pictures = {"objects_my_parts": 1, "objects_torus": 1}
-    assert without_ends(planned.jobs) == both | COLLECTORS | TABLES | pictures
+    of_rows = {"objects_my_parts": 1, "objects_torus": 1, "explain_controls": 4}
+    assert without_ends(planned.jobs) == both | COLLECTORS | TABLES | of_rows
     assert "results/smoke/predictions/torus/gpca_paper/seed0.csv" in planned.outputs
 
     table2 = "results/smoke/tables/table2_per_concept"

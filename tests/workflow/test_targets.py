@@ -39,6 +39,10 @@ CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes
 CAUSES_SHOWN += jobs("nominal_reliability")
 MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
 CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
+# Explainers of the first seed of two sources under the controls, and what is made of what they say.
+CONTROLS_SHOWN = jobs("control_metrics", "control_intervals", "control_severities")
+CONTROLS_SHOWN += jobs("table10_controls", "table10_transfer", "severity_curves", "transfer")
+CONTROLS = jobs(explain_controls=2) + CONTROLS_SHOWN
 # Explainers times two sources: three with a GPC (classic features on the frames too), four on embeddings, 11 on
 # uncertainties.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 1, 2 * 4, 2 * 11))
@@ -111,7 +115,7 @@ def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
 EDITS = {
     "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
     + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD
-    + jobs(diagnose=4) + CAUSES_SHOWN,
+    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS,
     "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
@@ -121,10 +125,10 @@ EDITS = {
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
         jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED,
+        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED + CONTROLS,
     "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
     "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
-    "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN,
+    "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN + CONTROLS,
     "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
     # Not the pictures: they show an encoder without reduction.
@@ -141,19 +145,21 @@ EDITS = {
     "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
     + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
-    + jobs(train_on_causes=4, diagnose=2) + CAUSES_SHOWN,
+    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=5)
     + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
-    + jobs(sample_model_causes=1, describe_model_causes=1) + MODEL
-    + jobs("register_methods", "estimate") + METHODS + ESTIMATED,
+    + jobs(sample_model_causes=1, describe_model_causes=1, train_control=1) + MODEL
+    + jobs("register_methods", "estimate") + METHODS + ESTIMATED + CONTROLS,
     "gpca/descriptors/entropy.py":
         jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED,
     "gpca/uncertainty/estimators/censi.py": jobs(estimate=2) + ESTIMATED,
     "gpca/reporting/figures/estimators.py": jobs("estimators"),
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
+    "gpca/controls/variants.py": jobs(train_control=2) + CONTROLS,
+    "gpca/controls/judged.py": CONTROLS_SHOWN,
 }  # fmt: skip
 
 

@@ -8,9 +8,10 @@ from gpca.comparison.published import read_published
 COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
-    *("registration_methods.csv", "estimators.csv"),
+    *("registration_methods.csv", "estimators.csv", "controls.csv"),
 ]
-# Those of them that hold a counterpart of a printed number.
+ENDS = ["model.pt", "comparison.md", "index.html"]
+# Those of the collected that hold a counterpart of a printed number.
 COMPARED = sorted(
     {number.counterpart.file for number in read_published() if number.counterpart}
     & set(COLLECTED)

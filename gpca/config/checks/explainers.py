@@ -9,6 +9,7 @@ from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
 from gpca.config.checks.named import require_names, with_key
+from gpca.controls.settings import ControlSettings
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError
 from gpca.pairs.synthesis import RegistrationSettings
@@ -57,6 +58,24 @@ def check_explainers(config: dict, left_out: Set[str]) -> None:
         with_key(f"explainers.{name}", require_settings, name, settings or {})
         if design := explainer_entry(name).design:
             require_names(f"explainers.{name}", [design], config["uncertainty"], "uncertainty", left_out)
+
+
+def check_controls(config: dict) -> None:
+    """Check that the settings agree, and that every explainer takes its own and finds what it reads under a control.
+
+    As a learner's, its settings add to those that it has as an explainer.
+    """
+    controls = config["controls"]
+    with_key("controls", ControlSettings.from_dict, controls)
+    for name, settings in controls["explainers"].items():
+        key = f"controls.explainers.{name}"
+        own = (config["explainers"].get(name) or {}) | (settings or {})
+        with_key(key, require_settings, name, own)
+        with_key(key, check_settings, own, "explainers", name)
+        entry = explainer_entry(name)
+        if entry.design and not entry.observed_only:
+            fault = "reads more of Monte-Carlo ICP than the observed pair, which is all that runs under a control"
+            raise InputError(f"config key {key}", fault, "leave it out")
 
 
 def check_strategies(config: dict) -> None:

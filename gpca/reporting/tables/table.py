@@ -38,7 +38,8 @@ class Column:
     """Says how one quantity is shown: its title, the digits after the point, with ± or without.
 
     `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them. Of some
-    quantities, as the labels that were needed, the least is best.
+    quantities, as the labels that were needed, the least is best. A column `beside` another has none of its own: its
+    cells stand with their sign in brackets behind the other's; the CSV holds both.
     """
 
     title: str
@@ -46,10 +47,11 @@ class Column:
     interval: bool = True
     limits: tuple[float, float] = (0.0, 100.0)
     least_is_best: bool = False
+    beside: str = ""
 
     def text(self, cell: Cell) -> str:
         """Return e.g. ``97.7 ± 0.4``, or ``> 52.0``."""
-        mean = f"{cell.mean:.{self.decimals}f}"
+        mean = f"{cell.mean:{'+' if self.beside else ''}.{self.decimals}f}"
         if cell.at_least:
             return f"> {mean}"
         if not self.interval:
@@ -130,7 +132,7 @@ class Table:
 
     def markdown(self) -> str:
         """Return a GitHub table, caption above, footnotes below."""
-        rule = [":--"] * len(self.row_heads) + ["--:"] * len(self.columns)
+        rule = [":--"] * len(self.row_heads) + ["--:"] * len(self._own_columns())
         body = self._body(lambda text: text.replace("|", "\\|"), lambda text: f"**{text}**")
         lines = [" | ".join(row) for row in (self._heads(), rule, *body)]
         table = "\n".join(f"| {line} |" for line in lines)
@@ -144,7 +146,7 @@ class Table:
         plain = [self._heads(), *self._body(str, str)]
         characters = sum(2 + max(map(len, column)) for column in zip(*plain, strict=True))
         float_name = "table" if characters <= _COLUMN_CHARACTERS else "table*"
-        alignments = "l" * len(self.row_heads) + "c" * len(self.columns)
+        alignments = "l" * len(self.row_heads) + "c" * len(self._own_columns())
         begin = rf"\begin{{tabular}}{{{alignments}}}"
         end = r"\end{tabular}"
         packages = "booktabs"
@@ -176,16 +178,26 @@ class Table:
         )
 
     def _heads(self) -> list[str]:
-        return [*self.row_heads.values(), *(column.title for column in self.columns.values())]
+        return [*self.row_heads.values(), *(column.title for column in self._own_columns().values())]
+
+    def _own_columns(self) -> dict[str, Column]:
+        return {name: column for name, column in self.columns.items() if not column.beside}
+
+    def _text(self, row: int, name: str) -> str:
+        cell = self.cells.get((row, name))
+        if cell is None:
+            return EMPTY
+        beside = [(key, column) for key, column in self.columns.items() if column.beside == name]
+        texts = [column.text(self.cells[row, key]) for key, column in beside if (row, key) in self.cells]
+        return " ".join([self.columns[name].text(cell), *(f"({text})" for text in texts)])
 
     def _body(self, escape, bold) -> list[list[str]]:
         body = []
         best = self.best()
         for row, labels in enumerate(self.rows):
             texts = [escape(title) for _, title in labels]
-            for name, column in self.columns.items():
-                cell = self.cells.get((row, name))
-                text = escape(column.text(cell)) if cell else escape(EMPTY)
+            for name in self._own_columns():
+                text = escape(self._text(row, name))
                 texts.append(bold(text) if (row, name) in best else text)
             body.append(texts)
         return body

@@ -1,0 +1,124 @@
+"""Explainers that see the pair, both clouds and what ICP did, and not the aligned source alone.
+
+`gpca_pair` is the paper's classifier with other eyes: a row of its own, never "GP-CA (paper)". What it reads does not
+depend on which object is registered (:func:`gpca.descriptors.registered.relations`). Beside it stand the plainest form
+of the same idea, a forest on distances, and a rival that knows the density of the cloud and nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from baselines.concept_classifier import ConceptClassifier, standardised_regression
+from gpca.attribution.scores import Attribution
+from gpca.explainers.gpca import GPCA
+from gpca.explainers.interface import ExplainerEntry, measured
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.seeds import seed_of
+
+
+class DescribedPairs:
+    """What these explainers share: one group of descriptors of each pair.
+
+    Args:
+        source, seed: name the draws from the clouds.
+        group: one of :data:`gpca.descriptors.registered.WIDTHS`.
+        points: drawn from each cloud.
+    """
+
+    def __init__(self, source: str, seed: int, group: str, points: int) -> None:
+        self._axes = (source, seed)
+        self._group = group
+        self._points = points
+        self._prefix = f"pair_{source}_{seed}_{points}_"
+
+    def describe(self, registrations: Registrations) -> Registrations:
+        """Attach the descriptors, unless they are attached already."""
+        from gpca.descriptors.registered import describe_registrations
+
+        return measured(
+            registrations,
+            self._prefix,
+            lambda: describe_registrations(registrations, *self._axes, points=self._points),
+        )
+
+    def features(self, registrations: Registrations) -> np.ndarray:
+        """Return the group (N, F)."""
+        return self.describe(registrations).attached[self._prefix + self._group]
+
+
+class PairGPCA(DescribedPairs):
+    """GP-CA on the relations of the pair, normalised by their ranks among the training samples.
+
+    Args:
+        source, seed: name the draws.
+        points: drawn from each cloud.
+        settings: those of the GPC, as for GP-CA.
+    """
+
+    def __init__(self, source: str, seed: int, points: int = 512, **settings) -> None:
+        super().__init__(source, seed, "relations", points)
+        self._gpca = GPCA(source, seed, **settings)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit the GPC to the labelled pairs."""
+        from gpca.explainers.pair_classifier import NormalisedDescriptors
+
+        features_N_F = self.features(registrations)
+        self._normalised = NormalisedDescriptors(*self._axes, "gpca_pair").fit(features_N_F)
+        self._gpca.fit(self._embedded(registrations, features_N_F))
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Draw from the posterior at every pair and summarise, as GP-CA does."""
+        started = perf_counter()
+        embedded = self._embedded(registrations, self.features(registrations))
+        seconds = (perf_counter() - started) / len(registrations)
+        attribution = self._gpca.explain(embedded)
+        return replace(attribution, seconds_N=attribution.seconds_N + seconds)
+
+    def _embedded(self, registrations: Registrations, features_N_F: np.ndarray) -> Registrations:
+        return replace(registrations, attached={"embedding": self._normalised(features_N_F)})
+
+
+class PairLearner(DescribedPairs):
+    """Scores are the probabilities of a scikit-learn classifier on one group."""
+
+    def __init__(self, classifier, *description) -> None:
+        super().__init__(*description)
+        self._classifier = ConceptClassifier(classifier)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit the classifier to the labelled pairs."""
+        self._classifier.fit(self.features(registrations), registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every pair."""
+        started = perf_counter()
+        scores_N_C = self._classifier.scores(self.features(registrations))
+        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+
+
+def pair_forest(source: str, seed: int, trees: int = 200, points: int = 512) -> PairLearner:
+    """Make a random forest on the 52 distances of the pair."""
+    from sklearn.ensemble import RandomForestClassifier
+
+    random_state = seed_of(source, seed, "pair_forest") % 2**32
+    return PairLearner(
+        RandomForestClassifier(n_estimators=trees, random_state=random_state), source, seed, "distances", points
+    )
+
+
+def density(source: str, seed: int, inverse_regularisation: float = 1.0, points: int = 512) -> PairLearner:
+    """Make the logistic regression that knows spacing and extent of the observed cloud, and nothing else."""
+    return PairLearner(standardised_regression(inverse_regularisation), source, seed, "densities", points)
+
+
+EXPLAINERS = {
+    "gpca_pair": ExplainerEntry("GP-CA on the pair", PairGPCA),
+    "pair_forest": ExplainerEntry("Distances of the pair (random forest)", pair_forest),
+    "density": ExplainerEntry("Density alone (logistic regression)", density),
+}

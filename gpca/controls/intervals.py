@@ -1,0 +1,97 @@
+"""Intervals of accuracies under the controls, and of what they lose against the paper's protocol.
+
+By the bootstrap over objects and seeds of :mod:`gpca.attribution.bootstrap`. A draw of objects and seeds is the same
+for all explainers and controls of a source, so that differences are paired, also where a control has other test samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.bootstrap import bounds, pigeonhole_weights
+from gpca.controls.judged import read_controls
+from gpca.controls.metrics import auroc_error
+from gpca.controls.settings import PAPER, TRANSFER
+from gpca.csv_file import numbers, read_csv
+from gpca.diagnosis.judged import POOLED
+from gpca.seeds import generator
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = (
+    *("control", "source", "trained_on", "method", "metric", "samples", "seeds", "value", "low", "high"),
+    *("change", "change_low", "change_high"),
+)
+TEXTS = COLUMNS[:5]
+
+
+def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return accuracy and auroc_error of every control and explainer over all seeds, with 95 % intervals.
+
+    By the source tested, and pooled over all. Of transfer there is a row for each source trained on, and one for all
+    others together, whose ``trained_on`` is pooled. The change is the value minus the paper's protocol's.
+    """
+    import pandas as pd
+
+    judged = read_controls(prediction_files)
+    sources = list(dict.fromkeys(judged["source"]))
+    records: list[tuple] = []
+    for source in (*sources, POOLED) if len(sources) > 1 else sources:
+        of_source = judged if source == POOLED else judged[judged["source"] == source]
+        for explainer, rows in of_source.groupby("explainer", sort=False):
+            factors = (rows["seed"].to_numpy(), rows["instance"].to_numpy(str))
+            drawn_B_N = pigeonhole_weights(generator("control intervals", source), *factors)
+            weights_B_N = np.vstack([np.ones(len(rows)), drawn_B_N])
+            for of_group in _of_explainer(source, rows, weights_B_N):
+                records.append((*of_group[:3], explainer, *of_group[3:]))
+    return pd.DataFrame(records, columns=list(COLUMNS))
+
+
+def read_intervals(path: str | Path) -> pd.DataFrame:
+    """Read what :func:`collect` returned; where nothing is wrong, auroc_error has no row, and some bounds are NaN.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
+    """
+    rows = read_csv(path, COLUMNS)
+    for column in COLUMNS:
+        if column not in TEXTS:
+            rows[column] = numbers(path, rows, column, needed=column in ("samples", "seeds", "value"))
+    return rows
+
+
+def _of_explainer(source: str, rows: pd.DataFrame, weights_B_N: np.ndarray) -> Iterator[tuple]:
+    measured = {group: _measures(rows[mask], weights_B_N[:, mask]) for group, mask in _groups(rows, source).items()}
+    for (control, trained_on), (of_group, counts) in measured.items():
+        for metric, value_B in of_group.items():
+            if not np.isfinite(value_B[0]):
+                continue
+            change_B = value_B - measured[PAPER, source][0][metric]
+            own = (control, source, trained_on, metric, *counts)
+            yield (*own, value_B[0], *bounds(value_B[1:]), change_B[0], *bounds(change_B[1:]))
+
+
+def _groups(rows: pd.DataFrame, source: str) -> dict[tuple[str, str], np.ndarray]:
+    """Return (control, trained on) -> which rows are of it."""
+    control, trained_on = rows["control"].to_numpy(str), rows["trained_on"].to_numpy(str)
+    groups = {}
+    for name in dict.fromkeys(control.tolist()):
+        of_control = control == name
+        if name == TRANSFER and source != POOLED:
+            for other in dict.fromkeys(trained_on[of_control].tolist()):
+                groups[name, other] = of_control & (trained_on == other)
+        groups[name, POOLED if name == TRANSFER else source] = of_control
+    return groups
+
+
+def _measures(rows: pd.DataFrame, weights_B_N: np.ndarray) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
+    right_N = rows["right"].to_numpy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        accuracy_B = (weights_B_N * right_N).sum(axis=1) / weights_B_N.sum(axis=1)
+    measures = {"accuracy": accuracy_B, "auroc_error": auroc_error(rows, "entropy", weights_B_N)}
+    return measures, (len(rows), rows["seed"].nunique())

@@ -1,0 +1,60 @@
+"""Settings of the controls: nothing here needs torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
+
+from gpca.errors import InputError
+from gpca.settings import Bounds, Count, PositiveShare
+
+PAPER = "paper"  # the protocol itself, which every control is compared with
+Control = Literal[
+    "density",
+    "unseen_objects",
+    "reversed",
+    "label_noise_5",
+    "label_noise_10",
+    "label_noise_20",
+    "label_noise_30",
+    "shuffled",
+    "transfer",
+]
+CONTROLS: tuple[str, ...] = get_args(Control)
+RETRAINED = ("density", "unseen_objects")  # need an encoder of their own
+WRONG_LABELS = {f"label_noise_{percent}": percent / 100 for percent in (5, 10, 20, 30)}  # share of the training labels
+RELABELLED = (*WRONG_LABELS, "shuffled")
+TRANSFER = "transfer"
+Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
+
+
+@dataclass(frozen=True)
+class ControlSettings:
+    """What is controlled, and how much of it.
+
+    Attributes:
+        controls: their names.
+        seeds: the first so many of the run's.
+        draw_points: range of the random number of points of a cloud where density is matched.
+        folds: a source's objects are dealt into so many; one of them is unseen.
+        success: ADD(-S) below which a registration has succeeded, relative to the diameter.
+        bins: of each severity, equally wide.
+    """
+
+    controls: tuple[Control, ...] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
+    seeds: Count = 3
+    draw_points: tuple[Points, Points] = (200, 512)
+    folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3
+    success: PositiveShare = 0.02
+    bins: Annotated[int, Bounds(minimum=1, maximum=20)] = 4
+
+    def __post_init__(self) -> None:
+        if self.draw_points[0] > self.draw_points[1]:
+            fault = f"{list(self.draw_points)} runs downwards"
+            raise InputError("setting draw_points of controls", fault, "swap the two")
+
+    @classmethod
+    def from_dict(cls, settings: dict) -> ControlSettings:
+        """Build from the config's section ``controls``; its explainers are not among the settings."""
+        given = {name: value for name, value in settings.items() if name != "explainers"}
+        return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})

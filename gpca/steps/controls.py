@@ -1,0 +1,118 @@
+"""Step ``controls``: registrations and embeddings -> what every explainer says under every control."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+
+import torch
+
+from baselines.registry import explainer_entry, require_settings
+from gpca.alignment.icp import ICPSettings
+from gpca.arguments import SEED
+from gpca.controls.experiment import Experiment, Rival
+from gpca.controls.samples import sample_table
+from gpca.controls.settings import PAPER, RETRAINED, ControlSettings
+from gpca.controls.variants import left_out, variant
+from gpca.csv_file import write_csv
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, load_model
+from gpca.errors import InputError
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.provenance import record_provenance
+from gpca.settings import check_settings
+from gpca.steps import checked_sections
+from gpca.uncertainty.settings import UncertaintySettings
+
+SECTIONS = {
+    "controls": ("controls",),
+    "encoder": ("encoders", "*"),
+    "uncertainty": ("uncertainty", "removal"),
+    "icp": ("registrations", "icp"),
+}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config, `explainers` by name too."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seed", required=True, type=SEED)
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--registrations", required=True, type=Path)
+    parser.add_argument("--encoder", required=True, type=Path, help="weights of the paper's protocol")
+    parser.add_argument("--embeddings", required=True, type=Path, help="of that encoder")
+    parser.add_argument("--retrained", nargs="*", default=[], choices=RETRAINED, help="controls with embeddings")
+    parser.add_argument("--retrained-embeddings", nargs="*", default=[], type=Path, help="theirs, in the same order")
+    parser.add_argument("--others", nargs="*", default=[], help="names of the other sources")
+    parser.add_argument("--other-registrations", nargs="*", default=[], type=Path, help="theirs, in the same order")
+    parser.add_argument("--out", required=True, type=Path, help="predictions")
+    parser.add_argument("--samples", required=True, type=Path, help="CSV of the test samples' severities and errors")
+
+
+def run(options: Namespace) -> None:
+    """Let every explainer learn and explain under the paper's protocol and under each control."""
+    torch.set_num_threads(options.threads)
+    given = dict(options.settings)
+    rivals = _rivals(given.pop("explainers", {}), options.source, options.seed)
+    given = checked_sections(given, SECTIONS)
+    settings, encoder = ControlSettings.from_dict(given["controls"]), EncoderSettings(**given["encoder"])
+    icp = ICPSettings(**given["icp"])
+    runs = {name: value for name, value in given["uncertainty"].items() if name != "samples"}
+    retrained = _pairs(options, "retrained", "retrained_embeddings")
+    others = _pairs(options, "others", "other_registrations")
+    if missing := set(settings.controls) & set(RETRAINED) - set(retrained):
+        raise InputError("--retrained", f"lacks control '{sorted(missing)[0]}'", "give its embeddings")
+    inputs = [options.objects, options.registrations, options.encoder, options.embeddings]
+    inputs += [*retrained.values(), *others.values()]
+    with record_provenance([options.out, options.samples], inputs, options.settings, seed=options.seed):
+        registrations = Registrations.load(options.registrations)
+        model = load_model(options.encoder, encoder)
+        embeddings = {PAPER: _embeddings(options.embeddings, registrations, "embed")}
+        for control, path in retrained.items():
+            if not left_out(control, registrations, settings, encoder.backbone):
+                changed = variant(control, registrations, options.source, options.seed, settings, icp)
+                embeddings[control] = _embeddings(path, changed, "train_control")
+        experiment = Experiment(
+            source=options.source,
+            seed=options.seed,
+            settings=settings,
+            backbone=encoder.backbone,
+            uncertainty=UncertaintySettings(**runs, icp=icp),
+            rivals=rivals,
+            embed=lambda asked, source: embed(model, asked, source, options.seed, encoder),
+            embeddings=embeddings,
+        )
+        asked = {name: Registrations.load(path) for name, path in others.items()}
+        rows = experiment.run(registrations, asked)
+        samples = sample_table(registrations, ObjectClouds.load(options.objects))
+        write_csv(options.out, rows)
+        write_csv(options.samples, samples)
+
+
+def _rivals(explainers: dict, source: str, seed: int) -> dict[str, Rival]:
+    if not explainers:
+        raise InputError("setting explainers", "names none", "give at least one")
+    rivals = {}
+    for name, settings in explainers.items():
+        require_settings(name, settings)
+        check_settings(settings, "explainers", name)
+        entry = explainer_entry(name)
+        rivals[name] = Rival(partial(entry.make, source, seed, **settings), entry.reads)
+    return rivals
+
+
+def _pairs(options: Namespace, names: str, files: str) -> dict[str, Path]:
+    given, paths = getattr(options, names), getattr(options, files)
+    if len(given) != len(paths):
+        option = f"--{files.replace('_', '-')}"
+        raise InputError(
+            option, f"{len(paths)} file(s) for {len(given)} name(s)", "give one for each, in the same order"
+        )
+    return dict(zip(given, paths, strict=True))
+
+
+def _embeddings(path: Path, registrations: Registrations, step: str):
+    shapes = {"h": ("S", "d"), "head_logits": ("S", "C")}
+    arrays = load_embeddings(path, registrations, shapes, f"python -m gpca {step}")
+    return {"embedding": arrays["h"], "head_logits": arrays["head_logits"]}

@@ -1,0 +1,168 @@
+# Registrations -> encoders trained under a control -> what every explainer says under all of them.
+from gpca.controls.settings import RETRAINED
+
+CONTROLS = config["controls"]
+CONTROL_SEEDS = NAMES["control_seed"]
+CONTROL_ENCODER = config["embedding"]["encoder"]
+RETRAINED_CONTROLS = [name for name in CONTROLS["controls"] if name in RETRAINED]
+CONTROL_EXPLAINERS = {
+    name: (config["explainers"].get(name) or {}) | (own or {})
+    for name, own in CONTROLS["explainers"].items()
+}
+CONTROL_SETTINGS = {
+    "controls": {name: CONTROLS[name] for name in CONTROLS if name != "explainers"},
+    "encoder": config["encoders"][CONTROL_ENCODER],
+}
+
+
+def other_sources(wildcards):
+    """Return the sources that explainers of this one are asked about besides, where there is transfer."""
+    return [name for name in NAMES["transfer_source"] if name != wildcards.source]
+
+
+rule controls:
+    input:
+        collect(
+            "<results>/controls/{source}/seed{seed}.csv",
+            source=SOURCES,
+            seed=CONTROL_SEEDS,
+        ),
+
+
+rule train_control:
+    input:
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        code=code_files("gpca.steps.train_control", encoder_module(CONTROL_ENCODER)),
+    output:
+        embeddings="<results>/control_embeddings/{control}/{source}/seed{seed}.npz",
+        curve="<results>/control_embeddings/{control}/{source}/seed{seed}.csv",
+    log:
+        "<logs>/control_embeddings/{control}/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/control_embeddings/{control}/{source}/seed{seed}.tsv"
+    wildcard_constraints:
+        control="|".join(RETRAINED),
+    priority: 10
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(CONTROL_SETTINGS),
+    shell:
+        "python -m gpca train_control --threads {threads} --control {wildcards.control} "
+        "--registrations {input.registrations} --source {wildcards.source} --seed {wildcards.seed} "
+        "--settings {params.settings:q} --out {output.embeddings} --curve {output.curve} 2> {log}"
+
+
+rule explain_controls:
+    input:
+        objects="<results>/objects/{source}.npz",
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        others=lambda wildcards: collect(
+            f"<results>/registrations/{{source}}/seed{wildcards.seed}.npz",
+            source=other_sources(wildcards),
+        ),
+        encoder=f"<results>/encoders/{{source}}/{CONTROL_ENCODER}/seed{{seed}}.pt",
+        embeddings=f"<results>/embeddings/{{source}}/{CONTROL_ENCODER}/none/seed{{seed}}.npz",
+        retrained=collect(
+            "<results>/control_embeddings/{control}/{{source}}/seed{{seed}}.npz",
+            control=RETRAINED_CONTROLS,
+        ),
+        code=code_files(
+            "gpca.steps.controls",
+            encoder_module(CONTROL_ENCODER),
+            *map(explainer_module, CONTROL_EXPLAINERS),
+        ),
+    output:
+        predictions="<results>/controls/{source}/seed{seed}.csv",
+        samples="<results>/control_samples/{source}/seed{seed}.csv",
+    log:
+        "<logs>/controls/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/controls/{source}/seed{seed}.tsv"
+    priority: 5
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(
+            CONTROL_SETTINGS
+            | {
+                "explainers": CONTROL_EXPLAINERS,
+                "uncertainty": config["uncertainty"].get("removal", {}),
+                "icp": config["registrations"]["icp"],
+            }
+        ),
+        retrained=RETRAINED_CONTROLS,
+        others=other_sources,
+    shell:
+        "python -m gpca controls --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
+        "--objects {input.objects} --registrations {input.registrations} --encoder {input.encoder} "
+        "--embeddings {input.embeddings} --retrained {params.retrained} --retrained-embeddings {input.retrained} "
+        "--others {params.others} --other-registrations {input.others} --settings {params.settings:q} "
+        "--out {output.predictions} --samples {output.samples} 2> {log}"
+
+
+rule control_metrics:
+    input:
+        prediction_files=rules.controls.input,
+        code=collector_code("gpca.controls.metrics:collect"),
+    output:
+        "<results>/controls.csv",
+    log:
+        "<logs>/controls.log",
+    benchmark:
+        "<benchmarks>/controls.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        collector="gpca.controls.metrics:collect",
+    script:
+        "../scripts/collect.py"
+
+
+use rule control_metrics as control_intervals with:
+    input:
+        prediction_files=rules.controls.input,
+        code=collector_code("gpca.controls.intervals:collect"),
+    output:
+        "<results>/control_intervals.csv",
+    log:
+        "<logs>/control_intervals.log",
+    benchmark:
+        "<benchmarks>/control_intervals.tsv"
+    params:
+        collector="gpca.controls.intervals:collect",
+
+
+use rule control_metrics as control_severities with:
+    input:
+        prediction_files=rules.controls.input,
+        sample_files=collect(
+            "<results>/control_samples/{source}/seed{seed}.csv",
+            source=SOURCES,
+            seed=CONTROL_SEEDS,
+        ),
+        code=collector_code("gpca.controls.severity:collect"),
+    output:
+        "<results>/control_severities.csv",
+    log:
+        "<logs>/control_severities.log",
+    benchmark:
+        "<benchmarks>/control_severities.tsv"
+    params:
+        collector="gpca.controls.severity:collect",
+        severities=config["registrations"]["severities"],
+        bins=CONTROLS["bins"],
+        success=CONTROLS["success"],
