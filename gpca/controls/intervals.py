@@ -1,7 +1,7 @@
 """Intervals of accuracies under the controls, and of what they lose against the paper's protocol.
 
 By the bootstrap over objects and seeds of :mod:`gpca.attribution.bootstrap`. A draw of objects and seeds is the same
-for all explainers and controls of a source, so that differences are paired, also where a control has other test samples.
+for all explainers and controls of a source, so that differences are paired, also where a control has other samples.
 """
 
 from __future__ import annotations
