@@ -73,8 +73,8 @@ def _samples(paths: list[str | Path]):
 
     parts = []
     for path in paths:
-        sets = Path(path).parts[-4] == "learners"
-        rows = read_predictions(path, sets=sets)
+        labels = ("set",) if Path(path).parts[-4] == "learners" else ()
+        rows = read_predictions(path, labels)
         parts.append(rows[rows["split"] == "test"].assign(seed=source_method_seed(path)[2]))
     rows = pd.concat(parts, ignore_index=True)
     return rows.assign(instance=rows["object"].map(instance_of))

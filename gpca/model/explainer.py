@@ -190,14 +190,14 @@ class Explainer:
         Raises:
             InputError: as :meth:`explain`, when the pair's turn comes; the line names the number of the pair, from 0.
         """
-        asked = {"uncertainty": uncertainty, "diagnose": diagnose, "method": method, "estimator": estimator}
+        asked = uncertainty, diagnose, method, estimator
         known, frame = None, None
         for number, (source_points, target_points, *init) in enumerate(pairs):
             try:
                 if frame is None or target_points is not known:
                     known, frame = target_points, CanonicalFrame.of(np.asarray(target_points, np.float64), unit)
                 T_init = init[0] if init else None
-                yield self.explain(source_points, target_points, T_init, unit, frame, **asked)
+                yield self.explain(source_points, target_points, T_init, unit, frame, *asked)
             except InputError as fault:
                 raise InputError(f"pair {number}", str(fault)) from fault
 
@@ -236,8 +236,9 @@ class Explainer:
         if fitness >= GOOD_FITNESS:
             return []
         distance = self.model.icp.correspondence_distance
-        _, *fits = (of_starts[0] for of_starts in icp.register(from_inverse, np.eye(4)[None]))
-        if clipped_cost(*fits, distance) < INVERSE_COST * clipped_cost(fitness, rmse, distance):
+        _, fitness_1, rmse_1 = icp.register(from_inverse, np.eye(4)[None])
+        found, of_inverse = clipped_cost(np.append(fitness, fitness_1), np.append(rmse, rmse_1), distance)
+        if of_inverse < INVERSE_COST * found:
             return ["the inverse of the initial pose fits far better: is it T_source_target?"]
         return []
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING
 
+from gpca.attribution.bootstrap import REPEATS
 from gpca.controls.settings import PAPER, TRANSFER, WRONG_LABELS
-from gpca.diagnosis.intervals import REPEATS
 from gpca.diagnosis.judged import POOLED
 from gpca.objects.title import stand_in_clause, title_of
 from gpca.reporting.tables.builder import TableBuilder, rows_where
