@@ -62,12 +62,8 @@ class AnalyticalGPC:
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the features, the point-count ratio last, unless they are attached already."""
-        settings = {"shape_points": self._shape_points, "neighbours": self._neighbours}
-        return measured(
-            registrations,
-            self._prefix,
-            lambda: {"features": analytical_features(registrations, *self._axes, **settings)},
-        )
+        measure = partial(analytical_features, shape_points=self._shape_points, neighbours=self._neighbours)
+        return measured(registrations, self._prefix, lambda: {"features": measure(registrations, *self._axes)})
 
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the features (N, F) of :func:`gpca.explainers.analytical_features.analytical_features`."""

@@ -7,6 +7,7 @@ and spreads the Monte-Carlo poses of ICP. Like GP-CA it learns from the labels o
 
 from __future__ import annotations
 
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -105,8 +106,8 @@ def residuals_forest(source: str, seed: int, trees: int = 200, floor: float = FL
     return Residuals(RandomForestClassifier(n_estimators=trees, random_state=random_state), floor)
 
 
-_OBSERVED = {"reads": "uncertainty/removal", "observed_only": True}
+_entry = partial(ExplainerEntry, reads="uncertainty/removal", observed_only=True)
 EXPLAINERS = {
-    "residuals_logistic": ExplainerEntry("Residuals (logistic regression)", residuals_logistic, **_OBSERVED),
-    "residuals_forest": ExplainerEntry("Residuals (random forest)", residuals_forest, **_OBSERVED),
+    "residuals_logistic": _entry("Residuals (logistic regression)", residuals_logistic),
+    "residuals_forest": _entry("Residuals (random forest)", residuals_forest),
 }

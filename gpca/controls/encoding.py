@@ -43,7 +43,7 @@ def encode(
     return {"h": h_S_d, "head_logits": logits_S_C, **of_sample}, curve
 
 
-def nothing() -> dict[str, np.ndarray]:
-    """Return the arrays of a file of embeddings without samples: what there is where a control is left out."""
+def nothing() -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
+    """Return what there is where a control is left out: arrays without samples, and no epoch."""
     empty = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
-    return empty | {"sample": np.zeros(0, int), "split": np.zeros(0, "U5")}
+    return {**empty, "sample": np.zeros(0, int), "split": np.zeros(0, "U5")}, []

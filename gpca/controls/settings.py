@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from gpca.errors import InputError
 from gpca.settings import Bounds, Count, PositiveShare
@@ -56,5 +56,7 @@ class ControlSettings:
     @classmethod
     def from_dict(cls, settings: dict) -> ControlSettings:
         """Build from the config's section ``controls``; its explainers are not among the settings."""
-        given = {name: value for name, value in settings.items() if name != "explainers"}
-        return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})
+        given: dict[str, Any] = {name: value for name, value in settings.items() if name != "explainers"}
+        for name in {"controls", "draw_points"} & set(given):
+            given[name] = tuple(given[name])
+        return cls(**given)

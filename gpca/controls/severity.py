@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from gpca.controls.settings import PAPER
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
+from gpca.pairs.synthesis import RegistrationSettings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +28,7 @@ COLUMNS = ("concept", "method", "low", "high", "other_low", "other_high", "sampl
 def collect(
     prediction_files: Iterable[str | Path],
     sample_files: Iterable[str | Path],
-    severities: Mapping[str, list[float]],
+    severities: dict[str, list[float]],
     bins: int,
     success: float,
 ) -> pd.DataFrame:
@@ -44,7 +45,7 @@ def collect(
     """
     import pandas as pd
 
-    ranges = Severities(**{name: tuple(limits) for name, limits in severities.items()})
+    ranges = RegistrationSettings.from_dict({"severities": severities}).severities
     judged = read_controls(prediction_files)
     judged = judged[judged["control"] == PAPER]
     samples = []
@@ -83,7 +84,8 @@ def read_severities(path: str | Path) -> pd.DataFrame:
 
 
 def _edges(ranges: Severities, name: str, bins: int) -> np.ndarray:
-    return np.linspace(*getattr(ranges, name), bins + 1)
+    low, high = getattr(ranges, name)
+    return np.linspace(low, high, bins + 1)
 
 
 def _bin(severity: str) -> str:

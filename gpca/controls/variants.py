@@ -64,7 +64,8 @@ def thinned(registrations: Registrations, points: tuple[int, int], *axes: object
         count = min(int(random.integers(points[0], points[1] + 1)), len(cloud))
         clouds.append(cloud[np.sort(random.permutation(len(cloud))[:count])])
     targets = [registrations.target(row) for row in range(len(registrations))]
-    return replace(registrations, **ragged(clouds, targets))
+    thin: dict[str, Any] = ragged(clouds, targets)
+    return replace(registrations, **thin)
 
 
 def of_unseen_objects(registrations: Registrations, folds: int, source: str, seed: int) -> Registrations:

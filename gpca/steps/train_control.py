@@ -44,7 +44,7 @@ def run(options: Namespace) -> None:
         registrations = Registrations.load(options.registrations)
         if why := left_out(options.control, registrations, settings, encoder.backbone):
             print(f"control '{options.control}' of {options.source} is left out: {why}", file=sys.stderr)
-            arrays, curve = nothing(), []
+            arrays, curve = nothing()
         else:
             axes = (options.source, options.seed, settings, encoder, checkpoint)
             arrays, curve = encode(options.control, registrations, *axes)

@@ -50,14 +50,16 @@ def draw_severity_curves(
         raise InputError("severities", "hold none of these explainers", "run the controls first")
     use_style()
     import matplotlib.pyplot as plt
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     maps = [REGISTRATION, *shown]
     lines = -(-len(maps) // WIDEST)
     heights_in = [2.1, *[1.62] * lines]
     height_in = sum(heights_in) + 0.95
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in), layout="constrained")
-    figure.get_layout_engine().set(rect=(0, 0.0, 1, 1 - 0.2 / height_in))
-    upper, lower = figure.subfigures(2, 1, height_ratios=[heights_in[0] + 0.55, sum(heights_in[1:]) + 0.2])
+    below_title = ConstrainedLayoutEngine(rect=(0, 0, 1, 1 - 0.2 / height_in))
+    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in), layout=below_title)
+    grid = figure.add_gridspec(2, 1, height_ratios=[heights_in[0] + 0.55, sum(heights_in[1:]) + 0.2])
+    upper, lower = figure.add_subfigure(grid[0]), figure.add_subfigure(grid[1])
     panels = upper.subplots(1, len(CURVES), sharey=True)
     for panel, (concept, label) in zip(panels, CURVES.items(), strict=True):
         of_concept = severities[severities["concept"] == concept]
