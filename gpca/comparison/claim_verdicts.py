@@ -156,8 +156,8 @@ def _of_runtime(claim: Claim, compared: Compared, rows: pd.DataFrame, levels: It
     """Compare mean seconds that were measured apart from one another; of logarithms by the delta method."""
     from scipy.stats import t as student_t
 
-    found = [runtime_mean(rows, place) for place in (compared.one, compared.other)]
-    if None in found:
+    found = [mean for place in compared.counterparts if (mean := runtime_mean(rows, place)) is not None]
+    if len(found) < 2:
         return None
     (one, error, n), (other, other_error, other_n) = found
     n = min(n, other_n)

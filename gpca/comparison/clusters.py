@@ -52,13 +52,13 @@ def cluster_intervals(
     """
     counterparts: dict[Folder, set[Counterpart]] = defaultdict(set)
     for number in numbers:
-        if folder := folder_behind(number.counterpart):
+        if number.counterpart and (folder := folder_behind(number.counterpart)):
             counterparts[folder].add(number.counterpart)
     files: dict[Folder, list[str | Path]] = defaultdict(list)
     for path in prediction_files:
         source, method, _ = source_method_seed(path)
         files[Path(path).parts[-4], source, method].append(path)
-    found = {}
+    found: dict[Counterpart, tuple[float, float]] = {}
     for folder, of_folder in counterparts.items():
         if folder in files:
             rows = _samples(files[folder])

@@ -139,7 +139,7 @@ class Number:
     counterpart: Counterpart | None
     note: str
     paper_n: int = 0
-    same_as: tuple[str, str, str] | None = None
+    same_as: tuple[str, ...] = ()
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -247,7 +247,7 @@ def _number(where: str, fields: dict[str, str]) -> Number:
         decimals=decimals,
         counterpart=_counterpart(where, fields),
         paper_n=paper_n,
-        same_as=tuple(fields["same_as"].split(" / ")) if fields["same_as"] else None,
+        same_as=tuple(filter(None, fields["same_as"].split(" / "))),
     )
 
 
@@ -293,5 +293,5 @@ def require_known(where: str, name: str, given: str, known: Iterable[str]) -> st
     return given
 
 
-def _named(key: tuple[str, str, str]) -> str:
+def _named(key: tuple[str, ...]) -> str:
     return " / ".join(key)

@@ -101,7 +101,8 @@ def deviation_interval(deviation: float, n: int) -> tuple[float, float]:
     """Return the 95 % chi-square interval of the standard deviation of n normal repeats."""
     from scipy.stats import chi2
 
-    return tuple(deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
+    low, high = (deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
+    return low, high
 
 
 def of_seeds(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, bool]:

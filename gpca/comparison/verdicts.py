@@ -76,7 +76,8 @@ def compare(
     deviations: dict[Counterpart | None, Number] = {
         n.counterpart: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"
     }
-    records, values = [], {}
+    records: list[dict] = []
+    values: dict[tuple[str, ...], Reproduced | None] = {}
     for number in numbers:
         if number.unit not in tolerances:
             raise InputError("config key comparison.tolerances", f"no unit '{number.unit}'", "give its tolerance")
@@ -85,7 +86,7 @@ def compare(
         found = values[number.key] = value_of_run(number, results, clusters)
         tolerance = tolerances[number.unit]
         verdict, reason = _judge(number, printed, found, objects, tolerance, reasons)
-        first = values.get(number.same_as) if number.same_as else None
+        first = values.get(number.same_as)
         repeats = first is not None and found is not None and (first.value, first.n) == (found.value, found.n)
         records.append(
             {

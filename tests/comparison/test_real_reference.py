@@ -6,10 +6,13 @@ import yaml
 
 from gpca.code_files import ROOT
 from gpca.comparison.chance import ALL, chance
+from gpca.comparison.claim_verdicts import read_verdicts
+from gpca.comparison.claims import read_claims
 from gpca.comparison.published import read_published
 from gpca.comparison.reasons import NONE_YET, read_reasons
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_RUN, VERDICTS, Tolerance, compare
+from gpca.reporting.tables.claims import counted
 from gpca.reporting.tables.comparison import counts_table, summary
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
@@ -62,6 +65,13 @@ def test_every_repeat_has_the_value_that_was_judged(shown):
     repeats = shown[shown["repeat_of"] != ""]
     assert len(repeats) == 8
     assert repeats["reproduced"].tolist() == [values[key] for key in repeats["repeat_of"]]
+
+
+def test_the_readme_counts_the_sentences_of_the_reference():
+    verdicts = read_verdicts(ROOT / "results/reference/real/claims.csv")
+    assert list(dict.fromkeys(verdicts["claim"])) == [claim.name for claim in read_claims()]
+    assert counted(verdicts) in " ".join((ROOT / "README.md").read_text().split())
+    assert counted(verdicts) in (ROOT / "results/reference/real/tables/claims.md").read_text()
 
 
 def test_the_readme_counts_the_verdicts_of_the_reference(shown):
