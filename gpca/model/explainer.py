@@ -122,9 +122,9 @@ class Explainer:
                 warnings.append("no source point is near the target at the initial pose, so the scores mean nothing")
             if fitness < GOOD_FITNESS and T_target_source_init is not None:
                 from_inverse = frame.coordinates(transform(inverse(T_init), seen))
-                distance = self.model.icp.correspondence_distance
-                _, *fits = (of_starts[0] for of_starts in icp.register(from_inverse, np.eye(4)[None]))
-                if clipped_cost(*fits, distance) < INVERSE_COST * clipped_cost(fitness, rmse, distance):
+                if self._cost(*icp.register(from_inverse, np.eye(4)[None])[1:]) < INVERSE_COST * self._cost(
+                    fitness, rmse
+                ):
                     warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         spread = None
         if uncertainty is not None:
@@ -206,6 +206,10 @@ class Explainer:
         if len(kept) < len(points):
             notes.append(f"{role}: {len(kept)} of {len(points)} points, drawn at random")
         return kept
+
+    def _cost(self, fitness: float | np.ndarray, rmse: float | np.ndarray) -> float:
+        """Return the mean squared distance of one registration, cut off at the correspondence distance."""
+        return float(np.squeeze(clipped_cost(fitness, rmse, self.model.icp.correspondence_distance)))
 
     def _icp(self, target: np.ndarray) -> BatchedICP:
         settings = self.model.icp
