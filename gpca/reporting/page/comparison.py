@@ -48,8 +48,9 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
         return None
     rows = read_csv(path, _COLUMNS)
     words = [_words(path, row) for row in rows.to_dict("records")]
-    of_reference = reference is not None and not set(TONES) & set(rows["verdict"])
-    if of_reference:
+    of_reference = False
+    if reference is not None and not set(TONES) & set(rows["verdict"]):
+        of_reference = True
         here = {_key(row): row["reproduced"] for row in words}
         rows = read_csv(reference, _COLUMNS)
         words = [_words(reference, row) for row in rows.to_dict("records")]
