@@ -158,7 +158,7 @@ def test_an_estimator(config, added_modules, objects):
     from gpca.alignment.methods.interface import Pair
     from gpca.alignment.methods.registry import make_method
     from gpca.uncertainty.estimators.interface import RegisteredPair
-    from gpca.uncertainty.estimators.registry import estimator_module, estimators, make_estimator
+    from gpca.uncertainty.estimators.registry import estimator_module, estimators
 
     added_modules("gpca/uncertainty/estimators/sensitivity.py")
     assert estimators()["sensitivity"].title == "First order in the start"
@@ -170,8 +170,10 @@ def test_an_estimator(config, added_modules, objects):
     registered = RegisteredPair(pair, make_method("point_to_point")(pair), "point_to_point", np.full(6, 0.03))
     names = {"registered": registered}
     exec(block("estimate.py"), names)
-    found = names["estimate"].covariance_6_6
-    assert np.trace(found) == pytest.approx(np.trace(make_estimator("monte_carlo")(registered).covariance_6_6), rel=2)
+    steps = 0.25 * 0.03 * np.concatenate([np.eye(6), -np.eye(6)])
+    expected = sum(np.outer(twist, twist) for twist in registered.twists_from(steps)) / (2 * 0.25**2)
+    assert names["estimate"].covariance_6_6 == pytest.approx(expected)
+    assert np.trace(expected) > 0
 
 
 def test_a_recovery_action_passes_the_check(config, monkeypatch):

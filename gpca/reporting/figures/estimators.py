@@ -196,7 +196,7 @@ def _draw_scatter(panel, rows: pd.DataFrame, title: str, limits, left: bool, bel
     panel.tick_params(which="both", pad=1.5, length=2, labelleft=left, labelbottom=below)
     decades = 10.0 ** np.arange(np.ceil(np.log10(limits[0])), np.floor(np.log10(limits[1])) + 1)
     for axis in (panel.xaxis, panel.yaxis):
-        axis.set_major_locator(FixedLocator(decades))
+        axis.set_major_locator(FixedLocator(decades.tolist()))
         axis.set_major_formatter("{x:g}")
         axis.set_minor_locator(NullLocator())
 
