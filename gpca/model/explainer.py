@@ -248,10 +248,6 @@ class Explainer:
             notes.append(f"{role}: {len(kept)} of {len(points)} points, drawn at random")
         return kept
 
-    def _cost(self, fitness: float | np.ndarray, rmse: float | np.ndarray) -> float:
-        """Return the mean squared distance of one registration, cut off at the correspondence distance."""
-        return float(np.squeeze(clipped_cost(fitness, rmse, self.model.icp.correspondence_distance)))
-
     def _icp(self, target: np.ndarray) -> BatchedICP:
         settings = self.model.icp
         return BatchedICP(target, settings, None if settings.method == "point_to_point" else estimate_normals(target))
