@@ -60,8 +60,9 @@ def estimated_spread(
         source, target: in diameters; thinned to the settings' points.
         outcome, method: what was found, and by which registration method.
     """
-    points = (thin(cloud, settings.icp_points, role) for cloud, role in ((source, "spread"), (target, "spread target")))
-    pair = Pair(*points, seed=seed_of("explanation", "estimate")).with_normals()
+    source = thin(source, settings.icp_points, "spread")
+    target = thin(target, settings.icp_points, "spread", "target")
+    pair = Pair(source, target, seed=seed_of("explanation", "estimate")).with_normals()
     said = estimate(RegisteredPair(pair, outcome, method, settings.deviation_6()))
     if said.covariance_6_6 is None:
         return None, f"{name} gives no covariance: {said.failure}"
