@@ -60,7 +60,8 @@ def estimated_spread(
         source, target: in diameters; thinned to the settings' points.
         outcome, method: what was found, and by which registration method.
     """
-    source, target = thin(source, settings.icp_points, "spread"), thin(target, settings.icp_points, "spread target")
+    source = thin(source, settings.icp_points, "spread")
+    target = thin(target, settings.icp_points, "spread", "target")
     pair = Pair(source, target, seed=seed_of("explanation", "estimate")).with_normals()
     said = estimate(RegisteredPair(pair, outcome, method, settings.deviation_6()))
     if said.covariance_6_6 is None:
