@@ -94,7 +94,7 @@ def test_the_settings_of_the_knobs_are_in_the_order_of_the_names(registrations, 
 
 
 def test_icp_runs_once_for_every_setting_that_differs(evaluated):
-    runs = {"additive": 11, "latin": 25, "saltelli": 41, "oracle": 2, "removal": 8, "causal": 3}
+    runs = {"additive": 11, "latin": 25, "saltelli": 41, "oracle": 2, "removal": 8, "observed": 1, "causal": 3}
     for design, of_row in evaluated.items():
         for made in of_row.values():
             # Saltelli's scheme may hold a setting twice.
@@ -116,7 +116,7 @@ def test_the_observed_pair_is_the_same_in_every_design(registrations, evaluated)
     for row in evaluated["additive"]:
         observed = evaluated["additive"][row][0]
         assert not observed.degenerate
-        for design, condition in (("latin", 0), ("saltelli", 0), ("causal", 2), ("removal", 0)):
+        for design, condition in (("latin", 0), ("saltelli", 0), ("causal", 2), ("removal", 0), ("observed", 0)):
             assert np.array_equal(evaluated[design][row][condition].covariance, observed.covariance)
         for design in ("latin", "saltelli"):
             assert evaluated[design][row][0].residual == observed.residual
