@@ -98,7 +98,8 @@ class Explainer:
             _require_like_sizes(source, target)
             icp = self._icp(target)
         with _timed(seconds, "icp"):
-            T_icp, fitness, rmse = (of_starts[0] for of_starts in icp.register(source, np.eye(4)[None]))
+            T_icp_1, fitness_1, rmse_1 = icp.register(source, np.eye(4)[None])
+            T_icp, fitness, rmse = T_icp_1[0], fitness_1[0], rmse_1[0]
         found = None
         if diagnose and self.model.diagnoser is not None:
             with _timed(seconds, "diagnosis"):
@@ -123,7 +124,7 @@ class Explainer:
             if fitness < GOOD_FITNESS and T_target_source_init is not None:
                 from_inverse = frame.coordinates(transform(inverse(T_init), seen))
                 if self._cost(*icp.register(from_inverse, np.eye(4)[None])[1:]) < INVERSE_COST * self._cost(
-                    fitness, rmse
+                    fitness_1, rmse_1
                 ):
                     warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         spread = None
@@ -207,9 +208,9 @@ class Explainer:
             notes.append(f"{role}: {len(kept)} of {len(points)} points, drawn at random")
         return kept
 
-    def _cost(self, fitness: float | np.ndarray, rmse: float | np.ndarray) -> float:
-        """Return the mean squared distance of one registration, cut off at the correspondence distance."""
-        return float(np.squeeze(clipped_cost(fitness, rmse, self.model.icp.correspondence_distance)))
+    def _cost(self, fitness_1: np.ndarray, rmse_1: np.ndarray) -> float:
+        """Return the mean squared distance of a registration, cut off at the correspondence distance."""
+        return float(clipped_cost(fitness_1, rmse_1, self.model.icp.correspondence_distance)[0])
 
     def _icp(self, target: np.ndarray) -> BatchedICP:
         settings = self.model.icp
