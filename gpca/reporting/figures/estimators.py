@@ -14,6 +14,7 @@ from gpca.reporting.figures.style import (
     BLUE,
     GREEN,
     GREY,
+    LIGHT_GREY,
     ORANGE,
     PURPLE,
     SKY_BLUE,
@@ -40,7 +41,6 @@ STYLES = {  # An estimator has a colour and a line everywhere in the figure.
     "cello": (GREEN, "-"),
     "learned": (PURPLE, "-"),
 }
-SHADE = "#AAAAAA"  # of the reference's results
 _OTHER = (SKY_BLUE, "-")
 TURN = np.linspace(0, 2 * np.pi, 181)
 LEVELS = np.linspace(0.01, 0.99, 99)
@@ -167,7 +167,7 @@ def _draw_ellipses(panel, samples: ReferenceSamples, place: int, said: Mapping, 
     values_3, axes_3_3 = np.linalg.eigh(np.cov(twists_n_3, rowvar=False))
     plane_3_2 = axes_3_3[:, ::-1][:, :2]
     dots_n_2, true_2 = twists_n_3 @ plane_3_2, factor * samples.true_twist[place, block] @ plane_3_2
-    panel.scatter(*dots_n_2.T, s=1.2, color=SHADE, linewidths=0, rasterized=True, zorder=1)
+    panel.scatter(*dots_n_2.T, s=1.2, color=LIGHT_GREY, linewidths=0, rasterized=True, zorder=1)
     for name, row in said.items():
         if row is None or name == REFERENCE:
             continue
