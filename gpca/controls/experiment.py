@@ -14,12 +14,14 @@ from gpca.controls.settings import PAPER, RELABELLED, RETRAINED, TRANSFER, Contr
 from gpca.controls.variants import left_out, relabelled, variant
 from gpca.explainers.interface import ConceptExplainer, Describing
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.evaluation import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
+PARTS, FEWEST_OF_PART = 5, 60  # of the training samples whose labels are shuffled
 LABELS = ("control", "tested", "explainer")  # columns before those of a prediction file
 Embed = Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]
 
@@ -127,17 +129,38 @@ class Experiment:
         self, control: str, learnt: Registrations, tests: Mapping[str, Registrations]
     ) -> Iterator[pd.DataFrame]:
         """Yield what each explainer says of the test samples after learning from the training samples."""
-        train = learnt.subset(learnt.rows("train"))
-        if control in RELABELLED:
-            train = relabelled(control, train, self.source, self.seed)
-        for name, rival in self.rivals.items():
-            explainer = rival.make()
-            if control in RELABELLED and getattr(explainer, "trained_with_encoder", False):
-                continue
-            explainer.fit(train)
-            for tested, test in tests.items():
-                frame = prediction_frame(test, explainer.explain(test.without_labels()))
-                of_test = control if tested == self.source else TRANSFER
-                for place, entry in enumerate(zip(LABELS, (of_test, tested, name), strict=True)):
-                    frame.insert(place, *entry)
-                yield frame
+        for train, asked in self._lessons(control, learnt.subset(learnt.rows("train")), tests):
+            for name, rival in self.rivals.items():
+                explainer = rival.make()
+                if control in RELABELLED and getattr(explainer, "trained_with_encoder", False):
+                    continue
+                explainer.fit(train)
+                for tested, test in asked.items():
+                    frame = prediction_frame(test, explainer.explain(test.without_labels()))
+                    of_test = control if tested == self.source else TRANSFER
+                    for place, entry in enumerate(zip(LABELS, (of_test, tested, name), strict=True)):
+                        frame.insert(place, *entry)
+                    yield frame
+
+    def _lessons(
+        self, control: str, train: Registrations, tests: Mapping[str, Registrations]
+    ) -> Iterator[tuple[Registrations, Mapping[str, Registrations]]]:
+        """Yield training samples, and the test samples that are asked of what has learnt from them.
+
+        Labels that say nothing make an explainer name a whole cluster of samples by chance. So they are shuffled in
+        parts, of which each is learnt from alone and asked about a part of the test samples.
+        """
+        if control not in RELABELLED:
+            yield train, tests
+        elif control != "shuffled":
+            yield relabelled(control, train, self.source, self.seed), tests
+        else:
+            parts = max(1, min(PARTS, len(train) // FEWEST_OF_PART))
+            for part in range(parts):
+                of_part = relabelled(control, _dealt(train, part, parts), self.source, self.seed, part)
+                yield of_part, {name: _dealt(test, part, parts) for name, test in tests.items()}
+
+
+def _dealt(registrations: Registrations, part: int, parts: int) -> Registrations:
+    """Return one part of the samples, which are dealt out in threes: one object under every concept."""
+    return registrations.subset(np.flatnonzero(np.arange(len(registrations)) // len(CONCEPTS) % parts == part))

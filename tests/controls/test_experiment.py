@@ -8,7 +8,7 @@ from baselines.residuals import residuals_logistic
 from gpca.controls.experiment import Rival
 from gpca.controls.variants import of_unseen_objects
 
-from .conftest import Head, attached, experiment
+from .conftest import Head, Nearest, attached, experiment
 
 
 def share_right(rows, **wanted):
@@ -24,7 +24,7 @@ def test_every_explainer_says_something_of_every_test_sample_under_every_control
         *(six, "density", "unseen_objects", "reversed", "label_noise_30", "shuffled", "transfer"),
         embeddings={"density": attached(six), "unseen_objects": attached(of_unseen)},
     ).run(six, {"other": six})
-    counts = found.groupby(["control", "tested", "explainer"], sort=False).size()
+    counts = found.groupby(["control", "tested", "explainer"]).size()
     assert counts["paper", "tiny"].to_dict() == {"nearest": 18, "head": 18}
     assert counts["transfer", "other"].to_dict() == {"nearest": 18, "head": 18}
     assert counts["unseen_objects", "tiny"].tolist() == [(of_unseen.split == "test").sum()] * 2
@@ -44,6 +44,21 @@ def test_what_a_source_does_not_admit_is_left_out_and_named(registrations, capsy
         "controls of tiny: 'unseen_objects' is left out: it needs 5 objects or more, there are 3",
         "controls of tiny: 'transfer' is left out: it needs two sources or more",
     ]
+
+
+def test_shuffled_labels_are_learnt_in_parts_and_every_test_sample_is_asked_about_once(six, monkeypatch):
+    monkeypatch.setattr("gpca.controls.experiment.FEWEST_OF_PART", 12)
+    learnt = []
+
+    class Counting(Nearest):
+        def fit(self, registrations):
+            learnt.append(registrations.sample.tolist())
+            super().fit(registrations)
+
+    found = experiment(six, "shuffled", rivals={"counting": Rival(Counting, "embeddings")}).run(six, {})
+    assert [len(samples) for samples in learnt] == [36, 12, 12, 12]
+    assert sorted(sample for samples in learnt[1:] for sample in samples) == learnt[0]
+    assert sorted(found["sample"][found["control"] == "shuffled"]) == list(range(18))
 
 
 def test_an_explainer_cannot_see_what_was_perturbed(six):

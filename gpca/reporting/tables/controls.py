@@ -73,7 +73,8 @@ def table10_controls(
             f"{plural(table.most_seeds(), 'seed')}. {INTERVAL}",
             "Matched density: a random number of points of every cloud, in training and test. Unseen objects: encoder "
             "and explainer learnt from other objects. Other sources: they learnt from one other source. Wrong labels: "
-            "of the explainer's training samples. Shuffled labels teach nothing, and guessing gives 33.3.",
+            "of the explainer's training samples. Shuffled labels teach nothing: guessing gives "
+            "33.3, and in a single source and seed chance names whole clusters of samples.",
             "AUROC: how well the entropy of the scores tells the wrong from the right. A dash stands where a head is "
             "trained with the encoder and learns no labels, and where a source does not admit a control.",
         ),
