@@ -1,1 +1,1 @@
-"""Registration methods side by side: the same pairs registered by each of them, and judged by the true pose."""
+"""Registration methods side by side, and estimators of uncertainty: the same pairs, judged by the true pose."""

@@ -1,1 +1,1 @@
-"""Monte-Carlo ICP under the conditions that SHAP and sensitivity analysis ask for."""
+"""Monte-Carlo ICP under the conditions that SHAP and sensitivity analysis ask for, and estimators of covariance."""
