@@ -75,3 +75,8 @@ def read_by(cause_explainer):
     """Return the folder of what an explainer of causes reads."""
     entry = explainer_entry(cause_explainer, CAUSES)
     return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"
+
+
+def other_sources(wildcards):
+    """Return the sources that explainers of this one are asked about besides, where there is transfer."""
+    return [name for name in NAMES["transfer_source"] if name != wildcards.source]

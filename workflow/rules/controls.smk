@@ -15,11 +15,6 @@ CONTROL_SETTINGS = {
 }
 
 
-def other_sources(wildcards):
-    """Return the sources that explainers of this one are asked about besides, where there is transfer."""
-    return [name for name in NAMES["transfer_source"] if name != wildcards.source]
-
-
 rule controls:
     input:
         collect(
