@@ -114,7 +114,7 @@ def made_on(folder: Path, lines: list[list[str]], **variables: str) -> dict[str,
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in folder.rglob("*")
-        if path.is_file() and path.name not in SECONDS and not path.name.endswith(".provenance.json")
+        if path.is_file() and path.name not in SECONDS and not path.name.endswith(("_seconds.csv", ".provenance.json"))
     }
 
 

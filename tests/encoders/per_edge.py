@@ -11,7 +11,8 @@ class PerEdgeConv(nn.Module):
         self.linear = nn.Linear(2 * in_features, out_features, bias=False)
         self.norm = nn.BatchNorm2d(out_features)
 
-    def forward(self, x_B_N_F):
+    def forward(self, x_B_N_F, sizes=None):
+        assert sizes is None, "clouds of unlike sizes are not in the reference"
         batch = len(x_B_N_F)
         squares = x_B_N_F.square().sum(-1, keepdim=True)
         distances = squares - 2 * x_B_N_F @ x_B_N_F.transpose(1, 2) + squares.transpose(1, 2)

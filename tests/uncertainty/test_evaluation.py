@@ -34,7 +34,7 @@ def test_without_a_number_all_rows_of_the_designs_splits_are_evaluated(registrat
     rows = design_rows(registrations, design, None)
     expected = np.isin(registrations.split, DESIGNS[design].splits)
     assert np.array_equal(rows, np.flatnonzero(expected))
-    assert len(rows) == (54 if design == "removal" else 18)
+    assert len(rows) == (54 if "train" in DESIGNS[design].splits else 18)
 
 
 @pytest.mark.parametrize("samples", [3, 6, 9, 18])
@@ -94,7 +94,7 @@ def test_outcomes_are_finite_and_measured_against_the_reference(registrations, d
     for k in range(shape[1]):
         clean, other = outcomes.covariance[1, entry.reference], outcomes.covariance[1, k]
         assert outcomes.uncertainty[1, k] == pytest.approx(divergence(clean, other, SETTINGS.floor), rel=1e-6, abs=1e-6)
-    assert outcomes.uncertainty.max() > 0.5
+    assert shape[1] == 1 or outcomes.uncertainty.max() > 0.5
     assert outcomes.icp_calls.max() == 13
     assert seconds_S_K.shape == icp_seconds_S_K.shape == shape
     assert (seconds_S_K >= icp_seconds_S_K).all() and (icp_seconds_S_K[outcomes.icp_calls > 0] > 0).all()
