@@ -6,8 +6,9 @@
 Snakemake's plan of the whole run (a dry run, nothing is made) says which jobs a target needs; the run's benchmark files
 say how long each took and how much memory it held. Core time is the sum over those jobs. Wall time is that of a
 schedule which starts the next job as soon as a core is free, the higher priority first: without Snakemake's own start,
-some ten seconds. A job that was killed and continued counts with its last part alone. --write puts the table between
-the two comments that the page has for the run. The last line is a JSON object of the target `all`.
+some ten seconds. A job that was killed and continued counts with its last part alone. --write puts the rows of the
+tables, the model and the whole run between the two comments that the page has for the run; all rows are printed. The
+last line is a JSON object of the target `all`.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from gpca.errors import InputError  # noqa: E402
 from gpca.files import whole_file  # noqa: E402
 
 TARGETS = re.compile(r"(tables/\w+\.md|figures/\w+\.png|[\w.]+)$")  # and what lies in the run's folder itself
+ON_PAGE = re.compile(r"tables/|model\.pt$|all$")  # a figure takes about what the table of the same results takes
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--configfile", type=Path, help="as for snakemake; by default config/{run}.yaml where it is")
     parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
     parser.add_argument("--cores", type=int, default=2, help="of the wall time, default 2")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the table")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the rows")
     options = parser.parse_args(arguments)
     try:
         if not (options.folder / "benchmarks").is_dir():
@@ -67,13 +69,13 @@ def main(arguments: list[str] | None = None) -> int:
         run = options.folder.resolve().name
         jobs = read_plan(plan(run, options.configfile, options.config), run)
         costs = {target: cost(needed, options.folder, options.cores) for target, needed in targets(jobs).items()}
-        lines = table(costs, options.cores)
         if options.write:
-            write_between(options.write, f"results/{run}", lines)
+            shown = {target: of_target for target, of_target in costs.items() if ON_PAGE.match(target)}
+            write_between(options.write, f"results/{run}", table(shown, options.cores))
     except InputError as fault:
         print(f"targets: {fault}", file=sys.stderr)
         return 2
-    print("\n".join(lines))
+    print("\n".join(table(costs, options.cores)))
     print(json.dumps(vars(costs["all"]) if costs["all"] else {}))
     return 0
 

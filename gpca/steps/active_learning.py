@@ -32,8 +32,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--registrations", required=True, type=Path)
-    parser.add_argument("--embeddings", required=True, type=Path, help="of an encoder that saw every concept")
-    parser.add_argument("--embeddings-without", required=True, type=Path, help="of encoders that never saw one")
+    parser.add_argument("--embeddings", required=True, type=Path, help="by an encoder that saw every concept")
+    parser.add_argument("--embeddings-without", required=True, type=Path, help="by encoders that never saw one of them")
     parser.add_argument("--strategies", required=True, nargs="+")
     parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSV for each strategy, in their order")
 

@@ -16,7 +16,7 @@ from gpca.errors import InputError
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the configs."""
-    parser.add_argument("configs", nargs="*", type=Path, help="laid over the default in this order, as --configfile")
+    parser.add_argument("configs", nargs="*", type=Path, help="merged into the default in this order")
 
 
 def run(options: Namespace) -> None:

@@ -20,7 +20,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, help="folder of the run, such as results/real")
     parser.add_argument("--reference", type=Path, help="its reference (default: reference/ beside it, same name)")
     parser.add_argument(
-        "--config", type=Path, default=CONFIG, help=f"file whose section reference says what agrees (default: {CONFIG})"
+        "--config",
+        type=Path,
+        default=CONFIG,
+        help=f"config whose section 'reference' sets the tolerances (default: {CONFIG})",
     )
 
 

@@ -31,7 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--causes", required=True, type=Path, nargs="+", help="one per seed")
     parser.add_argument("--samples", required=True, type=Path, nargs="+", help="npz of the reference, one per seed")
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs of the reference, then one by one")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs: reference, then each estimator")
     parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of their seconds, in that order")
 
 

@@ -24,17 +24,17 @@ def add_arguments(parser: ArgumentParser) -> None:
         "source", type=Path, nargs="+", help="what was observed: points or a mesh (PLY, PCD, OBJ, STL, OFF)"
     )
     parser.add_argument("target", type=Path, help="the reference that each of them is aligned to")
-    parser.add_argument("--init", type=Path, help="text file of T_target_source where ICP starts, 4×4 numbers")
-    parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="of files and pose (default m)")
-    parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, or one in ./results/")
-    parser.add_argument("--method", help="registration method by its name, gicp for one; by default the model's ICP")
+    parser.add_argument("--init", type=Path, help="text file with the 4×4 numbers of T_target_source")
+    parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="unit of files and pose (default m)")
+    parser.add_argument("--model", type=Path, help="model file (default: GPCA_MODEL, or one in ./results/)")
+    parser.add_argument("--method", help="registration method, such as gicp (default: the model's ICP)")
     parser.add_argument(
         "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
         help="measure how uncertain the pose is, by an estimator such as brossard; by default Monte-Carlo",
     )  # fmt: skip
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
-    form.add_argument("--json-lines", action="store_true", help="print a JSON object in a line for each source")
+    form.add_argument("--json-lines", action="store_true", help="print one line of JSON for each source")
 
 
 def run(options: Namespace) -> None:

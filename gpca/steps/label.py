@@ -34,14 +34,14 @@ COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` are those of the classifier, as of the explainer ``gpca``."""
     parser.add_argument("registrations", type=Path)
-    parser.add_argument("--embeddings", required=True, type=Path, help="of 'python -m gpca embed'")
+    parser.add_argument("--embeddings", required=True, type=Path, help="as the step embed writes them")
     parser.add_argument("--labels", required=True, type=Path, help="CSV of the answers; it is appended to")
     parser.add_argument("--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labelled before")
-    parser.add_argument("--initial", type=COUNT, default=60, help="how many samples of these (default 60)")
+    parser.add_argument("--initial", type=COUNT, default=60, help="samples labelled before (default 60)")
     parser.add_argument("--batch", type=COUNT, default=4, help="questions between two retrainings (default 4)")
-    parser.add_argument("--questions", type=COUNT, default=20, help="at most so many in this session (default 20)")
-    parser.add_argument("--strategy", default="bald_kmeans", help="what is asked (default bald_kmeans, the paper's)")
-    parser.add_argument("--picture", type=Path, default=Path("query.png"), help="drawn anew for every question")
+    parser.add_argument("--questions", type=COUNT, default=20, help="at most in this session (default 20)")
+    parser.add_argument("--strategy", default="bald_kmeans", help="picks the questions (default bald_kmeans)")
+    parser.add_argument("--picture", type=Path, default=Path("query.png"), help="redrawn for every question")
     parser.add_argument("--answers", type=Path, help="a file with an answer on each line, instead of the terminal")
     parser.add_argument("--predictions", type=Path, help="CSV of what the classifier says of every sample at the end")
 

@@ -22,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--learners", required=True, nargs="+")
-    parser.add_argument("--sets", required=True, type=Path, nargs="+", help="one per seed, of python -m gpca shift")
+    parser.add_argument("--sets", required=True, type=Path, nargs="+", help="files of the step shift, one per seed")
     parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one learner after the other")
 
 

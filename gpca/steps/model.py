@@ -42,15 +42,21 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config."""
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--title", required=True, help="of the objects, as explanations name them")
+    parser.add_argument("--title", required=True, help="title of the objects, as explanations show it")
     parser.add_argument("--stand-in", action="store_true", help="the objects were drawn by the package")
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--encoder", required=True, type=Path, help="weights")
-    parser.add_argument("--embeddings", required=True, type=Path, help="of that encoder")
+    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings by that encoder")
     parser.add_argument(
-        "--causes", required=True, type=Path, nargs="+", help="of every source, what is observed moving"
+        "--causes",
+        required=True,
+        type=Path,
+        nargs="+",
+        help="measured causes, a file per source; the observed cloud moves",
     )
-    parser.add_argument("--descriptors", required=True, type=Path, nargs="+", help="of these, in the same order")
+    parser.add_argument(
+        "--descriptors", required=True, type=Path, nargs="+", help="their descriptors, in the same order"
+    )
     parser.add_argument("--out", required=True, type=Path)
 
 

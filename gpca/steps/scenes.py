@@ -15,7 +15,7 @@ from gpca.settings import check_settings
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the config's section ``real_world.scenes``."""
     parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
-    parser.add_argument("--out", required=True, type=Path, help="folder; one that is there is replaced")
+    parser.add_argument("--out", required=True, type=Path, help="folder; an existing one is replaced")
 
 
 def run(options: Namespace) -> None:
