@@ -132,12 +132,15 @@ class PairClassifier:
         return float(np.quantile(_to_nearest(known, known, 1), USUAL))
 
     def state(self) -> dict[str, object]:
-        """Return all that was learnt, for :meth:`from_state`."""
-        return {
-            "quantiles": self.normalised.state(),
-            "failure": self._failure.state(),
-            "causes": [gpc.state() for gpc in self._causes],
-        }
+        """Return all that was learnt, for :meth:`from_state`.
+
+        All four learnt the same inputs, two thirds of all numbers here: as one tensor, a file holds them once.
+        """
+        failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
+        for state in causes:
+            if torch.equal(state["labelled"], failure["labelled"]):
+                state["labelled"] = failure["labelled"]
+        return {"quantiles": self.normalised.state(), "failure": failure, "causes": causes}
 
     @classmethod
     def from_state(cls, state: dict) -> PairClassifier:
