@@ -131,6 +131,11 @@ class PairClassifier:
         known = self._failure.learnt_N_d
         return float(np.quantile(_to_nearest(known, known, 1), USUAL))
 
+    @property
+    def samples(self) -> int:
+        """How many it learnt."""
+        return len(self._failure.learnt_N_d)
+
     def state(self) -> dict[str, object]:
         """Return all that was learnt, for :meth:`from_state`.
 
