@@ -120,12 +120,15 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
     changes = origin.record["settings"].get("model", {}).get("causes", {})
     return [
         "Of classifiers of these kinds in the run that made this model, on objects that they had not learnt, with "
-        "intervals (95 %) over objects and seeds. The model itself then learnt all objects, so nothing is left to test "
-        "it on. The registrations of these scores were drawn as the section `causes` of the config says; those that "
-        f"the model learnt differ from them by `{json.dumps(changes, sort_keys=True)}`.",
+        "95\u00a0% intervals over objects and seeds. The model itself then learnt all objects, so nothing is left to "
+        "test it on. The registrations of these scores were drawn as the section `causes` of the config says; those "
+        "that the model learnt were drawn with these changes:",
+        "\n".join(f"- `{name}: {json.dumps(value, sort_keys=True)}`" for name, value in sorted(changes.items()))
+        or "- none",
         _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows),
-        f"False alarms: share of the nominal above the alarm that finds {RECALL:.0%} of the failed. The truth, measured "
-        "again from other starts, is the most that can be expected. docs/causes.md defines every measure.",
+        f"False alarms: share of the nominal above the alarm that finds {100 * RECALL:g}\u00a0% of the failed. The "
+        "truth, measured again from other starts, is the most that can be expected. docs/causes.md defines every "
+        "measure.",
     ]
 
 
@@ -143,10 +146,9 @@ def _limits(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
     ranges = model.familiar.ranges.items() if model.familiar else ()
     familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in ranges)
     return [
-        f"Failed means an error above {causes['limits']['failed']:g} of the diameter. A task of yours may need another "
-        "limit.",
-        f"The diagnosis learnt {severities} (lengths in diameters; crop and outliers in shares of the points), clouds of "
-        "{} to {} points, and ICP `{}`. What lies outside is a guess.".format(*causes["points"], model.icp.method),
+        f"Failed means an error above {causes['limits']['failed']:g} of the diameter. A task may need another limit.",
+        f"The diagnosis learnt {severities} (lengths in diameters; crop and outliers in shares of the points), clouds "
+        "of {} to {} points, and ICP `{}`. What lies outside is a guess.".format(*causes["points"], model.icp.method),
         f"The threshold of {diagnoser.threshold:.3f} was chosen so that at most {settings['model']['false_alarms']:g} "
         "of the nominal registrations of objects that a first classifier had not learnt are called failed.",
         f"It knows the causes {', '.join(CONCEPTS)}. Whatever else is wrong, such as the wrong object or a sensor's "

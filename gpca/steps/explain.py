@@ -26,7 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("target", type=Path, help="the reference that each of them is aligned to")
     parser.add_argument("--init", type=Path, help="text file of T_target_source where ICP starts, 4×4 numbers")
     parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="of files and pose (default m)")
-    parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, or one in ./results/")
+    parser.add_argument("--model", type=Path, help="by default that of GPCA_MODEL, one in ./results/, or the package's")
     parser.add_argument("--method", help="registration method by its name, gicp for one; by default the model's ICP")
     parser.add_argument(
         "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
