@@ -142,8 +142,8 @@ class PairClassifier:
         All four learnt the same inputs, two thirds of all numbers here: as one tensor, a file holds them once.
         """
         failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
-        for state in causes:
-            if torch.equal(state["labelled"], failure["labelled"]):
+        for gpc, state in zip(self._causes, causes, strict=True):
+            if np.array_equal(gpc.learnt_N_d, self._failure.learnt_N_d):
                 state["labelled"] = failure["labelled"]
         return {"quantiles": self.normalised.state(), "failure": failure, "causes": causes}
 
