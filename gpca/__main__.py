@@ -41,6 +41,7 @@ STEPS = {
     "recover": "settings -> failures on virtual scenes, and what every policy of recovery makes of them",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
     "model": "encoder and embeddings -> one file with all that an explanation needs",
+    "ship": "model of a run -> the model that comes with the package, and its card",
     "explain": "files of points -> why their registration is uncertain, and what to do",
     "runtime": "model, registrations and embeddings -> seconds of every stage",
     "check-config": "configs -> whether a run can use them",

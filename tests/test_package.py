@@ -11,6 +11,10 @@ import pytest
 import yaml
 
 import gpca
+from gpca.files import sha256_of_file
+from gpca.model.explainer import Explainer
+from gpca.model.file import SHIPPED, Model
+from gpca.steps.ship import LARGEST_BYTES
 
 from .documents import ROOT
 
@@ -64,6 +68,7 @@ def test_the_wheel_holds_every_module_and_every_data_file_and_nothing_else(wheel
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert names == files_of(ROOT)
+    assert ("gpca/model/shipped.pt" in names) == SHIPPED.is_file()
     assert {"gpca/py.typed", "baselines/py.typed", "gpca/config/config.schema.yaml"} <= names
 
 
@@ -103,7 +108,8 @@ def test_the_command_runs_anywhere(installed, tmp_path):
     assert run("--help").stdout.startswith("usage: gpca ")
     missing = run("explain", "a.ply", "b.ply")
     assert missing.returncode == 2
-    assert missing.stderr.startswith(f"gpca explain: no model: none in {tmp_path}/results; ")
+    lost = "a.ply: no such file" if SHIPPED.is_file() else f"no model: none in {tmp_path}/results; "
+    assert missing.stderr.startswith(f"gpca explain: {lost}")
     (tmp_path / "run").mkdir()
     missing = run("check-reference", "run")
     assert missing.returncode == 2
@@ -111,6 +117,19 @@ def test_the_command_runs_anywhere(installed, tmp_path):
         "gpca check-reference: config/config.yaml: no such file; "
         "run this in the folder of the suite, or name the file with --config\n"
     )
+
+
+def test_a_model_comes_with_its_card_and_no_page_promises_one_that_is_not_there(registrations):
+    card = SHIPPED.with_suffix(".md")
+    assert card.is_file() == SHIPPED.is_file()
+    if SHIPPED.is_file():
+        assert SHIPPED.stat().st_size <= LARGEST_BYTES
+        assert f"| SHA-256 | `{sha256_of_file(SHIPPED)}` |" in card.read_text()
+        model = Model.load(SHIPPED)
+        assert not model.stand_in
+        source, target = registrations.cloud(0), registrations.target(0)
+        assert Explainer(model).explain(source, target).diagnosis.state in ("nominal", "failed")
+    assert SHIPPED.is_file() or "with the model that comes with it" not in (ROOT / "README.md").read_text()
 
 
 def test_its_data_code_and_provenance_are_its_own(installed, tmp_path):

@@ -131,13 +131,21 @@ class PairClassifier:
         known = self._failure.learnt_N_d
         return float(np.quantile(_to_nearest(known, known, 1), USUAL))
 
+    @property
+    def samples(self) -> int:
+        """How many it learnt."""
+        return len(self._failure.learnt_N_d)
+
     def state(self) -> dict[str, object]:
-        """Return all that was learnt, for :meth:`from_state`."""
-        return {
-            "quantiles": self.normalised.state(),
-            "failure": self._failure.state(),
-            "causes": [gpc.state() for gpc in self._causes],
-        }
+        """Return all that was learnt, for :meth:`from_state`.
+
+        All four learnt the same inputs, two thirds of all numbers here: as one tensor, a file holds them once.
+        """
+        failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
+        for gpc, state in zip(self._causes, causes, strict=True):
+            if np.array_equal(gpc.learnt_N_d, self._failure.learnt_N_d):
+                state["labelled"] = failure["labelled"]
+        return {"quantiles": self.normalised.state(), "failure": failure, "causes": causes}
 
     @classmethod
     def from_state(cls, state: dict) -> PairClassifier:

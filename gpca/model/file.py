@@ -28,6 +28,7 @@ from gpca.recovery.policy import RecoveryPolicy, Thresholds
 FORMAT, VERSION = "GP-CA model", 3
 VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to take where no other is named
 RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
+SHIPPED = Path(__file__).with_name("shipped.pt")  # comes with the package where `python -m gpca ship` has put it
 BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
 REMEDY = "make one with 'make results', or alone with 'snakemake -j2 results/embedded/model.pt'"
 
@@ -137,7 +138,7 @@ def _renamed(settings: Mapping, old: str, new: str) -> dict:
 
 
 def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path:
-    """Return the model that is meant: the given one, that of the environment, or one that the workflow made.
+    """Return the model that is meant: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
 
     Of those in `results`, by default the folder of that name in the working directory, that of the run ``real`` comes
     first, then ``embedded``, then the newest of any other, and ``smoke`` last.
@@ -157,7 +158,7 @@ def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path
         preferred = BEST_FIRST.index(run) if run in BEST_FIRST else len(BEST_FIRST)
         return run == "smoke", preferred, -path.stat().st_mtime
 
-    found = sorted(results.glob("*/model.pt"), key=rank)
+    found = [*sorted(results.glob("*/model.pt"), key=rank), *([SHIPPED] if SHIPPED.is_file() else [])]
     if not found:
         raise InputError(
             "no model", f"none in {results.absolute()}", f"{REMEDY}, or name one with --model or {VARIABLE}"

@@ -46,6 +46,28 @@ def test_the_same_model_is_written_in_the_same_bytes(model, path, tmp_path):
     assert (tmp_path / "again.pt").read_bytes() == path.read_bytes()
 
 
+def test_what_all_classifiers_of_the_diagnosis_learnt_stands_in_the_file_once(path):
+    state = torch.load(path, weights_only=True)["diagnoser"]["classifier"]
+    assert len({gpc["labelled"].data_ptr() for gpc in (state["failure"], *state["causes"])}) == 1
+
+
+def test_a_file_that_holds_it_four_times_says_the_same_and_is_written_smaller(model, path, tmp_path):
+    content = torch.load(path, weights_only=True)
+    for gpc in content["diagnoser"]["classifier"]["causes"]:
+        gpc["labelled"] = gpc["labelled"].clone()
+    torch.save(content, tmp_path / "large.pt")
+    assert (tmp_path / "large.pt").stat().st_size > path.stat().st_size
+    Model.load(tmp_path / "large.pt").save(tmp_path / "small.pt")
+    assert (tmp_path / "small.pt").read_bytes() == path.read_bytes()
+    features = np.random.default_rng(1).normal(size=(4, len(model.diagnoser.error_weights) - 1))
+    expected, actual = (
+        made.classifier.judge(made.classifier.normalised(features))
+        for made in (model.diagnoser, Model.load(tmp_path / "small.pt").diagnoser)
+    )
+    np.testing.assert_array_equal(actual.failure_N, expected.failure_N)
+    np.testing.assert_array_equal(actual.causes_N_3, expected.causes_N_3)
+
+
 def test_a_model_from_before_ranges_were_kept_is_loaded_without(path):
     changed(familiar=None)(path)
     assert Model.load(path).familiar is None
@@ -78,8 +100,14 @@ def test_a_file_that_is_no_model_of_this_version_is_one_line(path, spoil, messag
     assert str(path) in str(caught.value)
 
 
-def test_the_best_model_of_the_workflow_is_taken(tmp_path, monkeypatch):
+@pytest.fixture
+def none_shipped(tmp_path, monkeypatch):
+    """No model is named, and none comes with the package, whether or not this checkout has one."""
     monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("gpca.model.file.SHIPPED", tmp_path / "shipped.pt")
+
+
+def test_the_best_model_of_the_workflow_is_taken(tmp_path, none_shipped):
     with pytest.raises(InputError, match=f"none in .*snakemake -j2 results/embedded/model.pt.*{VARIABLE}"):
         model_path(results=tmp_path)
     for run in ("smoke", "older", "mine", "embedded", "real"):
@@ -91,8 +119,15 @@ def test_the_best_model_of_the_workflow_is_taken(tmp_path, monkeypatch):
         (tmp_path / run / "model.pt").unlink()
 
 
-def test_results_are_those_below_the_working_directory(tmp_path, monkeypatch):
-    monkeypatch.delenv(VARIABLE, raising=False)
+def test_the_model_of_the_package_is_taken_where_the_workflow_made_none(tmp_path, none_shipped):
+    (tmp_path / "shipped.pt").touch()
+    assert model_path(results=tmp_path) == tmp_path / "shipped.pt"
+    (tmp_path / "smoke").mkdir()
+    (tmp_path / "smoke/model.pt").touch()
+    assert model_path(results=tmp_path) == tmp_path / "smoke/model.pt"
+
+
+def test_results_are_those_below_the_working_directory(tmp_path, none_shipped, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=f"none in {tmp_path}/results; "):
         model_path()

@@ -1,0 +1,169 @@
+"""The card of a model that is handed on: data and their licences, scores, limits; all from the files of its run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from gpca.diagnosis.judged import CEILING, POOLED
+from gpca.diagnosis.measures import RECALL
+from gpca.errors import InputError
+from gpca.model.diagnoser import Diagnoser
+from gpca.model.file import VERSION, Model
+from gpca.model.origin import Licence, Origin
+from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
+from gpca.pairs.perturbation import CONCEPTS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+OWN = "gpca_multilabel"  # the explainer that has the model's classifiers
+EXPLAINERS = {
+    OWN: "one classifier of failure and one of each cause, as in this model",
+    "gpca_pair": "one classifier of all",
+    CEILING: "the truth, measured again",
+}
+MEASURES = {
+    "balanced_accuracy": "balanced accuracy",
+    "dominant_accuracy": "dominant cause",
+    "auroc_failed": "AUROC of failed",
+    "false_alarm_rate": "false alarms",
+    "average_precision": "mean average precision",
+}
+
+
+def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: Origin, scores: pd.DataFrame) -> str:
+    """Return the Markdown of the card; the same inputs give the same text.
+
+    Args:
+        name: of the file that is handed on.
+        content: of that file.
+        model, diagnoser: what it holds.
+        origin: of the model.
+        scores: what :func:`gpca.diagnosis.intervals.collect` returned for its run.
+
+    Raises:
+        InputError: no scores of a classifier as in the model, or settings of a run that are incomplete.
+    """
+    try:
+        limits = _limits(model, diagnoser, origin)
+    except (LookupError, TypeError, ValueError, AttributeError) as fault:
+        raise InputError("provenance of the model", f"is incomplete ({fault})", "make the model anew") from fault
+    paragraphs = [
+        f"# Model card of {name}",
+        "The model that `gpca explain` takes where no other is named or found. It says whether a registration of two "
+        f"point clouds is right and, if it is not, which of the causes {', '.join(CONCEPTS)} made it fail. "
+        "`python -m gpca ship` wrote this page; docs/explain.md says how to use the model.",
+        "## File",
+        _file(name, content, origin),
+        *("## What it learnt", *_learnt(model, diagnoser, origin)),
+        *("## Data and licences", *_licences(origin)),
+        *("## Scores", *_scores(origin, scores)),
+        *("## Limits", "\n".join(_wrapped(f"- {line}", "  ") for line in limits)),
+    ]
+    return "\n\n".join(text if text[0] in "|-#" else _wrapped(text) for text in paragraphs) + "\n"
+
+
+def _file(name: str, content: bytes, origin: Origin) -> str:
+    record, code = origin.record, origin.record["code"]
+    changed = ", with changes" if code.get("dirty") else ""
+    rows = {
+        "file": f"`{name}`, {len(content)} bytes, format version {VERSION}",
+        "SHA-256": f"`{hashlib.sha256(content).hexdigest()}`",
+        "precision": "that of the training; no number was rounded",
+        "made by": f"version {code.get('version')} of the package, commit `{code.get('commit')}`{changed}",
+        "settings": f"seed {record.get('seed')}, SHA-256 `{record.get('settings_sha256')}`",
+    }
+    return _table(["", ""], rows.items())
+
+
+def _learnt(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
+    rows = [(source.title, source.objects, "diagnosis" if source.diagnosed else "GP-CA") for source in origin.sources]
+    return [
+        f"The diagnosis learnt {diagnoser.classifier.samples} registrations whose causes were measured by "
+        "counterfactuals (docs/causes.md). What is observed in them was drawn from the objects' surfaces and "
+        f"perturbed. GP-CA as in the paper, which is printed beside it, learnt {len(model.gpc.learnt_N_d)} "
+        "registrations, perturbed in one way each.",
+        _table(["objects", "number", "learnt by"], rows),
+    ]
+
+
+def _licences(origin: Origin) -> list[str]:
+    used: dict[Licence, list[str]] = {}
+    for source in origin.sources:
+        for licence in source.licences:
+            used.setdefault(licence, []).append(source.title)
+    rows = [(of.dataset, of.licence, of.known, "; ".join(dict.fromkeys(titles))) for of, titles in used.items()]
+    return [
+        "The file holds weights, descriptors and embeddings that were computed from these data, but none of their "
+        "points or images. The data stay under their own licences; whether these reach a trained model is not for this "
+        'page to say. "Seen" means read in the stated place, "from memory" means not confirmed.',
+        _table(["dataset", "licence", "how that is known", "part of"], rows),
+    ]
+
+
+def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
+    titles = {source.name: source.title for source in origin.sources if source.diagnosed} | {POOLED: "all together"}
+    rows, own = [], 0
+    for source, title in titles.items():
+        for explainer, words in EXPLAINERS.items():
+            of = scores[(scores["source"] == source) & (scores["method"] == explainer)].set_index("metric")
+            if len(of):
+                own += explainer == OWN
+                counts = f"{of['samples'].iloc[0]:.0f} ({of['seeds'].iloc[0]:.0f})"
+                rows.append((title, words, *(_interval(of, metric) for metric in MEASURES), counts))
+    if not own:
+        raise InputError("cause_intervals.csv", f"holds no scores of {OWN}", "switch it on in diagnosis.explainers")
+    changes = origin.record["settings"].get("model", {}).get("causes", {})
+    return [
+        "Of classifiers of these kinds in the run that made this model, on objects that they had not learnt, with "
+        "95\u00a0% intervals over objects and seeds. The model itself then learnt all objects, so nothing is left to "
+        "test it on. The registrations of these scores were drawn as the section `causes` of the config says; those "
+        "that the model learnt were drawn with these changes:",
+        "\n".join(f"- `{name}: {json.dumps(value, sort_keys=True)}`" for name, value in sorted(changes.items()))
+        or "- none",
+        _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows),
+        f"False alarms: share of the nominal above the alarm that finds {100 * RECALL:g}\u00a0% of the failed. The "
+        "truth, measured again from other starts, is the most that can be expected. docs/causes.md defines every "
+        "measure.",
+    ]
+
+
+def _interval(of: pd.DataFrame, metric: str) -> str:
+    if metric not in of.index:
+        return "–"
+    value, low, high = of.loc[metric, ["value", "low", "high"]]
+    return f"{value:.3f} ({low:.3f} to {high:.3f})"
+
+
+def _limits(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
+    settings = origin.record["settings"]
+    causes = settings["causes"] | settings["model"].get("causes", {})
+    severities = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in causes["severities"].items())
+    ranges = model.familiar.ranges.items() if model.familiar else ()
+    familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in ranges)
+    return [
+        f"Failed means an error above {causes['limits']['failed']:g} of the diameter. A task may need another limit.",
+        f"The diagnosis learnt {severities} (lengths in diameters; crop and outliers in shares of the points), clouds "
+        "of {} to {} points, and ICP `{}`. What lies outside is a guess.".format(*causes["points"], model.icp.method),
+        f"The threshold of {diagnoser.threshold:.3f} was chosen so that at most {settings['model']['false_alarms']:g} "
+        "of the nominal registrations of objects that a first classifier had not learnt are called failed.",
+        f"It knows the causes {', '.join(CONCEPTS)}. Whatever else is wrong, such as the wrong object or a sensor's "
+        "bias, it calls one of them.",
+        f"It warns of clouds outside the geometry of GP-CA's training: {familiar} (docs/explain.md)."
+        if familiar
+        else "It keeps no ranges of its training's geometry, so it notices fewer clouds that are unlike it.",
+        f"It explains rigid objects of {SMALLEST_DIAMETER_M:g} to {LARGEST_DIAMETER_M:g} m. It is no safety device.",
+    ]
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    return fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -1,0 +1,131 @@
+"""Where a model comes from: the data of its run, with their licences, as the run's provenance tells."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.json_file import read_json
+from gpca.objects.canonical import ObjectClouds
+from gpca.structured_text import load_own_yaml
+
+LICENCES = Path(__file__).with_name("licences.yaml")
+REMEDY = "ship a model from the folder of the run that made it"
+_READ = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # among the inputs of a model
+
+
+@dataclass(frozen=True)
+class Licence:
+    """What is known of the licence of a dataset.
+
+    Attributes:
+        dataset, licence: their names.
+        known: where the licence was read.
+    """
+
+    dataset: str
+    licence: str
+    known: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """Objects that a model learnt.
+
+    Attributes:
+        name, title: in the run.
+        diagnosed: whether the diagnosis learnt from them, or else GP-CA.
+        objects: how many there are.
+        licences: of all datasets that they were read from.
+    """
+
+    name: str
+    title: str
+    diagnosed: bool
+    objects: int
+    licences: tuple[Licence, ...]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """How a model was made.
+
+    Attributes:
+        record: its provenance, as :func:`gpca.provenance.record_provenance` wrote it.
+        sources: what it learnt, in the order of the record.
+    """
+
+    record: Mapping
+    sources: tuple[Source, ...]
+
+    @classmethod
+    def of(cls, model: Path, title: str) -> Origin:
+        """Return the origin of a model file in the folder of its run.
+
+        Args:
+            model: the file, with its provenance beside it and the objects of the run below ``objects/``.
+            title: of the frames, which the provenance of a dataset's objects does not name.
+
+        Raises:
+            InputError: provenance that is missing or incomplete, objects drawn by the package, data without a licence.
+        """
+        record = _provenance(model)
+        found = [match.groups() for path in record["inputs_sha256"] if (match := _READ.search(f"/{path}"))]
+        if not found:
+            raise InputError(_beside(model), "names nothing that a model learns from", REMEDY)
+        sources = (_source(model.parent, name, kind == "model_causes", title) for kind, name in found)
+        try:
+            return cls(record, tuple(sources))
+        except (LookupError, TypeError, AttributeError) as fault:
+            raise InputError(model.parent / "objects", f"its provenance is incomplete ({fault})", REMEDY) from fault
+
+
+def _source(run: Path, name: str, diagnosed: bool, title: str) -> Source:
+    objects = run / "objects" / f"{name}.npz"
+    record = _provenance(objects)
+    settings = record["settings"]
+    entry = settings.get("entry", {"title": title, "stand_in": "datasets" not in settings})
+    if entry.get("stand_in"):
+        raise InputError(objects, "holds objects that the package drew", "ship a model of real objects")
+    places = list(record["inputs_sha256"]) or _addresses(settings)
+    licences = {licence: None for place in places for licence in _licences_of(place, objects)}
+    return Source(name, entry["title"], diagnosed, len(ObjectClouds.load(objects)), tuple(licences))
+
+
+def _addresses(settings: Mapping) -> list[str]:
+    """Return what was downloaded."""
+    entries = settings["datasets"].values() if "datasets" in settings else [settings["entry"]]
+    return [url for entry in entries for url in (entry.get("urls") or [entry["url"]])]
+
+
+def _licences_of(place: str, objects: Path) -> list[Licence]:
+    known = [licence for words, licence in _licences() if any(word in place for word in words)]
+    if not known:
+        fault = f"was made from '{Path(place).name}', of a dataset without a known licence"
+        raise InputError(objects, fault, f"add the dataset to {LICENCES}")
+    return known
+
+
+@cache
+def _licences() -> tuple[tuple[tuple[str, ...], Licence], ...]:
+    return tuple(
+        (tuple(entry["found"]), Licence(dataset, entry["licence"], entry["known"]))
+        for dataset, entry in load_own_yaml(LICENCES).items()
+    )
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(path.name + ".provenance.json")
+
+
+def _provenance(path: Path) -> dict:
+    """Return the record beside a file."""
+    record = read_json(_beside(path), "a provenance record", REMEDY)
+    for name in ("inputs_sha256", "settings", "code"):
+        if not isinstance(record.get(name), dict):
+            raise InputError(_beside(path), f"lacks '{name}'", REMEDY)
+    return record

@@ -1,0 +1,159 @@
+"""The step ``ship``: the same model in the package, and a card whose numbers are those of the run."""
+
+import hashlib
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.__main__ import main
+from gpca.diagnosis.intervals import COLUMNS
+from gpca.model.explainer import Explainer
+from gpca.model.file import Model
+from gpca.steps import ship
+
+from .command_lines import content, removed, written
+
+SHIP = ["ship", "--model", "real/model.pt", "--out", "shipped.pt", "--card", "shipped.md"]
+MESH = "/data/bop/lm/models/obj_000001.ply"
+FRAME = "/data/bop/lmo/test/000002/depth/000003.png"
+SETTINGS = {
+    "causes": {
+        "severities": {"noise": [0.01, 0.0834]}, "limits": {"failed": 0.0312}, "points": [128, 1024], "moved": "model",
+    },
+    "model": {"false_alarms": 0.05, "causes": {"moved": "observed"}},
+}  # fmt: skip
+
+
+def record(path, inputs, settings):
+    said = {
+        "inputs_sha256": dict.fromkeys(inputs, "0" * 64), "settings": settings, "seed": 7,
+        "code": {"version": "0.1.0", "commit": "c0ffee", "dirty": False}, "settings_sha256": "5" * 64,
+    }  # fmt: skip
+    path.with_name(f"{path.name}.provenance.json").write_text(json.dumps(said))
+
+
+@pytest.fixture(scope="module")
+def run(model, objects, tmp_path_factory):
+    """The files of a run that ``ship`` reads, of a model that says that it learnt real objects."""
+    folder = tmp_path_factory.mktemp("run") / "real"
+    (folder / "objects").mkdir(parents=True)
+    replace(model, stand_in=False, title="Frames").save(folder / "model.pt")
+    learnt = [f"results/real/{name}/seed0.npz" for name in ("model_causes/tiny", "registrations/frames")]
+    record(folder / "model.pt", learnt, SETTINGS)
+    for name, inputs, settings in (
+        ("tiny", [MESH], {"entry": {"title": "Tiny things", "stand_in": False, "url": "https://x/lm_models.zip"}}),
+        ("frames", [MESH, FRAME], {"datasets": {"lmo": {"location": "bop/lmo"}}}),
+    ):
+        objects.save(folder / f"objects/{name}.npz", name)
+        record(folder / f"objects/{name}.npz", inputs, settings)
+    values = ("balanced_accuracy", 300, 5, 0.7519, 0.7018, 0.8017, "", np.nan, np.nan, np.nan)
+    rows = [("tiny", explainer, *values) for explainer in ("gpca_multilabel", "ceiling", "residuals")]
+    pd.DataFrame(rows, columns=list(COLUMNS)).to_csv(folder / "cause_intervals.csv", index=False)
+    return folder
+
+
+@pytest.fixture
+def folder(run, tmp_path, monkeypatch):
+    """A copy of the run to spoil, below the working folder."""
+    shutil.copytree(run, tmp_path / "real")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_what_is_shipped_explains_as_the_runs_model_does(folder, registrations):
+    assert main(SHIP) == 0
+    source, target = registrations.cloud(0), registrations.target(0)
+    said = [Explainer(Model.load(path)).explain(source, target).as_dict() for path in ("real/model.pt", "shipped.pt")]
+    for explanation in said:
+        del explanation["seconds"]
+    assert said[0] == said[1]
+
+
+def test_the_card_has_the_numbers_of_the_run_and_the_same_run_gives_the_same_bytes(folder, model):
+    assert main(SHIP) == 0
+    first = content(folder)
+    text = first["shipped.md"].decode()
+    for words in (
+        hashlib.sha256(first["shipped.pt"]).hexdigest(), f"{len(first['shipped.pt'])} bytes", "commit `c0ffee`",
+        f"learnt {model.diagnoser.classifier.samples} registrations", "| Tiny things | 3 | diagnosis |",
+        "| Frames | 3 | GP-CA |", "| LINEMOD in BOP | CC BY 4.0 | from memory | Tiny things; Frames |",
+        "| LINEMOD-Occlusion in BOP | CC BY-SA 4.0 | seen: ", "0.752 (0.702 to 0.802) | – | – | – | – | 300 (5) |",
+        "above 0.0312 of", "noise 0.01 to 0.0834", '- `moved: "observed"`', f"{model.diagnoser.threshold:.3f}",
+    ):  # fmt: skip
+        assert words in text, words
+    assert "residuals" not in text
+    assert "YCB" not in text
+    assert "/data/" not in text
+    assert main(SHIP) == 0
+    assert content(folder) == first
+
+
+def provenance(name, inputs=(MESH,), **settings):
+    return lambda folder: record(folder / name, inputs, settings)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (removed("real/model.pt"), ["real/model.pt: no such model"]),
+        (
+            removed("real/model.pt.provenance.json"),
+            ["model.pt.provenance.json: no such file"],
+        ),
+        (written("real/model.pt.provenance.json", "{}"), ["model.pt.provenance.json: lacks 'inputs_sha256'"]),
+        (provenance("real/model.pt"), ["names nothing that a model learns from"]),
+        (
+            provenance("real/model.pt", ["real/model_causes/tiny/seed0.npz"]),
+            ["provenance of the model: is incomplete ('causes'); make the model anew"],
+        ),
+        (
+            provenance("real/objects/tiny.npz", [], entry={"title": "Tiny"}),
+            ["its provenance is incomplete ('url')"],
+        ),
+        (
+            provenance("real/objects/tiny.npz", entry={"title": "Tiny", "stand_in": True}),
+            ["tiny.npz: holds objects that the package drew; ship a model of real objects"],
+        ),
+        (
+            provenance("real/objects/tiny.npz", ["/mine/secret.ply"], entry={"title": "Tiny"}),
+            ["tiny.npz: was made from 'secret.ply', of a dataset without a known licence; add the dataset to "],
+        ),
+        (
+            provenance("real/objects/tiny.npz", [], entry={"title": "Tiny", "url": "https://x/mine.zip"}),
+            ["'mine.zip', of a dataset without a known licence"],
+        ),
+        (written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\n"), ["cause_intervals.csv: holds no rows"]),
+        (
+            written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\ntiny,gpca,auroc_failed,9,1,0.5,,,,,,\n"),
+            ["cause_intervals.csv: holds no scores of gpca_multilabel"],
+        ),
+    ],
+)
+def test_a_run_that_cannot_be_shipped_is_refused_in_one_line(folder, spoil, words, capsys):
+    spoil(folder)
+    before = content(folder)
+    assert main(SHIP) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("gpca ship: ")
+    assert all(part in line for part in words), line
+    assert content(folder) == before
+
+
+def test_a_model_that_the_package_should_not_carry_is_refused(folder, model, monkeypatch, capsys):
+    before = content(folder)
+    monkeypatch.setattr(ship, "LARGEST_BYTES", 1000)
+    assert main(SHIP) == 2
+    assert "MB in the package, where 0.001 are allowed" in capsys.readouterr().err
+    assert content(folder) == before
+    for changes, words in (
+        ({"stand_in": True}, "learnt objects that the package drew"),
+        ({"diagnoser": None}, "cannot say what is wrong"),
+    ):
+        replace(model, **({"stand_in": False} | changes)).save("real/model.pt")
+        assert main(SHIP) == 2
+        assert words in capsys.readouterr().err
+    assert not (folder / "shipped.pt").exists()
