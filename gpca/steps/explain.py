@@ -26,7 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("target", type=Path, help="the reference that each of them is aligned to")
     parser.add_argument("--init", type=Path, help="text file with the 4×4 numbers of T_target_source")
     parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="unit of files and pose (default m)")
-    parser.add_argument("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)")
+    parser.add_argument("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, the package's)")
     parser.add_argument("--method", help="registration method, such as gicp (default: the model's ICP)")
     parser.add_argument(
         "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
