@@ -11,6 +11,15 @@ from gpca.processor import THREAD_VARIABLES, prepare
 prepare()
 
 
+# The kernels of the smoke run: what the tests of these compile beside the modules is copied with them for that run.
+COMPILING = ("tests/alignment/test_batched_icp.py", "tests/encoders/test_dgcnn.py", "tests/encoders/test_training.py")
+
+
+def pytest_collection_modifyitems(items):
+    """First are the tests that compile what others need compiled."""
+    items.sort(key=lambda item: not item.nodeid.startswith(COMPILING))
+
+
 @pytest.fixture(autouse=True)
 def threads_restored(monkeypatch):
     """The command line sets these for its own process, which here is that of all tests."""

@@ -158,8 +158,8 @@ def planned(tmp_path_factory):
 
 
 def pytest_collection_modifyitems(items):
-    """Last are the tests that wait for the run which was killed: it goes on beside the others."""
-    items.sort(key=_waits)
+    """First are the tests without a run, last those that wait for the run which was killed beside the others."""
+    items.sort(key=lambda item: (_waits(item), "smoke_and_again" in item.fixturenames))
 
 
 def _waits(item):
