@@ -59,10 +59,12 @@ def run(options: Namespace) -> None:
             explanation = explainer.explain(source, target, T_init, options.unit, frame, **asked)
         except InputError as fault:
             raise InputError(name, str(fault)) from fault
-        warnings = (f"warning: {line}" for line in explanation.warnings)
+        as_json = options.json or options.json_lines
+        # A text begins with its warnings.
+        warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
         for line in (*explanation.notes, *warnings):
             print(line if len(sources) == 1 else f"{name}: {line}", file=sys.stderr)
-        if options.json or options.json_lines:
+        if as_json:
             names = {"source": str(name), "target": str(options.target), "model": str(path), "trained_on": trained_on}
             print(json.dumps(explanation.as_dict() | names), flush=options.json_lines)
         else:
