@@ -320,3 +320,13 @@ def test_what_was_found_about_causes_stands_in_the_reference(title):
     metrics = {"balanced_accuracy": 1, "dominant_accuracy": 1, "false_alarm_rate": 1, "auroc_failed": 3}
     expected = [f"{float(of[name]['mean']):.{digits}f}" if name in of else "–" for name, digits in metrics.items()]
     assert [cell.split(" ± ")[0].strip() for cell in line.split("|")] == expected
+
+
+def test_what_was_found_under_controls_stands_in_the_reference():
+    table = (ROOT / "results/reference/real/tables/table10_controls.md").read_text()
+    page = (ROOT / "docs/controls.md").read_text().split("## What was found")[1]
+    rows = re.findall(r"^\| ([^|\n]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+    assert len(rows) == 5
+    for explainer, *shown in rows:
+        [line] = re.findall(rf"^\| All together \| {re.escape(explainer)} \|(.*)$", table, re.MULTILINE)
+        assert shown == [cell.replace("*", "").split()[0] for cell in line.split("|")[:4]]

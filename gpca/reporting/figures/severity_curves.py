@@ -73,7 +73,7 @@ def draw_severity_curves(
     axes = lower.subplots(lines, WIDEST, sharex=True, sharey=True, squeeze=False)
     for panel, method in zip(axes.flat, maps, strict=False):
         image = _draw_map(panel, of_pose[of_pose["method"] == method])
-        panel.set_title(explainers.get(method, SUCCEEDS), fontsize=SMALL_PT, wrap=True)
+        panel.set_title(explainers.get(method, SUCCEEDS).replace(" (", "\n("), fontsize=SMALL_PT)
     for panel in axes.flat[len(maps) :]:
         panel.set_visible(False)
     lower.supxlabel("pose: rotation (°)", fontsize=8)
