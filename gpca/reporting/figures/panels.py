@@ -45,3 +45,8 @@ def finish_panels(
     write_title(figure, title)
     figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
     save_figure(figure, pdf_path, png_path)
+
+
+def in_lines(title: str) -> str:
+    """Return the title with what stands in brackets in a line of its own."""
+    return title.replace(" (", "\n(")

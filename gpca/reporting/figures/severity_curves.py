@@ -10,6 +10,7 @@ import numpy as np
 
 from gpca.controls.severity import REGISTRATION
 from gpca.errors import InputError
+from gpca.reporting.figures.panels import in_lines
 from gpca.reporting.figures.style import (
     BLACK,
     GREY,
@@ -73,7 +74,7 @@ def draw_severity_curves(
     axes = lower.subplots(lines, WIDEST, sharex=True, sharey=True, squeeze=False)
     for panel, method in zip(axes.flat, maps, strict=False):
         image = _draw_map(panel, of_pose[of_pose["method"] == method])
-        panel.set_title(explainers.get(method, SUCCEEDS).replace(" (", "\n("), fontsize=SMALL_PT)
+        panel.set_title(in_lines(explainers.get(method, SUCCEEDS)), fontsize=SMALL_PT)
     for panel in axes.flat[len(maps) :]:
         panel.set_visible(False)
     lower.supxlabel("pose: rotation (°)", fontsize=8)

@@ -10,6 +10,7 @@ import numpy as np
 
 from gpca.controls.settings import PAPER, TRANSFER
 from gpca.errors import InputError
+from gpca.reporting.figures.panels import in_lines
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
 from gpca.reporting.tables.builder import rows_where
 
@@ -57,7 +58,7 @@ def draw_transfer(
             if np.isfinite(share):
                 colour = "white" if share > 65 else "black"
                 panel.text(column, row, f"{share:.1f}", ha="center", va="center", fontsize=SMALL_PT, color=colour)
-        panel.set_title(_in_lines(explainers[name]), fontsize=SMALL_PT)
+        panel.set_title(in_lines(explainers[name]), fontsize=SMALL_PT)
         panel.set_xticks(range(len(letters)), letters)
         panel.set_yticks(range(len(letters)), letters)
         panel.tick_params(length=0, labelsize=SMALL_PT, labelbottom=True)
@@ -80,8 +81,3 @@ def _matrix(accuracy: pd.DataFrame, sources: list[str]) -> np.ndarray:
             if len(found):
                 shares[row, column] = 100 * found["value"].iloc[0]
     return shares
-
-
-def _in_lines(title: str) -> str:
-    """Return the title with what stands in brackets in a line of its own."""
-    return title.replace(" (", "\n(")
