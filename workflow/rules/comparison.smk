@@ -11,9 +11,10 @@ COLLECTED = [
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
+PUBLISHED = read_published()
 # Those of the collected that hold a counterpart of a printed number.
 COMPARED = sorted(
-    {number.counterpart.file for number in read_published() if number.counterpart}
+    {number.counterpart.file for number in PUBLISHED if number.counterpart}
     & set(COLLECTED)
 )
 # Predictions of single samples that these are shares of, where the config makes them.
@@ -28,7 +29,7 @@ PREDICTED = {
 }
 COMPARED_PREDICTIONS = [
     f"<results>/{'/'.join(folder)}/seed{seed}.csv"
-    for folder in folders_behind(read_published())
+    for folder in folders_behind(PUBLISHED)
     if folder in PREDICTED
     for seed in SEEDS
 ]
