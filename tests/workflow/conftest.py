@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.kills import results, temporary_folders
 
-from .planning import plan
+from . import forks
 
 ROOT = Path(__file__).resolve().parents[2]
 NEEDED = ("Snakefile", "config", "gpca", "baselines", "workflow", "profiles", "environment.lock")
@@ -70,13 +70,16 @@ class Project:
     folder: Path
 
     def snakemake(self, *arguments, check=True):
+        """Run Snakemake and its jobs in forks of a process that has loaded the libraries."""
+        return self._checked(forks.run(["-m", "snakemake", *map(str, arguments)], self.folder, _environment()), check)
+
+    def snakemake_as_processes(self, *arguments, check=True):
+        """Run Snakemake and its jobs as users do, each a process that loads its libraries."""
         return self._python("-m", "snakemake", *arguments, check=check)
 
     def plan(self, *arguments, check=True):
         """Run Snakemake dry."""
-        done = plan(["-n", *map(str, arguments)], self.folder, _environment())
-        assert not check or done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
-        return done
+        return self.snakemake("-n", *arguments, check=check)
 
     def gpca(self, *arguments, check=True):
         return self._python("-m", "gpca", *arguments, check=check)
@@ -118,6 +121,10 @@ class Project:
         done = subprocess.run(
             [sys.executable, *map(str, arguments)], cwd=self.folder, env=_environment(), capture_output=True, text=True
         )
+        return self._checked(done, check)
+
+    @staticmethod
+    def _checked(done, check):
         assert not check or done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
         return done
 
@@ -233,11 +240,11 @@ def _killed_and_continued(smoke, folder):
     while process.poll() is None and not list(project.folder.glob("results/smoke/encoders/*/*/*.checkpoint")):
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGSTOP)  # it lives and gets no further, however long the second takes to start
-    second = project.snakemake(*run, check=False)
+    second = project.snakemake_as_processes(*run, check=False)
     os.killpg(process.pid, signal.SIGKILL)
     assert process.wait() != 0
     assert not list(project.folder.glob("results/smoke/predictions/**/*.csv"))
     temporary = {path for path in temporary_folders(project.folder) if Path(path).exists()}
     locks = len(list(project.folder.glob(".snakemake/locks/*")))
-    project.snakemake(*run)
+    project.snakemake_as_processes(*run)
     return Continued(project, locks, temporary, second)

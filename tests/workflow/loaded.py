@@ -1,9 +1,23 @@
-"""What the server behind `tests.workflow.planning` holds when it forks: what a plan loads, less the suite itself."""
+"""What the server behind `tests.workflow.forks` holds when it forks: what plans and jobs load."""
 
 from importlib import import_module
 
-SNAKEMAKE = ("cli", "profiles", "report.html_reporter", "storage", "workflow")
-LIBRARIES = ("jinja2", "jsonschema", "nbformat", "PIL.Image", "scipy.spatial.transform", "scipy.stats", "yte")
+SNAKEMAKE = ("cli", "profiles", "report.html_reporter", "script", "storage", "workflow")
+SKLEARN = (
+    "calibration",
+    "cluster",
+    "decomposition",
+    "ensemble",
+    "gaussian_process",
+    "linear_model",
+    "pipeline",
+    "svm",
+)
+LIBRARIES = (
+    *("gpytorch", "jinja2", "jsonschema", "matplotlib.pyplot", "nbformat", "numba", "pandas", "PIL.Image"),
+    *("SALib.analyze.sobol", "scipy.ndimage", "scipy.optimize", "scipy.spatial.transform", "scipy.stats", "shap"),
+    *("skactiveml.pool", "skactiveml.stream", "torch", "trimesh", "yte"),
+)
 
-for module in (*(f"snakemake.{name}" for name in SNAKEMAKE), *LIBRARIES):
+for module in (*(f"snakemake.{name}" for name in SNAKEMAKE), *(f"sklearn.{name}" for name in SKLEARN), *LIBRARIES):
     import_module(module)
