@@ -134,7 +134,12 @@ def _notes(
         "of the diameter d, ADD or, for symmetric objects, ADD-S, and the method says so: a registration that failed "
         "is none. Bold: best of a start."
     ]
-    if left_out:
-        told = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
-        notes.append(f"Left out, as the package is not installed: {told}.")
-    return notes
+    return [*notes, *missing_packages(left_out)]
+
+
+def missing_packages(left_out: Mapping[str, str]) -> list[str]:
+    """Return the footnote on methods whose package is not installed, if there are any."""
+    if not left_out:
+        return []
+    told = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
+    return [f"Left out, as the package is not installed: {told}."]

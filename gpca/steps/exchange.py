@@ -1,0 +1,79 @@
+"""Step ``exchange``: registrations -> explanations with other methods and estimators of uncertainty beneath them."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.alignment.methods.registry import require_settings
+from gpca.arguments import SEED
+from gpca.controls.rivals import make_rivals
+from gpca.csv_file import write_csv
+from gpca.encoders.settings import EncoderSettings
+from gpca.exchange.experiment import Exchange
+from gpca.exchange.settings import DESIGN, ExchangeSettings, require_exchangeable
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
+from gpca.provenance import record_provenance
+from gpca.steps import checked_sections, per_seed
+from gpca.trials.judge import Judges
+from gpca.uncertainty.estimators.registry import require_estimator_settings
+from gpca.uncertainty.settings import UncertaintySettings
+
+SECTIONS = {
+    "exchange": ("exchange",),
+    "methods": ("methods",),
+    "estimators": ("estimators",),
+    "uncertainty": ("uncertainty", DESIGN),
+    "encoder": ("encoders", "*"),
+}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config, `explainers` by name too."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+", help="one per seed")
+    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights, one per seed")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs of what explainers say, one per seed")
+
+
+def run(options: Namespace) -> None:
+    """Let every explainer learn and explain with each method and each estimator beneath it, seed by seed."""
+    import torch
+
+    from gpca.encoders.training import embed, load_model
+
+    torch.set_num_threads(options.threads)
+    given = dict(options.settings)
+    explainers = given.pop("explainers", {})
+    for name in explainers:
+        require_exchangeable(name)
+    given = checked_sections(given, SECTIONS)
+    settings, encoder = ExchangeSettings.from_dict(given["exchange"]), EncoderSettings(**given["encoder"])
+    methods = {name: given["methods"].get(name) or {} for name in settings.methods}
+    for name, own in methods.items():
+        require_settings(name, own)
+    estimators = {name: given["estimators"].get(name) or {} for name in settings.estimators}
+    for name, own in estimators.items():
+        require_estimator_settings(name, own)
+    runs = {name: value for name, value in given["uncertainty"].items() if name != "samples"}
+    objects = ObjectClouds.load(options.objects)
+    for seed, registrations_path, weights, out in per_seed(options, "registrations", "encoders", "out"):
+        rivals = make_rivals(explainers, options.source, seed)
+        inputs = [options.objects, registrations_path, weights]
+        with record_provenance([out], inputs, options.settings, seed=seed):
+            model = load_model(weights, encoder)
+            exchange = Exchange(
+                source=options.source,
+                seed=seed,
+                settings=settings,
+                methods=methods,
+                estimators=estimators,
+                uncertainty=UncertaintySettings(**runs),
+                rivals=rivals,
+                embed=lambda asked, source, model=model, seed=seed: embed(model, asked, source, seed, encoder),
+            )
+            judges = Judges(objects, f"objects of {options.source}")
+            write_csv(out, exchange.run(Registrations.load(registrations_path), judges))
