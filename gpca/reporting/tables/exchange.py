@@ -17,8 +17,7 @@ from gpca.attribution.metrics import ALL
 from gpca.exchange.metrics import ANOTHER
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, rows_where
-from gpca.reporting.tables.registration import missing_packages
+from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, missing_packages, rows_where
 from gpca.reporting.tables.table import Column, Table
 
 if TYPE_CHECKING:

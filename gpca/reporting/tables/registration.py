@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from gpca.attribution.metrics import ALL
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over
+from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, missing_packages
 from gpca.reporting.tables.table import Column, Table
 from gpca.trials.metrics import BINS, bin_name
 from gpca.trials.rows import INITIAL, NO_START, row_name
@@ -135,11 +135,3 @@ def _notes(
         "is none. Bold: best of a start."
     ]
     return [*notes, *missing_packages(left_out)]
-
-
-def missing_packages(left_out: Mapping[str, str]) -> list[str]:
-    """Return the footnote on methods whose package is not installed, if there are any."""
-    if not left_out:
-        return []
-    told = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
-    return [f"Left out, as the package is not installed: {told}."]
