@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from baselines.registry import explainer_entry
-from gpca.errors import InputError
 from gpca.settings import Bounds, Count
 
 BALANCED = {"multipleOf": 3}  # over the concepts
 METHOD, ESTIMATOR = "method", "estimator"  # what is exchanged
 LABELS = ("exchanged", "learnt_from", "asked_of", "explainer")  # columns before those of a prediction file
-DESIGN = "additive"  # whose conditions estimators are asked about
 FAILURE = "failure"  # the column behind them: why the method failed, or the estimator
 
 
@@ -47,14 +44,3 @@ class ExchangeSettings:
         for name in {"methods", "estimators"} & set(given):
             given[name] = tuple(given[name])
         return cls(**given)
-
-
-def require_exchangeable(name: str) -> None:
-    """Raise an InputError unless the explainer is known and reads what is exchanged.
-
-    That is registrations, their embeddings, the conditions of design ``additive``, or of any the observed pair alone.
-    """
-    entry = explainer_entry(name)
-    if entry.design not in (None, DESIGN) and not entry.observed_only:
-        fault = f"reads design '{entry.design}', of which estimators have no part"
-        raise InputError(f"explainer '{name}'", fault, f"name one that reads '{DESIGN}'")

@@ -10,8 +10,9 @@ from gpca.arguments import SEED
 from gpca.controls.rivals import make_rivals
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
+from gpca.exchange.asked import DESIGN, require_exchangeable
 from gpca.exchange.experiment import Exchange
-from gpca.exchange.settings import DESIGN, ExchangeSettings, require_exchangeable
+from gpca.exchange.settings import ExchangeSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance

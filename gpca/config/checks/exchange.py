@@ -6,7 +6,7 @@ from collections.abc import Set
 
 from baselines.registry import require_settings
 from gpca.config.checks.named import require_names, with_key
-from gpca.exchange.settings import require_exchangeable
+from gpca.exchange.asked import require_exchangeable
 from gpca.settings import check_settings
 
 
