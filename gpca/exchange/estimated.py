@@ -14,6 +14,7 @@ import numpy as np
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
+from gpca.alignment.normals import estimate_normals
 from gpca.pairs.dataset import Registrations
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
@@ -77,9 +78,9 @@ class Registrar:
         random = generator(*axes, "clouds")
         points, target, T_init, _ = Clouds(registrations, row).observed(settings.icp_points, random)
         source = KnobbedSource(points, random)
-        whole = Pair(points, target, T_init, seed=seed_of(*axes, "estimates")).with_normals()
+        normals = estimate_normals(target)
         for knobs in settings_of_knobs:
-            pair = replace(whole, source=source.at(knobs), source_normals=None)
+            pair = Pair(source.at(knobs), target, T_init, None, normals, seed_of(*axes, "estimates"))
             outcome = self._register(pair)
             deviation_6 = knobs.spread * settings.deviation_6()
             described = cache(lambda pair=pair, outcome=outcome: describe(pair, outcome, MOVED))

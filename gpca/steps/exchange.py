@@ -16,22 +16,22 @@ from gpca.exchange.settings import ExchangeSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
+from gpca.settings import check_settings
 from gpca.steps import checked_sections, per_seed
 from gpca.trials.judge import Judges
 from gpca.uncertainty.estimators.registry import require_estimator_settings
 from gpca.uncertainty.settings import UncertaintySettings
 
+OF_NAMES = ("methods", "estimators")  # name -> settings; what is not in them has none
 SECTIONS = {
     "exchange": ("exchange",),
-    "methods": ("methods",),
-    "estimators": ("estimators",),
     "uncertainty": ("uncertainty", DESIGN),
     "encoder": ("encoders", "*"),
 }
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config, `explainers` by name too."""
+    """Declare files and names; ``--settings`` holds what `SECTIONS` and `OF_NAMES` name of the config, and `explainers`."""
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--objects", required=True, type=Path)
@@ -51,14 +51,18 @@ def run(options: Namespace) -> None:
     explainers = given.pop("explainers", {})
     for name in explainers:
         require_exchangeable(name)
+    own = {section: given.pop(section, {}) for section in OF_NAMES}
+    for section, of_names in own.items():
+        if of_names:
+            check_settings(of_names, section)
     given = checked_sections(given, SECTIONS)
     settings, encoder = ExchangeSettings.from_dict(given["exchange"]), EncoderSettings(**given["encoder"])
-    methods = {name: given["methods"].get(name) or {} for name in settings.methods}
-    for name, own in methods.items():
-        require_settings(name, own)
-    estimators = {name: given["estimators"].get(name) or {} for name in settings.estimators}
-    for name, own in estimators.items():
-        require_estimator_settings(name, own)
+    methods = {name: own["methods"].get(name) or {} for name in settings.methods}
+    for name, of_method in methods.items():
+        require_settings(name, of_method)
+    estimators = {name: own["estimators"].get(name) or {} for name in settings.estimators}
+    for name, of_estimator in estimators.items():
+        require_estimator_settings(name, of_estimator)
     runs = {name: value for name, value in given["uncertainty"].items() if name != "samples"}
     objects = ObjectClouds.load(options.objects)
     for seed, registrations_path, weights, out in per_seed(options, "registrations", "encoders", "out"):
