@@ -31,7 +31,7 @@ SECTIONS = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` holds what `SECTIONS` and `OF_NAMES` name of the config, and `explainers`."""
+    """Declare files and names; ``--settings`` holds `SECTIONS` and `OF_NAMES` of the config, and `explainers`."""
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--objects", required=True, type=Path)

@@ -26,7 +26,7 @@ FAULTS = [
     (untouched, settings("exchange", explainers={}), r"setting explainers: names none; give at least one"),
     (untouched, settings("exchange", explainers={"gpc": {}}), r"explainer 'gpc': unknown"),
     (untouched, settings("exchange", explainers={"shap_removal": {}}), r"'shap_removal': reads design 'removal', of"),
-    (untouched, settings("exchange", control={}), r"setting control: unknown; known are exchange, uncertainty, encoder"),
+    (untouched, settings("exchange", control={}), r"setting control: unknown; known are exchange, uncertainty,"),
     (untouched, {"--out": ["a.csv", "b.csv"]}, r"--out: 2 file\(s\) for 1 seed\(s\)"),
 ]
 
