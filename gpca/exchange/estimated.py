@@ -86,7 +86,7 @@ class Registrar:
             described = cache(lambda pair=pair, outcome=outcome: describe(pair, outcome, MOVED))
             yield RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6, described)
 
-    def examples(self, rows: Sequence[int], judges: Judges) -> list[Example]:
+    def examples(self, rows: np.ndarray, judges: Judges) -> list[Example]:
         """Return the rows as estimators learn from them."""
         found = []
         for row in rows:
@@ -98,7 +98,7 @@ class Registrar:
 
     def estimates(
         self,
-        rows: Sequence[int],
+        rows: np.ndarray,
         estimators: Mapping[str, Callable[[RegisteredPair], Estimate]],
         settings_of_knobs: Sequence[Knobs] = ADDITIVE_KNOBS,
     ) -> dict[str, Estimates]:

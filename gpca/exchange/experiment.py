@@ -102,8 +102,8 @@ class Exchange:
         examples = Registrar(registrations, self.source, self.seed, self.uncertainty).examples(learnt[half:], judges)
         estimators = {name: make_estimator(name, given, examples) for name, given in self.estimators.items()}
         registrar = Registrar(described.without_labels(), self.source, self.seed, self.uncertainty)
-        teach = any(rival.observed_only for rival in rivals.values())
-        taught = registrar.estimates(rows_of["train"] if teach else [], estimators, OBSERVED)
+        lessons = rows_of["train"] if any(rival.observed_only for rival in rivals.values()) else np.arange(0)
+        taught = registrar.estimates(lessons, estimators, OBSERVED)
         asked = registrar.estimates(rows_of["test"], estimators)
         train, test_samples = (described.subset(rows) for rows in rows_of.values())
         for estimator in estimators:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
+
+import torch
 
 from gpca.alignment.methods.registry import require_settings
 from gpca.arguments import SEED
 from gpca.controls.rivals import make_rivals
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, load_model
 from gpca.exchange.asked import DESIGN, require_exchangeable
 from gpca.exchange.experiment import Exchange
 from gpca.exchange.settings import ExchangeSettings
@@ -42,10 +46,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Let every explainer learn and explain with each method and each estimator beneath it, seed by seed."""
-    import torch
-
-    from gpca.encoders.training import embed, load_model
-
     torch.set_num_threads(options.threads)
     given = dict(options.settings)
     explainers = given.pop("explainers", {})
@@ -69,7 +69,6 @@ def run(options: Namespace) -> None:
         rivals = make_rivals(explainers, options.source, seed)
         inputs = [options.objects, registrations_path, weights]
         with record_provenance([out], inputs, options.settings, seed=seed):
-            model = load_model(weights, encoder)
             exchange = Exchange(
                 source=options.source,
                 seed=seed,
@@ -78,7 +77,11 @@ def run(options: Namespace) -> None:
                 estimators=estimators,
                 uncertainty=UncertaintySettings(**runs),
                 rivals=rivals,
-                embed=lambda asked, source, model=model, seed=seed: embed(model, asked, source, seed, encoder),
+                embed=partial(_embedded, load_model(weights, encoder), encoder, seed),
             )
             judges = Judges(objects, f"objects of {options.source}")
             write_csv(out, exchange.run(Registrations.load(registrations_path), judges))
+
+
+def _embedded(model, encoder: EncoderSettings, seed: int, asked: Registrations, source: str):
+    return embed(model, asked, source, seed, encoder)
