@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gpca.config.checks.estimators import check_estimators
+from gpca.config.checks.exchange import check_exchange
 from gpca.config.checks.explainers import (
     check_controls,
     check_diagnosis,
@@ -76,6 +77,7 @@ def check(config: dict) -> dict[str, dict]:
     check_strategies(whole)
     check_learners(whole)
     check_controls(whole)
+    check_exchange(whole, *(names_left_out(config, key) for key in ("sources", "methods", "estimators")))
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs)

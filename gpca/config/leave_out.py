@@ -16,12 +16,16 @@ from gpca.recovery.policies import ALWAYS, POLICIES
 LEAVABLE = (
     *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
     *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
+    "exchange.explainers",
 )
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
 SWITCHES = ("active_learning.strategies", "recovery.policies")
 # Lists that lose the names of what is left out elsewhere: the list's key, and that of the mapping.
 LISTED = {
     "kernel_grid.sources": "sources",
+    "exchange.sources": "sources",
+    "exchange.methods": "methods",
+    "exchange.estimators": "estimators",
     "real_world.backbones": "encoders",
     "real_world.reductions": "reductions",
 }
@@ -45,7 +49,7 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     for key, of in LISTED.items():
         _change(whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone], list)
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    for key in ("explainers", "controls.explainers"):
+    for key in ("explainers", "controls.explainers", "exchange.explainers"):
         _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
     acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
     reading = {name for name, entry in POLICIES.items() if entry.explainer in without}

@@ -25,6 +25,7 @@ from gpca.controls.settings import ControlSettings
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
+from gpca.exchange.settings import ExchangeSettings
 from gpca.files import whole_file
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import SCHEMA, Bounds
@@ -94,6 +95,14 @@ class Controls(ControlSettings):
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Exchange(ExchangeSettings):
+    """What is exchanged beneath explainers, on which sources, and these, with settings beyond those elsewhere."""
+
+    sources: tuple[str, ...]
+    explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
+
+
 @dataclass(frozen=True)
 class Config:
     """Configuration of GP-CA Bench: all its sections."""
@@ -122,6 +131,7 @@ class Config:
     kernel_grid: Annotated[sections.Grid, GRID]
     learners: Annotated[dict[str, Settings], BY_NAME]
     controls: Annotated[Controls, Keys(required=EVERY)]
+    exchange: Annotated[Exchange, Keys(required=EVERY)]
     shift: Annotated[sections.Shift, SHIFT]
     real_world: RealWorld
     model: sections.ExplainedModel

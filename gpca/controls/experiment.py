@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.attribution.predictions import prediction_frame
+from gpca.controls.rivals import Embed, Rival, described_for
 from gpca.controls.settings import PAPER, RELABELLED, RETRAINED, TRANSFER, ControlSettings
 from gpca.controls.variants import left_out, relabelled, variant
-from gpca.explainers.interface import ConceptExplainer, Describing
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.evaluation import evaluate_design
@@ -23,20 +23,6 @@ if TYPE_CHECKING:
 
 PARTS, FEWEST_OF_PART = 5, 60  # of the training samples whose labels are shuffled
 LABELS = ("control", "tested", "explainer")  # columns before those of a prediction file
-Embed = Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]
-
-
-@dataclass(frozen=True)
-class Rival:
-    """One explainer.
-
-    Attributes:
-        make: a new one at every call.
-        reads: what it needs attached, as in :class:`gpca.explainers.interface.ExplainerEntry`.
-    """
-
-    make: Callable[[], ConceptExplainer]
-    reads: str
 
 
 @dataclass(frozen=True)
@@ -119,11 +105,7 @@ class Experiment:
         if any(rival.reads.startswith("uncertainty/") for rival in self.rivals.values()):
             outcomes, *seconds = evaluate_design("observed", described, source, self.seed, self.uncertainty)
             described = outcomes.attach_to(described, *seconds)
-        for rival in self.rivals.values():
-            explainer = rival.make()
-            if isinstance(explainer, Describing):
-                described = explainer.describe(described)
-        return described
+        return described_for(self.rivals, described)
 
     def _explained(
         self, control: str, learnt: Registrations, tests: Mapping[str, Registrations]

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from functools import partial
 from pathlib import Path
 
 import torch
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
-from gpca.controls.experiment import Experiment, Rival
+from gpca.controls.experiment import Experiment
+from gpca.controls.rivals import make_rivals
 from gpca.controls.samples import sample_table
 from gpca.controls.settings import PAPER, RETRAINED, ControlSettings
 from gpca.controls.variants import left_out, variant
@@ -22,7 +21,6 @@ from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
 from gpca.steps import checked_sections
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -54,7 +52,7 @@ def run(options: Namespace) -> None:
     """Let every explainer learn and explain under the paper's protocol and under each control."""
     torch.set_num_threads(options.threads)
     given = dict(options.settings)
-    rivals = _rivals(given.pop("explainers", {}), options.source, options.seed)
+    rivals = make_rivals(given.pop("explainers", {}), options.source, options.seed)
     given = checked_sections(given, SECTIONS)
     settings, encoder = ControlSettings.from_dict(given["controls"]), EncoderSettings(**given["encoder"])
     icp = ICPSettings(**given["icp"])
@@ -88,18 +86,6 @@ def run(options: Namespace) -> None:
         samples = sample_table(registrations, ObjectClouds.load(options.objects))
         write_csv(options.out, rows)
         write_csv(options.samples, samples)
-
-
-def _rivals(explainers: dict, source: str, seed: int) -> dict[str, Rival]:
-    if not explainers:
-        raise InputError("setting explainers", "names none", "give at least one")
-    rivals = {}
-    for name, settings in explainers.items():
-        require_settings(name, settings)
-        check_settings(settings, "explainers", name)
-        entry = explainer_entry(name)
-        rivals[name] = Rival(partial(entry.make, source, seed, **settings), entry.reads)
-    return rivals
 
 
 def _pairs(options: Namespace, names: str, files: str) -> dict[str, Path]:

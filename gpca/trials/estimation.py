@@ -13,27 +13,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.methods.interface import Outcome, Pair
+from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import log, point_jacobians
+from gpca.alignment.twist import point_jacobians
 from gpca.causes.dataset import Causes
-from gpca.descriptors.distances import describe_distances
-from gpca.descriptors.entropy import describe_entropy
-from gpca.descriptors.pair import ObservedPair, observed_pair
+from gpca.descriptors.pair import observed_pair
 from gpca.errors import InputError
-from gpca.objects.symmetry import symmetric_turn
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.trials.covariances import JUDGED, REFERENCE, covariance_columns
-from gpca.trials.judge import Judge, Judges
+from gpca.trials.examples import Moved, describe, example, true_twist
+from gpca.trials.judge import Judges
 from gpca.trials.settings import EstimatorPairSettings
-from gpca.uncertainty.estimators.interface import Estimate, Example, FailedEstimate, RegisteredPair, intrinsic_frame
+from gpca.uncertainty.estimators.interface import Estimate, Example, FailedEstimate, RegisteredPair
 from gpca.uncertainty.estimators.monte_carlo import sample
 from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
 
 if TYPE_CHECKING:
     import pandas as pd
+
+MOVED: Moved = "model"  # onto what was observed, as the causes' track has it
 
 
 @dataclass(frozen=True)
@@ -134,22 +134,13 @@ class _Maker:
             "add_relative": errors["add_relative"],
             "failed": bool(errors["add_relative"] >= self._settings.failed or not registered.outcome.fitness),
         }
-        return Case(known, registered, _true_twist(registered, T_true, judge), twists_n_6, seconds)
+        return Case(known, registered, true_twist(registered, T_true, judge, MOVED), twists_n_6, seconds)
 
     def example(self, row: int) -> Example:
-        """Return a training registration with the results of a few starts, all at the pose where there are none."""
+        """Return a training registration with the results of a few starts."""
         registered, T_true = self._registered(row)
-        try:
-            twists_n_6 = sample(registered, self._settings.train_starts, *self._axes, "examples")
-        except FailedEstimate:
-            twists_n_6 = np.zeros((self._settings.train_starts, 6))
-        true_twist_6 = _true_twist(registered, T_true, self._judges.of(self._causes.registrations, row))
-        return Example(
-            _describe(registered.pair, registered.outcome),
-            twists_n_6,
-            true_twist_6,
-            intrinsic_frame(registered.pair.target),
-        )
+        judge = self._judges.of(self._causes.registrations, row)
+        return example(registered, T_true, judge, MOVED, self._settings.train_starts, *self._axes)
 
     def _registered(self, row: int) -> tuple[RegisteredPair, np.ndarray]:
         """Return a registration of the model, the source, to what was observed, and the true pose.
@@ -167,7 +158,7 @@ class _Maker:
         T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
         outcome = self._register(pair)
         deviation_6 = self._settings.deviation_6()
-        registered = RegisteredPair(pair, outcome, self._method, deviation_6, lambda: _describe(pair, outcome))
+        registered = RegisteredPair(pair, outcome, self._method, deviation_6, lambda: describe(pair, outcome, MOVED))
         return registered, T_icp @ inverse(T_true)
 
 
@@ -211,27 +202,6 @@ def _reference(case: Case) -> Estimate:
     if not len(case.reference_twists):
         return Estimate(None, "too few of the reference's runs found a correspondence")
     return Estimate(np.cov(case.reference_twists, rowvar=False))
-
-
-def _true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge) -> np.ndarray:
-    T_found = registered.T_target_source
-    turn = np.eye(4)
-    turn[:3, :3] = symmetric_turn(T_found[:3, :3].T @ T_true[:3, :3], judge.symmetries)
-    return log((T_true @ turn @ inverse(T_found))[None])[0]
-
-
-def _describe(pair: Pair, outcome: Outcome) -> np.ndarray:
-    """Return the descriptors (F,) that need no further registration: distances, local planes, entropy."""
-    shown = ObservedPair(
-        observed=transform(inverse(outcome.T_target_source), pair.target),
-        model=pair.source,
-        T_init=np.eye(4),
-        T_runs=np.eye(4)[None],
-        fitness_n=np.array([outcome.fitness]),
-        inlier_rmse_n=np.array([outcome.inlier_rmse]),
-        axes=(),
-    )
-    return np.concatenate([*describe_distances(shown), describe_entropy(shown)])
 
 
 def _spaced(rows: np.ndarray, wanted: int) -> np.ndarray:

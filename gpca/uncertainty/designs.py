@@ -30,6 +30,11 @@ CORNERS = tuple(tuple(bool(corner >> i & 1) for i in range(3)) for corner in ran
 
 SEVERITIES = ("noise", "rotation_rad", "translation", "crop")
 KNOB_RANGE = np.subtract(UPPER, UNTOUCHED)
+# The settings of design ``additive``: the corners, and a small step of one knob.
+ADDITIVE_KNOBS = (
+    *(Knobs(*np.where(switches, MIDDLE, UNTOUCHED)) for switches in CORNERS),
+    *(Knobs(*np.where(row, UNTOUCHED + STEP * KNOB_RANGE, UNTOUCHED)) for row in np.eye(3, dtype=bool)),
+)
 
 
 # Source and target of a pair, its initial pose and its reference pose.
@@ -93,9 +98,7 @@ def _additive(
     pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
 ) -> list[Outcome]:
     runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
-    corners = [Knobs(*np.where(switches, MIDDLE, UNTOUCHED)) for switches in CORNERS]
-    steps = [Knobs(*np.where(row, UNTOUCHED + STEP * KNOB_RANGE, UNTOUCHED)) for row in np.eye(3, dtype=bool)]
-    return [runs(knobs) for knobs in (*corners, *steps)]
+    return [runs(knobs) for knobs in ADDITIVE_KNOBS]
 
 
 def _sweep(

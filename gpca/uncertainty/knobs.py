@@ -42,6 +42,32 @@ UPPER = Knobs(0.03, 6.0, 0.60)  # their upper ends: 3 %, 60°, 60 %
 MOST = Knobs(1.0, 100.0, 0.95)
 
 
+class KnobbedSource:
+    """A source cloud under any setting of noise and overlap.
+
+    Args:
+        source: (N, 3), in diameters.
+        random: draws the jitter and the direction of the cut.
+    """
+
+    def __init__(self, source: np.ndarray, random: np.random.Generator) -> None:
+        self._source = source
+        self._jitter = random.normal(size=source.shape)
+        self._order = np.argsort(source @ random_direction(random), kind="stable")
+
+    def at(self, knobs: Knobs) -> np.ndarray:
+        """Return the points (n, 3) that are left, with their jitter.
+
+        Raises:
+            InputError: a knob outside its range.
+        """
+        for name, value, most in zip(Knobs._fields, knobs, MOST, strict=True):
+            if not 0 <= value <= most:
+                raise InputError(f"knob '{name}'", f"{value} is outside [0, {most}]", "give a value inside")
+        kept = np.sort(self._order[: max(3, round(len(self._order) * (1 - knobs.overlap)))])
+        return (self._source + knobs.noise * self._jitter)[kept]
+
+
 class KnobRuns:
     """The function f of one pair; a setting that was evaluated is not evaluated again.
 
@@ -62,9 +88,7 @@ class KnobRuns:
         random: np.random.Generator,
     ) -> None:
         self._xi_n_6 = xi_n_6
-        self._jitter = random.normal(size=source.shape)
-        self._order = np.argsort(source @ random_direction(random), kind="stable")
-        self._source = source
+        self._source = KnobbedSource(source, random)
         self._target = target
         self._T_init = T_target_source_init
         self._T_ref = T_ref
@@ -84,11 +108,7 @@ class KnobRuns:
         return self._seen[knobs]
 
     def _evaluate(self, knobs: Knobs) -> Outcome:
-        for name, value, most in zip(Knobs._fields, knobs, MOST, strict=True):
-            if not 0 <= value <= most:
-                raise InputError(f"knob '{name}'", f"{value} is outside [0, {most}]", "give a value inside")
         started = perf_counter()
-        kept = np.sort(self._order[: max(3, round(len(self._order) * (1 - knobs.overlap)))])
-        source = (self._source + knobs.noise * self._jitter)[kept]
+        source = self._source.at(knobs)
         runs = run_from_starts(self._icp, source, self._T_init, knobs.spread * self._xi_n_6)
         return summarise_runs(runs, cKDTree(source), self._target, self._T_ref, self._settings, started)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gpca.attribution.scores import Attribution
-from gpca.controls.experiment import Experiment, Rival
+from gpca.controls.experiment import Experiment
+from gpca.controls.rivals import Rival
 from gpca.controls.settings import ControlSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.settings import UncertaintySettings

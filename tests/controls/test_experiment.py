@@ -5,7 +5,7 @@ import numpy as np
 
 from baselines.pair import PairGPCA
 from baselines.residuals import residuals_logistic
-from gpca.controls.experiment import Rival
+from gpca.controls.rivals import Rival
 from gpca.controls.variants import of_unseen_objects
 
 from .conftest import Head, Nearest, attached, experiment

@@ -98,6 +98,18 @@ STEP_OPTIONS = {
         "--others": "other", "--other-registrations": "registrations.npz", "--out": "controls.csv",
         "--samples": "control_samples.csv",
     },
+    "exchange": COMMON | {
+        "--settings": {
+            "exchange": {"methods": ["point_to_point", "point_to_plane"], "train": 9, "test": 3, "points": 64,
+                         "estimators": ["censi", "cello"], "estimated_train": 9, "estimated_test": 3},
+            "estimators": {"cello": {"steps": 2}}, "encoder": ENCODER,
+            "uncertainty": {"starts": 13, "icp_points": 40},
+            "explainers": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "shap_additive": {},
+                           "residuals_logistic": {}},
+        },
+        "--seeds": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoders": "weights.pt",
+        "--out": "exchange.csv",
+    },
     "reduce": COMMON | {
         "--settings": {"components": 4, "epochs": 5}, "--reduction": "autoencoder", "--seeds": 0,
         "--embeddings": "embeddings.npz", "--out": "reduced.npz",

@@ -28,6 +28,7 @@ def test_every_config_loads_offline_and_asks_for_all_results(
     assert planned.jobs["run_icp"] == sources * (5 if config == "smoke" else 6)
     assert planned.jobs["shift"] == planned.jobs["fit_learners"] == sources
     assert planned.jobs["register_methods"] == planned.jobs["estimate"] == sources
+    assert planned.jobs["explain_exchanged"] == (2 if config == "real" else 1)
     assert planned.jobs["fit_kernel_grid"] == (1 if config == "smoke" else 2)
     assert planned.jobs["embed_without"] == planned.jobs["learn_actively"] == sources * seeds
     for name in (
@@ -44,6 +45,8 @@ def test_every_config_loads_offline_and_asks_for_all_results(
         "kernels.csv",
         "registration_methods.csv",
         "estimators.csv",
+        "exchange.csv",
+        "tables/table14_method_matrix.md",
         "tables/table12_uncertainty.md",
         "figures/estimators.pdf",
         "estimates/ycb/reference/seed0.csv",

@@ -43,6 +43,8 @@ CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUS
 CONTROLS_SHOWN = jobs("control_metrics", "control_intervals", "control_severities")
 CONTROLS_SHOWN += jobs("table10_controls", "table10_transfer", "severity_curves", "transfer")
 CONTROLS = jobs(explain_controls=2) + CONTROLS_SHOWN
+# With other methods and estimators beneath them: explainers of one source.
+EXCHANGED = jobs("explain_exchanged", "exchange_metrics", "table14_estimator_explanations", "table14_method_matrix")
 # Explainers times two sources: three with a GPC (classic features on the frames too), four on embeddings, 11 on
 # uncertainties.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 1, 2 * 4, 2 * 11))
@@ -101,6 +103,13 @@ def test_table12_needs_the_causes_alone(planned):
     }  # fmt: skip
 
 
+def test_table14_needs_one_source_and_its_encoders(planned):
+    assert planned.before("results/smoke/tables/table14_method_matrix.md") == {
+        "sample_objects": 1, "register": 1, "train_encoder": 1, "explain_exchanged": 1, "exchange_metrics": 1,
+        "table14_method_matrix": 1,
+    }  # fmt: skip
+
+
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
         "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
@@ -115,7 +124,7 @@ def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
 EDITS = {
     "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
     + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD
-    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS,
+    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS + EXCHANGED,
     "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
@@ -125,7 +134,7 @@ EDITS = {
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
         jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED + CONTROLS,
+        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED + CONTROLS + EXCHANGED,
     "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
     "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN + CONTROLS,
@@ -145,7 +154,7 @@ EDITS = {
     "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
     + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
-    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS,
+    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS + EXCHANGED,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=5)
@@ -154,12 +163,14 @@ EDITS = {
     + jobs(sample_model_causes=1, describe_model_causes=1, train_control=1) + MODEL
     + jobs("register_methods", "estimate") + METHODS + ESTIMATED + CONTROLS,
     "gpca/descriptors/entropy.py":
-        jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED,
-    "gpca/uncertainty/estimators/censi.py": jobs(estimate=2) + ESTIMATED,
+        jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED
+        + EXCHANGED,
+    "gpca/uncertainty/estimators/censi.py": jobs(estimate=2) + ESTIMATED + EXCHANGED,
     "gpca/reporting/figures/estimators.py": jobs("estimators"),
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
     "gpca/controls/variants.py": jobs(train_control=2) + CONTROLS,
     "gpca/controls/judged.py": CONTROLS_SHOWN,
+    "gpca/exchange/estimated.py": EXCHANGED,
 }  # fmt: skip
 
 

@@ -32,6 +32,7 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
         "controls.explainers": ("explainer", explainers()),
+        "exchange.explainers": ("explainer", explainers()),
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
         "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
         "recovery.actions": ("action", ACTIONS),

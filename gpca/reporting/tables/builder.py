@@ -149,3 +149,11 @@ def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
 def mean_over(seeds: int | str, samples: int | str) -> str:
     """Return the start of the footnote that most tables begin with; it ends with what ± means, without a full stop."""
     return f"Mean over {plural(seeds, 'seed')}, {samples} test samples each; {INTERVAL}"
+
+
+def missing_packages(left_out: Mapping[str, str]) -> list[str]:
+    """Return the footnote on methods whose package is not installed, if there are any."""
+    if not left_out:
+        return []
+    told = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
+    return [f"Left out, as the package is not installed: {told}."]

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from gpca.attribution.metrics import ALL
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over
+from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, missing_packages
 from gpca.reporting.tables.table import Column, Table
 from gpca.trials.metrics import BINS, bin_name
 from gpca.trials.rows import INITIAL, NO_START, row_name
@@ -134,7 +134,4 @@ def _notes(
         "of the diameter d, ADD or, for symmetric objects, ADD-S, and the method says so: a registration that failed "
         "is none. Bold: best of a start."
     ]
-    if left_out:
-        told = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
-        notes.append(f"Left out, as the package is not installed: {told}.")
-    return notes
+    return [*notes, *missing_packages(left_out)]

@@ -1,0 +1,57 @@
+"""Explainers that an experiment asks more than once, each made anew for every lesson."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from baselines.registry import explainer_entry, require_settings
+from gpca.errors import InputError
+from gpca.explainers.interface import ConceptExplainer, Describing
+from gpca.pairs.dataset import Registrations
+from gpca.settings import check_settings
+
+Embed = Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]  # and the name of their source -> h and logits
+
+
+@dataclass(frozen=True)
+class Rival:
+    """One explainer.
+
+    Attributes:
+        make: a new one at every call.
+        reads, observed_only: what it needs attached, as in :class:`gpca.explainers.interface.ExplainerEntry`.
+    """
+
+    make: Callable[[], ConceptExplainer]
+    reads: str
+    observed_only: bool = False
+
+
+def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> dict[str, Rival]:
+    """Return the explainers of a config's section, name -> settings.
+
+    Raises:
+        InputError: none, an unknown one, or settings that it does not take.
+    """
+    if not explainers:
+        raise InputError("setting explainers", "names none", "give at least one")
+    rivals = {}
+    for name, settings in explainers.items():
+        require_settings(name, settings)
+        check_settings(dict(settings), "explainers", name)
+        entry = explainer_entry(name)
+        rivals[name] = Rival(partial(entry.make, source, seed, **settings), entry.reads, entry.observed_only)
+    return rivals
+
+
+def described_for(rivals: Mapping[str, Rival], registrations: Registrations) -> Registrations:
+    """Return the registrations with what the explainers measure of each attached, once for all lessons."""
+    for rival in rivals.values():
+        explainer = rival.make()
+        if isinstance(explainer, Describing):
+            registrations = explainer.describe(registrations)
+    return registrations

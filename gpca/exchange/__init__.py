@@ -1,0 +1,1 @@
+"""Explainers with another registration method, or another estimator of uncertainty, beneath them."""

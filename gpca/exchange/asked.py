@@ -1,0 +1,19 @@
+"""Which explainers can be asked with something else beneath them."""
+
+from __future__ import annotations
+
+from baselines.registry import explainer_entry
+from gpca.errors import InputError
+
+DESIGN = "additive"  # whose conditions estimators are asked about
+
+
+def require_exchangeable(name: str) -> None:
+    """Raise an InputError unless the explainer is known and reads what is exchanged.
+
+    That is registrations, their embeddings, the conditions of design ``additive``, or of any the observed pair alone.
+    """
+    entry = explainer_entry(name)
+    if entry.design not in (None, DESIGN) and not entry.observed_only:
+        fault = f"reads design '{entry.design}', of which estimators have no part"
+        raise InputError(f"explainer '{name}'", fault, f"name one that reads '{DESIGN}'")

@@ -1,0 +1,46 @@
+"""What is exchanged beneath the explainers, and on how many registrations: nothing here needs torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from gpca.settings import Bounds, Count
+
+BALANCED = {"multipleOf": 3}  # over the concepts
+METHOD, ESTIMATOR = "method", "estimator"  # what is exchanged
+LABELS = ("exchanged", "learnt_from", "asked_of", "explainer")  # columns before those of a prediction file
+FAILURE = "failure"  # the column behind them: why the method failed, or the estimator
+
+
+@dataclass(frozen=True)
+class ExchangeSettings:
+    """Which methods and estimators, and how many registrations.
+
+    Attributes:
+        seeds: the first so many of the run's.
+        methods: registration methods, each learnt from and asked about in its turn.
+        train, test: registrations of each source and seed, by each of them, at most.
+        points: of source and of target that are registered, at most.
+        estimators: of the covariance, each in the place of Monte-Carlo.
+        estimated_train: training registrations whose covariance is estimated, and as many others from which estimators
+            learn, at most.
+        estimated_test: test registrations that are explained by their uncertainty, at most.
+    """
+
+    seeds: Count = 3
+    methods: tuple[str, ...] = ("point_to_point", "point_to_plane")
+    train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 120
+    test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 60
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 512
+    estimators: tuple[str, ...] = ("monte_carlo",)
+    estimated_train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 24
+    estimated_test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 9
+
+    @classmethod
+    def from_dict(cls, settings: dict) -> ExchangeSettings:
+        """Build from the config's section ``exchange``; sources and explainers are not among the settings."""
+        given = {name: value for name, value in settings.items() if name not in ("sources", "explainers")}
+        for name in {"methods", "estimators"} & set(given):
+            given[name] = tuple(given[name])
+        return cls(**given)

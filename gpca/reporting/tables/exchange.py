@@ -1,0 +1,125 @@
+"""Makes the tables of explainers with other estimators and other registration methods beneath them.
+
+Both take these arguments and raise the same error:
+
+    metrics: The tidy metrics that :func:`gpca.exchange.metrics.collect` makes.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name.
+    explainers: The title of each name, in order.
+    InputError: The metrics hold none of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from gpca.attribution.metrics import ALL
+from gpca.exchange.metrics import ANOTHER
+from gpca.objects.title import stand_in_clause
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, missing_packages, rows_where
+from gpca.reporting.tables.table import Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_NOTHING = ("metrics", "hold no explanation", "run the step exchange first")
+_OF_ESTIMATORS = {
+    "agreement": Column("As with Monte-Carlo"),
+    "abstained": Column("Abstained", interval=False),
+    "no_estimate": Column("No estimate", interval=False),
+}
+
+
+def table14_estimator_explanations(
+    metrics: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    explainers: Mapping[str, str],
+    estimators: Mapping[str, str],
+) -> Table:
+    """Return accuracy in all and by concept, and what agrees with Monte-Carlo: explainers × estimators.
+
+    Args:
+        metrics, sources, explainers: See above.
+        estimators: The title of each name, in order.
+    """
+    table = TableBuilder("table14_estimator_explanations", {"explainer": "Explainer", "estimator": "Uncertainty by"})
+    causes = (ALL, *CONCEPTS)
+    for explainer, words in explainers.items():
+        rows = rows_where(metrics, table=explainer)
+        for name, title in estimators.items():
+            cells = {key: cell_over_sources(rows, rows, sources, name, "accuracy", key, 100) for key in causes}
+            cells |= {key: cell_over_sources(rows, rows, sources, name, key, ALL, 100) for key in _OF_ESTIMATORS}
+            table.add_row([(explainer, words), (name, title)], cells)
+    table.require_rows(*_NOTHING)
+    table.compare_down([ALL], same=1)
+    return table.build(
+        caption="Accuracy (%) with each estimator in the place of Monte-Carlo" + stand_in_clause(sources.values()),
+        column_head="metric",
+        columns={key: Column(key.capitalize()) for key in causes} | _OF_ESTIMATORS,
+        footnotes=(
+            f"{mean_over(table.most_seeds(), _samples(table, ALL))}. The uncertainty is how far the covariance "
+            "diverges from that of the untouched pair, as in Table I. As with Monte-Carlo: share of the samples of "
+            "which the same is said. Bold: best of an explainer.",
+            "Abstained: all concepts have the same value. No estimate: the estimator failed or refused under some "
+            "condition; the sample counts as wrong.",
+        ),
+    )
+
+
+def table14_method_matrix(
+    metrics: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    explainers: Mapping[str, str],
+    methods: Mapping[str, str],
+    left_out: Mapping[str, str],
+) -> Table:
+    """Return the accuracy of explainers × the method learnt from, by that of the test registrations.
+
+    Args:
+        metrics, sources, explainers: See above.
+        methods: The title of each name, in order.
+        left_out: The package that is missing, by the title of the method that needs it.
+    """
+    table = TableBuilder("table14_method_matrix", {"explainer": "Explainer", "learnt_from": "Learnt from"})
+    names = [*methods, ANOTHER]
+    for explainer, words in explainers.items():
+        rows = rows_where(metrics, table=explainer)
+        for learnt_from, title in methods.items():
+            cells = {name: cell_over_sources(rows, rows, sources, name, "accuracy", learnt_from, 100) for name in names}
+            table.add_row([(explainer, words), (learnt_from, title)], cells)
+    table.require_rows(*_NOTHING)
+    table.compare_down(methods, same=1)
+    columns = {name: Column(f"on {title}") for name, title in methods.items()} | {ANOTHER: Column("on another (mean)")}
+    shown = {key for _, key in table.cells}
+    return table.build(
+        caption="Accuracy (%) from each registration method to each other" + stand_in_clause(sources.values()),
+        column_head="asked_of",
+        columns={name: column for name, column in columns.items() if name in shown},
+        footnotes=(
+            f"{mean_over(table.most_seeds(), _samples(table, next(iter(methods))))}. The explainer learns from "
+            "registrations by one method and explains the same test pairs as registered by another; the encoder is the "
+            "run's own, which has seen point-to-point alone. Bold: best on a method.",
+            *_failed(metrics, table, sources, methods),
+            *missing_packages(left_out),
+        ),
+    )
+
+
+def _samples(table: TableBuilder, column: str) -> int:
+    """Return how many test samples of a seed the first row's cell in a column has."""
+    cell = table.cells[0, column]
+    return cell.test_samples // cell.seeds
+
+
+def _failed(
+    metrics: pd.DataFrame, table: TableBuilder, sources: Mapping[str, Mapping], methods: Mapping[str, str]
+) -> list[str]:
+    explainer, learnt_from = (key for key, _ in table.rows[0])
+    rows = rows_where(metrics, table=explainer)
+    shares = {
+        title: cell_over_sources(rows, rows, sources, name, "failed", learnt_from, 100)
+        for name, title in methods.items()
+    }
+    told = ", ".join(f"{title} {cell.mean:.1f} %" for title, cell in shares.items() if cell)
+    return [f"Registrations that failed by the method's own account, and count as they are: {told}."]

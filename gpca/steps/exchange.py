@@ -1,0 +1,87 @@
+"""Step ``exchange``: registrations -> explanations with other methods and estimators of uncertainty beneath them."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from functools import partial
+from pathlib import Path
+
+import torch
+
+from gpca.alignment.methods.registry import require_settings
+from gpca.arguments import SEED
+from gpca.controls.rivals import make_rivals
+from gpca.csv_file import write_csv
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, load_model
+from gpca.exchange.asked import DESIGN, require_exchangeable
+from gpca.exchange.experiment import Exchange
+from gpca.exchange.settings import ExchangeSettings
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
+from gpca.provenance import record_provenance
+from gpca.settings import check_settings
+from gpca.steps import checked_sections, per_seed
+from gpca.trials.judge import Judges
+from gpca.uncertainty.estimators.registry import require_estimator_settings
+from gpca.uncertainty.settings import UncertaintySettings
+
+OF_NAMES = ("methods", "estimators")  # name -> settings; what is not in them has none
+SECTIONS = {
+    "exchange": ("exchange",),
+    "uncertainty": ("uncertainty", DESIGN),
+    "encoder": ("encoders", "*"),
+}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` holds `SECTIONS` and `OF_NAMES` of the config, and `explainers`."""
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
+    parser.add_argument("--objects", required=True, type=Path)
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+", help="one per seed")
+    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights, one per seed")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs of what explainers say, one per seed")
+
+
+def run(options: Namespace) -> None:
+    """Let every explainer learn and explain with each method and each estimator beneath it, seed by seed."""
+    torch.set_num_threads(options.threads)
+    given = dict(options.settings)
+    explainers = given.pop("explainers", {})
+    for name in explainers:
+        require_exchangeable(name)
+    own = {section: given.pop(section, {}) for section in OF_NAMES}
+    for section, of_names in own.items():
+        if of_names:
+            check_settings(of_names, section)
+    given = checked_sections(given, SECTIONS)
+    settings, encoder = ExchangeSettings.from_dict(given["exchange"]), EncoderSettings(**given["encoder"])
+    methods = {name: own["methods"].get(name) or {} for name in settings.methods}
+    for name, of_method in methods.items():
+        require_settings(name, of_method)
+    estimators = {name: own["estimators"].get(name) or {} for name in settings.estimators}
+    for name, of_estimator in estimators.items():
+        require_estimator_settings(name, of_estimator)
+    runs = {name: value for name, value in given["uncertainty"].items() if name != "samples"}
+    objects = ObjectClouds.load(options.objects)
+    for seed, registrations_path, weights, out in per_seed(options, "registrations", "encoders", "out"):
+        rivals = make_rivals(explainers, options.source, seed)
+        inputs = [options.objects, registrations_path, weights]
+        with record_provenance([out], inputs, options.settings, seed=seed):
+            exchange = Exchange(
+                source=options.source,
+                seed=seed,
+                settings=settings,
+                methods=methods,
+                estimators=estimators,
+                uncertainty=UncertaintySettings(**runs),
+                rivals=rivals,
+                embed=partial(_embedded, load_model(weights, encoder), encoder, seed),
+            )
+            judges = Judges(objects, f"objects of {options.source}")
+            write_csv(out, exchange.run(Registrations.load(registrations_path), judges))
+
+
+def _embedded(model, encoder: EncoderSettings, seed: int, asked: Registrations, source: str):
+    return embed(model, asked, source, seed, encoder)

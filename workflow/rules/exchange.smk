@@ -1,0 +1,90 @@
+# Registrations -> what explainers say with other methods, and other estimators of uncertainty, beneath them.
+EXCHANGE = config["exchange"]
+EXCHANGE_METHODS = NAMES["exchange_method"]
+EXCHANGE_SEEDS = NAMES["exchange_seed"]
+EXCHANGE_EXPLAINERS = {
+    name: (config["explainers"].get(name) or {}) | (own or {})
+    for name, own in EXCHANGE["explainers"].items()
+}
+
+
+rule exchanges:
+    input:
+        collect(
+            "<results>/exchange/{source}/seed{seed}.csv",
+            source=EXCHANGE["sources"],
+            seed=EXCHANGE_SEEDS,
+        ),
+
+
+rule explain_exchanged:
+    input:
+        objects="<results>/objects/{source}.npz",
+        registrations=collect(
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=EXCHANGE_SEEDS
+        ),
+        encoders=collect(
+            f"<results>/encoders/{{{{source}}}}/{CONTROL_ENCODER}/seed{{seed}}.pt",
+            seed=EXCHANGE_SEEDS,
+        ),
+        code=code_files(
+            "gpca.steps.exchange",
+            encoder_module(CONTROL_ENCODER),
+            *map(explainer_module, EXCHANGE_EXPLAINERS),
+            *map(method_module, EXCHANGE_METHODS),
+            *map(estimator_module, EXCHANGE["estimators"]),
+        ),
+    output:
+        collect("<results>/exchange/{{source}}/seed{seed}.csv", seed=EXCHANGE_SEEDS),
+    log:
+        "<logs>/exchange/{source}.log",
+    benchmark:
+        "<benchmarks>/exchange/{source}.tsv"
+    wildcard_constraints:
+        source="|".join(EXCHANGE["sources"]),
+    priority: 2
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(
+            {
+                "exchange": {
+                    name: value
+                    for name, value in EXCHANGE.items()
+                    if name not in ("sources", "explainers")
+                }
+                | {"methods": EXCHANGE_METHODS},
+                "explainers": EXCHANGE_EXPLAINERS,
+                "methods": {
+                    name: config["methods"][name] for name in EXCHANGE_METHODS
+                },
+                "estimators": {
+                    name: config["estimators"][name] for name in EXCHANGE["estimators"]
+                },
+                "uncertainty": config["uncertainty"].get("additive", {}),
+                "encoder": config["encoders"][CONTROL_ENCODER],
+            }
+        ),
+        seeds=EXCHANGE_SEEDS,
+    shell:
+        "python -m gpca exchange --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "--objects {input.objects} --registrations {input.registrations} --encoders {input.encoders} "
+        "--settings {params.settings:q} --out {output} 2> {log}"
+
+
+use rule control_metrics as exchange_metrics with:
+    input:
+        prediction_files=rules.exchanges.input,
+        code=collector_code("gpca.exchange.metrics:collect"),
+    output:
+        "<results>/exchange.csv",
+    log:
+        "<logs>/exchange.log",
+    benchmark:
+        "<benchmarks>/exchange.tsv"
+    params:
+        collector="gpca.exchange.metrics:collect",
