@@ -26,6 +26,7 @@ from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
+from gpca.gradients.settings import GradientSettings
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import SCHEMA, Bounds
 from gpca.trials.settings import EstimatorPairSettings, PairSettings
@@ -122,6 +123,7 @@ class Config:
     kernel_grid: Annotated[sections.Grid, GRID]
     learners: Annotated[dict[str, Settings], BY_NAME]
     controls: Annotated[Controls, Keys(required=EVERY)]
+    gradients: Annotated[GradientSettings, COMPLETE]
     shift: Annotated[sections.Shift, SHIFT]
     real_world: RealWorld
     model: sections.ExplainedModel
