@@ -20,6 +20,6 @@ class GradientSettings:
     """
 
     samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 30
-    deleted: tuple[OpenShare, ...] = (0.1, 0.25, 0.5)
+    deleted: tuple[OpenShare, ...] = (0.05, 0.1, 0.25)
     vectors: Annotated[int, Bounds(minimum=2, maximum=1000)] = 20
     level: OpenShare = 0.05

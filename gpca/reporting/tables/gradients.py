@@ -17,6 +17,7 @@ from gpca.gradients.metrics import SALIENCY, TCAV, percent
 from gpca.objects.title import title_of
 from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,7 +57,7 @@ def saliency_deletion(metrics: pd.DataFrame, sources: Mapping[str, Mapping], con
         column_head="quantity",
         columns=columns,
         footnotes=(
-            f"{mean_over(table.most_seeds(), conditions['samples'])}, one draw of points of each.",
+            f"{mean_over(table.most_seeds(), conditions['samples'])}; one draw of points of each sample.",
             "Fall: of the score of the concept named on the whole draw, in hundredths; in brackets how much more than "
             "at random. To the centre: by what moving a point to the centre does to the score (Zheng et al. 2019). At "
             "random is the mean of four orders.",
@@ -93,7 +94,7 @@ def tcav(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapp
         column_head="quantity",
         columns=columns,
         footnotes=(
-            f"Means over {table.most_seeds()} seed(s) and {conditions['vectors']} probes of each concept and seed.",
+            f"Means over {plural(table.most_seeds(), 'seed')}; {conditions['vectors']} probes for each concept.",
             "Score: share of the test samples of the class whose log odds of it grow along the concept; without any "
             "relation about half. Seeds: in how many of them it differs from the scores of random probes, at the level "
             f"{conditions['level']:g} over all tests of a seed (Bonferroni). Probes right: accuracy on training "
