@@ -82,7 +82,7 @@ class EdgeConv(nn.Module):
         neighbours_B_N_k = knn_indices(x_B_N_F, self.k) if sizes is None else knn_indices_within(x_B_N_F, self.k, sizes)
         w1, w2 = self.weight.chunk(2, dim=1)
         ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
-        wants_gradient = torch.is_grad_enabled() and ac_B_N_2F.requires_grad
+        wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
         if ac_B_N_2F.device.type != "cpu" or (wants_gradient and not self.training):
             return _edge_max_plain(ac_B_N_2F, neighbours_B_N_k, self.norm)
         if not self.training:
