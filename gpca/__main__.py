@@ -34,6 +34,7 @@ STEPS = {
     "train_control": "registrations -> embeddings by an encoder that is trained under a control",
     "controls": "registrations and embeddings -> what every explainer says under every control",
     "exchange": "registrations -> explanations with other methods and estimators of uncertainty beneath them",
+    "gradients": "registrations, encoder and embeddings -> what GP-CA's scores react to: saliency maps and TCAV",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "kernel_grid": "embeddings -> every kernel, learning rate and number of iterations",

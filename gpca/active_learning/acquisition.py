@@ -197,4 +197,9 @@ STRATEGIES = {
     "typiclust": Strategy("TypiClust", typiclust, needs_scores=False),
 }
 
-STREAMS = {"stream_random": "Stream, random", "stream_bald": "Stream, BALD over a threshold"}
+STREAMS = {
+    "stream_random": "Stream, random",
+    "stream_bald": "Stream, BALD over a threshold",
+    "stream_narr": "Stream, Mondrian forest (after Narr et al.)",
+    "stream_clever": "Stream, Bayesian layer (after CLEVER)",
+}

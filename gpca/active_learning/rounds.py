@@ -156,8 +156,12 @@ def _step(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> 
     }
 
 
-def accuracies(task: Task[Projection], gpc: GPC) -> tuple[float, float]:
-    """Return the accuracy over all test samples and over those of the concept held out; NaN of none."""
-    right_N = np.array(gpc.classes)[gpc.attribute(task.test.h)[0].argmax(axis=1)] == task.test.concept_N
+def accuracies(task: Task[Projection], classifier) -> tuple[float, float]:
+    """Return the accuracy over all test samples and over those of the concept held out; NaN of none.
+
+    The classifier is a GPC, or what has its ``classes`` and ``attribute``.
+    """
+    scores_N_C = classifier.attribute(task.test.h)[0]
+    right_N = np.array(classifier.classes)[scores_N_C.argmax(axis=1)] == task.test.concept_N
     new_N = task.test.concept_N == task.held_out
     return float(right_N.mean()), float(right_N[new_N].mean()) if new_N.any() else float("nan")

@@ -1,7 +1,8 @@
 """The online form of active learning: samples arrive one at a time, and a label is asked for where it is worth it.
 
-The paper's loop (Sec. III-C and Fig. 4) as Narr et al. (2016) and CLEVER (2025) run it: the GPC names a concept as a
-sample arrives; where its uncertainty passes a threshold, and the budget allows, it asks for the label and learns.
+The paper's loop (Sec. III-C and Fig. 4): the classifier names a concept as a sample arrives; where its uncertainty
+passes a threshold, and the budget allows, it asks for the label and learns. The learners of Narr et al. (2016) and
+CLEVER (2025), which the paper cites for it, meet the same stream (:mod:`gpca.active_learning.stream_learners`).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 
 from gpca.active_learning.rounds import Task, accuracies
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.active_learning.stream_learners import LEARNERS, StreamLearner
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.errors import InputError
@@ -51,7 +53,8 @@ def run_stream(
     """Let the samples arrive, ask about some, learn at once.
 
     ``stream_bald`` asks where BALD exceeds a quantile of the last `window` arrivals, raised or lowered to stay within
-    the budget (Balanced Incremental Quantile Filter, Kottke et al. 2015); ``stream_random`` asks at random.
+    the budget (Balanced Incremental Quantile Filter, Kottke et al. 2015); ``stream_random`` asks at random. The others
+    ask as ``stream_bald``, by an uncertainty of their own, and learn in the GPC's place.
 
     Args:
         task: projected by `gpc`.
@@ -71,37 +74,37 @@ def run_stream(
         manager = StreamRandomSampling(budget=stream.budget, allow_exceeding_budget=False, random_state=seed)
     else:
         manager = BalancedIncrementalQuantileFilter(w=stream.window, w_tol=stream.window, budget=stream.budget)
-    gpc = copy(gpc)
+    learner: StreamLearner = LEARNERS[strategy](task, *axes, task.held_out) if strategy in LEARNERS else copy(gpc)
     right: list[bool] = []
     asked: list[int] = []
-    steps = [_row(task, gpc, right, asked, stream)]
+    steps = [_row(task, learner, right, asked, stream)]
     for row in arrival_order(task, stream, *axes):
         h = task.pool.h[[row]]
         concept = task.pool.concept_N[row]
-        scores_1_C, _, bald_1 = gpc.attribute(h)
-        right.append(gpc.classes[int(scores_1_C.argmax())] == concept)
-        if _asks(manager, bald_1):
+        scores_1_C, _, worth_1 = learner.attribute(h)
+        right.append(learner.classes[int(scores_1_C.argmax())] == concept)
+        if _asks(manager, worth_1):
             asked.append(row)
-            gpc.update(h, task.pool.concept_N[[row]], settings.iterations, settings.tolerance)
+            learner.update(h, task.pool.concept_N[[row]], settings.iterations, settings.tolerance)
         if len(right) % stream.every == 0:
-            steps.append(_row(task, gpc, right, asked, stream))
+            steps.append(_row(task, learner, right, asked, stream))
     return steps
 
 
-def _asks(manager, bald_1: np.ndarray) -> bool:
+def _asks(manager, worth_1: np.ndarray) -> bool:
     if hasattr(manager, "query_by_utility"):
-        queried = manager.query_by_utility(bald_1)
-        manager.update(bald_1[:, None], queried, bald_1)
+        queried = manager.query_by_utility(worth_1)
+        manager.update(worth_1[:, None], queried, worth_1)
     else:
-        queried = manager.query(bald_1[:, None])
-        manager.update(bald_1[:, None], queried)
+        queried = manager.query(worth_1[:, None])
+        manager.update(worth_1[:, None], queried)
     return len(queried) > 0
 
 
 def _row(
-    task: Task[Projection], gpc: GPC, right: list[bool], asked: list[int], stream: StreamSettings
+    task: Task[Projection], learner: StreamLearner, right: list[bool], asked: list[int], stream: StreamSettings
 ) -> dict[str, float]:
-    accuracy, accuracy_new = accuracies(task, gpc)
+    accuracy, accuracy_new = accuracies(task, learner)
     return {
         "arrived": len(right),
         "present": int(len(right) >= stream.quiet),

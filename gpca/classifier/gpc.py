@@ -148,6 +148,11 @@ class GPC:
         """Return mean and standard deviation (N, C) of the latent logits q(f(h)); the latents are independent."""
         return self._latents.marginals(self.project(h_N_d))
 
+    def mean_logits(self, h_N_d: torch.Tensor) -> torch.Tensor:
+        """Return the means (N, C) of the latent logits, differentiable in the embeddings."""
+        scaled_N_d = (h_N_d - torch.from_numpy(self._scaler.mean_)) / torch.from_numpy(self._scaler.scale_)
+        return self._prior.means(scaled_N_d, self._latents.mean_C_M)
+
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
 

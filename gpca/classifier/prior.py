@@ -51,6 +51,17 @@ class Prior:
         residual_C_N = variance_C_N - np.square(weights_C_M_N).sum(axis=1)
         return Projection(inputs_N_d.numpy(), np.swapaxes(weights_C_M_N, 1, 2), np.maximum(residual_C_N, 0))
 
+    def means(self, inputs_N_d: torch.Tensor, mean_C_M: np.ndarray) -> torch.Tensor:
+        """Return the means (N, C) of the latents at standardised inputs, differentiable in these, in float64.
+
+        Args:
+            inputs_N_d: the inputs.
+            mean_C_M: of the whitened inducing values.
+        """
+        weights_C_M = np.stack([solve_triangular(L.T, m) for L, m in zip(self._cholesky_C_M_M, mean_C_M, strict=True)])
+        K_C_M_N = cross_covariance(self.covariance, self.inducing_M_d.double(), inputs_N_d.double())
+        return torch.einsum("cmn,cm->nc", K_C_M_N, torch.from_numpy(weights_C_M))
+
     def grow(self) -> Prior:
         """Return the prior with one more covariance, its parameters the geometric means of the others'."""
         return self._with_parameters(lambda values_C: torch.cat([values_C, _geometric_mean(values_C)]))

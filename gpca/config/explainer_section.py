@@ -49,6 +49,15 @@ class ForestOfResiduals:
 
 
 @dataclass(frozen=True)
+class RulesOfResiduals:
+    """A shallow tree of residuals, whose logarithm has a floor."""
+
+    depth: Annotated[int, Bounds(minimum=1, maximum=20)] = 3
+    smallest_leaf: Annotated[float, Bounds(exclusiveMinimum=0, maximum=0.5)] = 0.02
+    floor: Positive = 1e-4
+
+
+@dataclass(frozen=True)
 class Boosting:
     """Gradient boosting on the descriptors of a pair."""
 
@@ -111,6 +120,7 @@ EXPLAINERS = {
     "sa_supervised": Probes | None,
     "residuals_logistic": LogisticOfResiduals | None,
     "residuals_forest": ForestOfResiduals | None,
+    "residuals_rules": RulesOfResiduals | None,
     "gpca_pair": PairClassifier | None,
     "pair_forest": ForestOfPairs | None,
     "density": DensityOfPairs | None,

@@ -27,6 +27,7 @@ from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
 from gpca.exchange.settings import ExchangeSettings
 from gpca.files import whole_file
+from gpca.gradients.settings import GradientSettings
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import SCHEMA, Bounds
 from gpca.trials.settings import EstimatorPairSettings, PairSettings
@@ -132,6 +133,7 @@ class Config:
     learners: Annotated[dict[str, Settings], BY_NAME]
     controls: Annotated[Controls, Keys(required=EVERY)]
     exchange: Annotated[Exchange, Keys(required=EVERY)]
+    gradients: Annotated[GradientSettings, COMPLETE]
     shift: Annotated[sections.Shift, SHIFT]
     real_world: RealWorld
     model: sections.ExplainedModel

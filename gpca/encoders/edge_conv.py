@@ -82,7 +82,8 @@ class EdgeConv(nn.Module):
         neighbours_B_N_k = knn_indices(x_B_N_F, self.k) if sizes is None else knn_indices_within(x_B_N_F, self.k, sizes)
         w1, w2 = self.weight.chunk(2, dim=1)
         ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
-        if ac_B_N_2F.device.type != "cpu":
+        wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
+        if ac_B_N_2F.device.type != "cpu" or (wants_gradient and not self.training):
             return _edge_max_plain(ac_B_N_2F, neighbours_B_N_k, self.norm)
         if not self.training:
             return self._inference(ac_B_N_2F, neighbours_B_N_k)
@@ -122,7 +123,10 @@ class _EdgeMax(torch.autograd.Function):
 
 
 def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbours_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
-    """Evaluate the same layer with torch operations alone (CUDA): gathers edges, still no per-edge matrix product."""
+    """Evaluate the same layer with torch operations alone: gathers edges, still no per-edge matrix product.
+
+    On a GPU, and where a trained layer is asked for the gradient in its inputs.
+    """
     a_B_N_F, c_B_N_F = ac_B_N_2F.chunk(2, dim=-1)
     batch, n, k = neighbours_B_N_k.shape
     rows = (neighbours_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]).reshape(-1)

@@ -12,6 +12,7 @@ ENCODERS = {
     "pointnet2": "gpca.encoders.pointnet2:PointNet2",
     "pointnext": "gpca.encoders.pointnext:PointNeXt",
 }
+DIFFERENTIABLE = ("dgcnn", "pointnet")  # those that, once trained, still have a gradient in the points on the processor
 
 
 def make_encoder(backbone: str, options: dict):

@@ -6,7 +6,7 @@ frame, ICP, the mean embedding of random draws, posterior draws.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,28 +15,26 @@ from time import perf_counter
 import numpy as np
 import torch
 
-from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points, thin
+from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import inverse, require_rigid, transform
+from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.scores import entropy
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
+from gpca.model.clouds import Clouds
 from gpca.model.diagnoser import Diagnosis
-from gpca.model.explanation import Explanation
+from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.file import Model, model_path
 from gpca.model.pose_spread import MONTE_CARLO, NAMES, estimated_spread, spread_estimator, spread_of_icp
-from gpca.objects.canonical import estimate_normals
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import UncertaintySettings
 
 GOOD_FITNESS = 0.9  # from which on an initial pose is not doubted
 INVERSE_COST = 0.5  # of that from the initial pose; where the inverse of this ends with less, it was probably meant
-LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
 
 class Explainer:
@@ -99,61 +97,35 @@ class Explainer:
         seconds: dict[str, float] = {}
         notes: list[str] = []
         with _timed(seconds, "preparation"):
-            source, target = (np.asarray(points, np.float64) for points in (source_points, target_points))
-            T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
-            require_rigid(T_init, "initial pose")
-            require_cloud_points(source, "source")
-            frame = frame or CanonicalFrame.of(target, unit)
-            target = frame.coordinates(self._thinned(target, "target", notes))
-            seen = self._thinned(source, "source", notes)
-            source = frame.coordinates(transform(T_init, seen))
-            _require_like_sizes(source, target)
-            icp = self._icp(target)
+            given = (source_points, target_points, T_target_source_init, unit, frame)
+            clouds = Clouds.prepared(*given, self.model.cloud_points, self.model.icp, notes)
         with _timed(seconds, "icp"):
-            if register is None:
-                T_icp, fitness, rmse = (of_starts[0] for of_starts in icp.register(source, np.eye(4)[None]))
-            else:
-                outcome = register(Pair(source, target, seed=seed_of("explanation", method)).with_normals())
-                T_icp, fitness, rmse = outcome.T_target_source, outcome.fitness, outcome.inlier_rmse
-                notes += [] if outcome.converged else [f"{method} failed: {outcome.failure}"]
+            at_pose = self._aligned(clouds, register, method, notes)
         found = None
         if diagnose and self.model.diagnoser is not None:
             with _timed(seconds, "diagnosis"):
-                found = self.model.diagnoser.diagnose(source, target, T_icp)
-            found = replace(found, expected_error=found.expected_error * frame.diameter)
+                found = self.model.diagnoser.diagnose(clouds.source, clouds.target, at_pose.T_target_source)
+            found = replace(found, expected_error=found.expected_error * clouds.frame.diameter)
         with _timed(seconds, "embedding"):
-            h_1_d = self.embed(transform(T_icp, source))
+            h_1_d = self.embed(transform(at_pose.T_target_source, clouds.source))
         with _timed(seconds, "attribution"):
             (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
         told = [*scores_C, *((found.failure, *found.causes.values()) if found else ())]
         if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
             raise InputError("model", "it gives no finite numbers for these clouds", "make another one")
         with _timed(seconds, "familiarity"):
-            warnings = self._warnings(source, target, found, fitness)
+            warnings = self._warnings(clouds, found, at_pose.fitness)
             if T_target_source_init is not None and register is None:
-                from_inverse = frame.coordinates(transform(inverse(T_init), seen))
-                warnings += self._inverted(icp, from_inverse, fitness, rmse)
+                warnings += self._inverted(clouds, at_pose)
         spread = None
         if uncertainty is not None and estimate is not None:
             with _timed(seconds, "uncertainty"):
-                if method is None and estimator == MONTE_CARLO:
-                    spread = spread_of_icp(icp, source, T_icp, uncertainty, frame.diameter)
-                else:
-                    found_by = method or NAMES[self.model.icp.method]
-                    at_pose = Outcome(T_icp, float(fitness), float(rmse))
-                    of_pair = (source, target, at_pose, found_by, uncertainty, frame.diameter)
-                    spread, fault = estimated_spread(estimate, estimator, *of_pair)
-                    notes += [fault] if fault else []
-        if found is None:
-            decision = self.policy.decide(scores_C, float(bald), concepts=self.model.concepts)
-        elif found.state == NOMINAL:
-            decision = Decision(NOTHING, "", "nothing is wrong")
-        else:
-            decision = self.policy.decide(np.array([*found.causes.values()]), found.bald, concepts=(*found.causes,))
+                spread = self._spread(clouds, at_pose, method, estimator, estimate, uncertainty, notes)
+        decision = self._decision(scores_C, float(bald), found)
         return Explanation(
-            T_target_source=frame.pose_outside(T_icp) @ T_init,
-            fitness=float(fitness),
-            inlier_rmse=float(rmse) * frame.diameter,
+            T_target_source=clouds.frame.pose_outside(at_pose.T_target_source) @ clouds.T_target_source_init,
+            fitness=at_pose.fitness,
+            inlier_rmse=at_pose.inlier_rmse * clouds.frame.diameter,
             diagnosis=found,
             method=method or self.model.icp.method,
             scores=dict(zip(self.model.concepts, scores_C.tolist(), strict=True)),
@@ -219,9 +191,52 @@ class Explainer:
         clouds_D_N_3 = torch.from_numpy(aligned.astype(np.float32)[np.array(rows_D_N)])
         return self.model.encoder(clouds_D_N_3.to(self._device)).mean(dim=0, keepdim=True).cpu().numpy()
 
-    def _warnings(self, source: np.ndarray, target: np.ndarray, found: Diagnosis | None, fitness: float) -> list[str]:
+    def _aligned(
+        self,
+        clouds: Clouds,
+        register: Callable[[Pair], Outcome] | None,
+        method: str | None,
+        notes: list[str],
+    ) -> Outcome:
+        """Register by the model's own ICP, or by the method that was asked for; a note says where that failed."""
+        if register is None:
+            poses_1, fitness_1, rmse_1 = clouds.icp.register(clouds.source, np.eye(4)[None])
+            return Outcome(poses_1[0], float(fitness_1[0]), float(rmse_1[0]))
+        found = register(Pair(clouds.source, clouds.target, seed=seed_of("explanation", method)).with_normals())
+        notes += [] if found.converged else [f"{method} failed: {found.failure}"]
+        return Outcome(found.T_target_source, float(found.fitness), float(found.inlier_rmse))
+
+    def _spread(
+        self,
+        clouds: Clouds,
+        at_pose: Outcome,
+        method: str | None,
+        estimator: str,
+        estimate: Callable,
+        settings: UncertaintySettings,
+        notes: list[str],
+    ) -> PoseSpread | None:
+        """Return how uncertain the pose is; a note says why an estimator cannot tell."""
+        diameter = clouds.frame.diameter
+        if method is None and estimator == MONTE_CARLO:
+            return spread_of_icp(clouds.icp, clouds.source, at_pose.T_target_source, settings, diameter)
+        found_by = method or NAMES[self.model.icp.method]
+        of_pair = (clouds.source, clouds.target, at_pose, found_by, settings, diameter)
+        spread, fault = estimated_spread(estimate, estimator, *of_pair)
+        notes += [fault] if fault else []
+        return spread
+
+    def _decision(self, scores_C: np.ndarray, bald: float, found: Diagnosis | None) -> Decision:
+        """Return what to do: by the diagnosis where there is one, otherwise by the scores alone."""
+        if found is None:
+            return self.policy.decide(scores_C, bald, concepts=self.model.concepts)
+        if found.state == NOMINAL:
+            return Decision(NOTHING, "", "nothing is wrong")
+        return self.policy.decide(np.array([*found.causes.values()]), found.bald, concepts=(*found.causes,))
+
+    def _warnings(self, clouds: Clouds, found: Diagnosis | None, fitness: float) -> list[str]:
         """Return what makes the scores doubtful, in words."""
-        warnings = list(self.model.familiar.warnings(source, target)) if self.model.familiar else []
+        warnings = list(self.model.familiar.warnings(clouds.source, clouds.target)) if self.model.familiar else []
         if found is not None and found.unlikeness > 1:
             warnings.append(
                 f"the pair is {found.unlikeness:.1f} times as far from the registrations that the diagnosis was "
@@ -231,33 +246,17 @@ class Explainer:
             warnings.append("no source point is near the target at the initial pose, so the scores mean nothing")
         return warnings
 
-    def _inverted(self, icp: BatchedICP, from_inverse: np.ndarray, fitness: float, rmse: float) -> list[str]:
+    def _inverted(self, clouds: Clouds, at_pose: Outcome) -> list[str]:
         """Return a warning where ICP ends far better from the inverse of the initial pose."""
-        if fitness >= GOOD_FITNESS:
+        if at_pose.fitness >= GOOD_FITNESS:
             return []
+        from_inverse = clouds.frame.coordinates(transform(inverse(clouds.T_target_source_init), clouds.seen))
         distance = self.model.icp.correspondence_distance
-        _, fitness_1, rmse_1 = icp.register(from_inverse, np.eye(4)[None])
-        found, of_inverse = clipped_cost(np.append(fitness, fitness_1), np.append(rmse, rmse_1), distance)
-        if of_inverse < INVERSE_COST * found:
+        _, fitness_1, rmse_1 = clouds.icp.register(from_inverse, np.eye(4)[None])
+        costs_2 = clipped_cost(np.append(at_pose.fitness, fitness_1), np.append(at_pose.inlier_rmse, rmse_1), distance)
+        if costs_2[1] < INVERSE_COST * costs_2[0]:
             return ["the inverse of the initial pose fits far better: is it T_source_target?"]
         return []
-
-    def _thinned(self, points: np.ndarray, role: str, notes: list[str]) -> np.ndarray:
-        kept = thin(points, self.model.cloud_points, role)
-        if len(kept) < len(points):
-            notes.append(f"{role}: {len(kept)} of {len(points)} points, drawn at random")
-        return kept
-
-    def _icp(self, target: np.ndarray) -> BatchedICP:
-        settings = self.model.icp
-        return BatchedICP(target, settings, None if settings.method == "point_to_point" else estimate_normals(target))
-
-
-def _require_like_sizes(source: np.ndarray, target: np.ndarray) -> None:
-    extents = [float(np.linalg.norm(np.ptp(cloud, axis=0))) for cloud in (source, target)]
-    ratio = extents[0] / extents[1]
-    if not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
-        raise InputError("source", f"is {ratio:.3g} times as large as the target", "give both in the same unit")
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.alignment.methods.registry import left_out, method_entry
 from gpca.controls.settings import TRANSFER
+from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import stand_in_clause, title_of
@@ -47,6 +48,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "control_seed": controlled_seeds(config),
         "control": list(config["controls"]["controls"]),
         "transfer_source": list(sources) if transfers(config, sources) else [],
+        "gradient_source": list(sources) if has_gradients(config) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
         "strategy": strategies,
@@ -110,6 +112,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         },
         "exchange_estimators": {name: estimator_entry(name).title for name in config["exchange"]["estimators"]},
         "controls": list(config["controls"]["controls"]),
+        "gradients": config["gradients"],
         "controls_title": _title_of_all(shown),
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": learners,
@@ -151,6 +154,11 @@ def controlled_seeds(config: Mapping) -> list[int]:
 def transfers(config: Mapping, sources: Mapping) -> bool:
     """Return whether explainers are asked about sources that they did not learn from; one alone admits no transfer."""
     return TRANSFER in config["controls"]["controls"] and len(sources) > 1
+
+
+def has_gradients(config: Mapping) -> bool:
+    """Return whether the encoder that GP-CA reads has a gradient in the points, once it is trained."""
+    return config["encoders"][config["embedding"]["encoder"]]["backbone"] in DIFFERENTIABLE
 
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:

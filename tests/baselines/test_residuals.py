@@ -11,7 +11,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import check_settings
 from gpca.uncertainty.spread import SMALLEST_RESIDUAL
 
-RIVALS = ("residuals_logistic", "residuals_forest")
+RIVALS = ("residuals_logistic", "residuals_forest", "residuals_rules")
 
 
 @pytest.fixture(scope="module")
@@ -106,5 +106,6 @@ def test_a_covariance_of_nan_or_none_at_all_is_refused(attached):
 def test_the_config_may_set_what_they_take():
     check_settings({"inverse_regularisation": 0.1, "floor": 1e-5}, "explainers", "residuals_logistic")
     check_settings({"trees": 20, "floor": 1e-5}, "explainers", "residuals_forest")
+    check_settings({"depth": 2, "smallest_leaf": 0.1, "floor": 1e-5}, "explainers", "residuals_rules")
     with pytest.raises(InputError, match="setting floor"):
         check_settings({"floor": 0}, "explainers", "residuals_forest")

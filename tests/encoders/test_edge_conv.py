@@ -50,6 +50,17 @@ def test_inference_agrees_with_per_edge_reference():
     torch.testing.assert_close(fused.eval()(x), reference.eval()(x), **TOLERANCE)
 
 
+def test_a_trained_layer_has_the_gradient_of_the_per_edge_reference_in_its_inputs():
+    fused, reference = layer_pair()
+    x, direction = torch.randn(4, 60, 6), torch.randn(4, 60, 32)
+    fused(x), reference(x)
+    ours, theirs = (
+        torch.autograd.grad((layer.eval()(given) * direction).sum(), given)[0]
+        for layer, given in ((fused, x.clone().requires_grad_()), (reference, x.clone().requires_grad_()))
+    )
+    torch.testing.assert_close(ours, theirs, atol=1e-3, rtol=1e-3)
+
+
 def test_plain_torch_path_agrees_with_fused_path():
     fused, _ = layer_pair()
     plain, _ = layer_pair()

@@ -10,6 +10,7 @@ COLLECTED = [
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
     "exchange.csv",
+    *(["gradients.csv"] if NAMES["gradient_source"] else []),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

@@ -154,7 +154,8 @@ def table3_stream(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
             f"concepts ({conditions['initial']} labelled samples at the start), of the others a third is new. A label "
-            f"may be asked for at {stream['budget']:.0%} of the arrivals; the GPC learns at once.",
+            f"may be asked for at {stream['budget']:.0%} of the arrivals; the GPC learns at once, or the learner that "
+            "the row names instead, simplified as docs/active_learning.md says.",
             "Delay: arrivals from the first sample of the new concept until half of its test samples are named right; "
             "'>': some runs ended before. Running: accuracy over the last arrivals, each judged before its label is "
             "known. Accuracy, New: on all test samples and those of the new concept, at the end. All but Delay are "

@@ -1,0 +1,25 @@
+"""Settings of the gradients: nothing here needs torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from gpca.settings import Bounds, OpenShare
+
+
+@dataclass(frozen=True)
+class GradientSettings:
+    """What is asked of the gradients.
+
+    Attributes:
+        samples: test samples of each source and seed whose points are deleted, balanced; all where there are fewer.
+        deleted: shares of a cloud's points.
+        vectors: concept vectors of each concept, and as many random ones.
+        level: of significance of TCAV, over all its tests of a source and seed.
+    """
+
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 30
+    deleted: tuple[OpenShare, ...] = (0.05, 0.1, 0.25)
+    vectors: Annotated[int, Bounds(minimum=2, maximum=1000)] = 20
+    level: OpenShare = 0.05

@@ -1,0 +1,68 @@
+import pandas as pd
+import pytest
+
+from gpca.errors import InputError
+from gpca.gradients.metrics import collect
+from gpca.reporting.tables.gradients import saliency_deletion, tcav
+
+SOURCES = {"tiny": {"title": "Tiny", "stand_in": False}}
+CONDITIONS = {"samples": 3, "deleted": [0.25], "vectors": 2, "level": 0.05}
+DELETIONS = """sample,concept,named,order,deleted,before,after,changed
+0,noise,noise,gradient,0.25,0.9,0.5,1
+0,noise,noise,random,0.25,0.9,0.8,0.25
+3,pose,pose,gradient,0.25,0.8,0.6,0
+3,pose,pose,random,0.25,0.8,0.8,0
+"""
+TESTED = """tested,concept,score,chance,p,significant,probe
+noise,noise,1.0,0.5,0.001,1,0.9
+noise,pose,0.25,0.5,0.3,0,0.9
+"""
+
+
+@pytest.fixture
+def metrics(tmp_path):
+    files = []
+    for kind, text in (("saliency", DELETIONS), ("tcav", TESTED)):
+        for seed in (0, 1):
+            path = tmp_path / kind / "tiny" / f"seed{seed}.csv"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+            files.append(path)
+    return collect(files[:2], files[2:])
+
+
+def value(metrics, **wanted):
+    for name, entry in wanted.items():
+        metrics = metrics[metrics[name] == entry]
+    return metrics["value"].tolist()
+
+
+def test_the_fall_is_that_of_the_score_and_its_excess_against_random(metrics):
+    assert value(metrics, method="gradient", metric="drop_25") == pytest.approx([0.3, 0.3])
+    assert value(metrics, method="gradient", metric="excess_25") == pytest.approx([0.25, 0.25])
+    assert value(metrics, method="gradient", metric="changed_25") == [0.5, 0.5]
+    assert value(metrics, method="random", metric="excess_25") == []
+    assert value(metrics, method="random", metric="test_samples") == [2, 2]
+    assert value(metrics, table="tcav", method="noise", concept="pose", metric="score") == [0.25, 0.25]
+
+
+def test_the_tables_show_them(metrics):
+    text = saliency_deletion(metrics, SOURCES, CONDITIONS).markdown()
+    assert "| Tiny | Most salient first | 30.0 ± 0.0 (+25.0 ± 0.0) | 50.0 |" in text
+    text = tcav(metrics, SOURCES, CONDITIONS).markdown()
+    assert "| Tiny | noise | 100.0 ± 0.0 | 2 | 25.0 ± 0.0 | 0 | 90.0 ± 0.0 |" in text
+
+
+def test_metrics_of_something_else_make_no_table(metrics):
+    other = pd.DataFrame(metrics).assign(source="other")
+    for make in (saliency_deletion, tcav):
+        with pytest.raises(InputError, match="hold no gradients"):
+            make(other, SOURCES, CONDITIONS)
+
+
+def test_a_file_without_a_column_is_refused(tmp_path):
+    path = tmp_path / "tiny" / "seed0.csv"
+    path.parent.mkdir()
+    path.write_text("sample,order\n0,random\n")
+    with pytest.raises(InputError, match="column 'concept' is missing"):
+        collect([path], [])

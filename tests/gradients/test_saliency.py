@@ -1,0 +1,105 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import make_model
+from gpca.gradients.saliency import (
+    CENTRE,
+    GRADIENT,
+    chosen_rows,
+    deletions,
+    log_odds,
+    orders,
+    point_gradient,
+    saliencies,
+)
+from gpca.gradients.settings import GradientSettings
+from gpca.pairs.perturbation import CONCEPTS
+
+ENCODING = EncoderSettings(draw_points=48, draws=1, options={"k": 6, "point_features": 8})
+
+
+@pytest.fixture(scope="module")
+def encoder():
+    torch.manual_seed(0)
+    return make_model(ENCODING).eval().encoder
+
+
+@pytest.fixture(scope="module")
+def gpc(encoder):
+    random = np.random.default_rng(0)
+    label_N = np.array(CONCEPTS)[np.arange(30) % 3]
+    with torch.no_grad():
+        h_N_d = encoder(torch.from_numpy(random.normal(size=(30, 48, 3)).astype(np.float32) / 3)).numpy()
+    h_N_d += 3 * h_N_d.std() * random.normal(size=(3, h_N_d.shape[1]))[np.arange(30) % 3]
+    return GPC(CONCEPTS, GPCSettings(learning_rate=0.1, iterations=20, inducing=6, draws=50), "tiny", 0).fit(
+        h_N_d, label_N
+    )
+
+
+def test_the_differentiable_means_are_those_of_the_posterior(gpc):
+    h_N_d = gpc.learnt_N_d * gpc._scaler.scale_ + gpc._scaler.mean_
+    assert gpc.mean_logits(torch.from_numpy(h_N_d)).numpy() == pytest.approx(gpc.posterior(h_N_d)[0], abs=1e-4)
+
+
+def test_log_odds_are_those_of_the_softmax():
+    logits = torch.tensor([[1.0, 2.0, -1.0]], dtype=torch.float64)
+    p = torch.softmax(logits, dim=1)[0, 1]
+    assert log_odds(logits, 1).item() == pytest.approx(torch.log(p / (1 - p)).item())
+
+
+def test_the_gradient_in_the_points_is_that_of_differences(encoder, gpc):
+    cloud = torch.from_numpy(np.random.default_rng(1).normal(size=(1, 48, 3)).astype(np.float32) / 3)
+    gradient = point_gradient(encoder, gpc, cloud, 2)
+    largest = np.unravel_index(np.abs(gradient).argmax(), gradient.shape)
+
+    def odds(step):
+        moved = cloud.clone()
+        moved[0, largest[0], largest[1]] += step
+        with torch.no_grad():
+            return log_odds(gpc.mean_logits(encoder(moved)), 2).item()
+
+    assert (odds(1e-3) - odds(-1e-3)) / 2e-3 == pytest.approx(gradient[largest], rel=0.1)
+
+
+def test_salient_is_a_long_gradient_or_what_a_way_to_the_centre_lowers():
+    points = np.array([[2.0, 0, 0], [-2, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 0]])
+    gradient = np.array([[3.0, 0, 0], [1, 0, 0], [0, 0, 5], [0, -1, 0], [1, 1, 1]])
+    found = saliencies(points, gradient)
+    assert found[GRADIENT] == pytest.approx([3, 1, 5, 1, np.sqrt(3)])
+    assert found[CENTRE] == pytest.approx([12, -4, 0, 1, 0])
+
+
+def test_the_orders_begin_with_the_most_and_with_the_least_salient():
+    ways = orders({GRADIENT: np.array([1.0, 3, 2]), CENTRE: np.array([0.0, -1, 1])}, "tiny", 0)
+    assert [way.tolist() for way in ways["gradient"] + ways["to_centre"] + ways["least_gradient"]] == [
+        [1, 2, 0],
+        [2, 0, 1],
+        [0, 2, 1],
+    ]
+    assert all(sorted(way) == [0, 1, 2] for way in ways["random"])
+
+
+def test_samples_are_balanced_and_of_the_test(registrations):
+    rows = chosen_rows(registrations, 9)
+    assert set(registrations.split[rows]) == {"test"}
+    assert [int(np.sum(registrations.concept[rows] == concept)) for concept in CONCEPTS] == [3, 3, 3]
+    assert len(chosen_rows(registrations, 3000)) == 18
+
+
+def test_each_deletion_asks_again_and_repeats_to_the_byte(encoder, gpc, registrations):
+    few = replace(registrations.subset(registrations.rows("test")[:6]), attached={})
+    given = (encoder, gpc, few, "tiny", 0, ENCODING, GradientSettings(samples=3, deleted=(0.25, 0.5)))
+    (rows, maps), (again, _) = deletions(*given), deletions(*given)
+    assert rows.equals(again)
+    assert len(rows) == 3 * 4 * 2
+    assert maps["points"].shape == (3, 48, 3) and maps["saliency"].shape == (3, 48)
+    assert (rows["before"] >= 1 / 3).all()
+    assert rows["after"].nunique() > 6
+    assert set(rows["named"]) <= set(CONCEPTS)
+    assert rows["changed"].between(0, 1).all()

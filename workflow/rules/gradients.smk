@@ -1,0 +1,83 @@
+# Encoders and embeddings -> what GP-CA's scores react to: saliency of points, TCAV -> gradients.csv.
+GRADIENT_ENCODER = config["embedding"]["encoder"]
+
+
+rule gradients:
+    input:
+        collect(
+            "<results>/saliency/{source}/seed{seed}.csv",
+            source=NAMES["gradient_source"],
+            seed=SEEDS,
+        ),
+
+
+rule follow_gradients:
+    input:
+        registrations=collect(
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
+        ),
+        encoders=collect(
+            f"<results>/encoders/{{{{source}}}}/{GRADIENT_ENCODER}/seed{{seed}}.pt",
+            seed=SEEDS,
+        ),
+        embeddings=collect(
+            f"<results>/embeddings/{{{{source}}}}/{GRADIENT_ENCODER}/none/seed{{seed}}.npz",
+            seed=SEEDS,
+        ),
+        code=code_files("gpca.steps.gradients", encoder_module(GRADIENT_ENCODER)),
+    output:
+        deletions=collect("<results>/saliency/{{source}}/seed{seed}.csv", seed=SEEDS),
+        maps=collect("<results>/saliency/{{source}}/seed{seed}.npz", seed=SEEDS),
+        tcav=collect("<results>/tcav/{{source}}/seed{seed}.csv", seed=SEEDS),
+    log:
+        "<logs>/saliency/{source}.log",
+    benchmark:
+        "<benchmarks>/saliency/{source}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(
+            {
+                "gradients": config["gradients"],
+                "encoder": config["encoders"][GRADIENT_ENCODER],
+                "gpc": config["explainers"].get("gpca") or {},
+            }
+        ),
+        seeds=SEEDS,
+    shell:
+        "python -m gpca gradients --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
+        "--registrations {input.registrations} --encoders {input.encoders} --embeddings {input.embeddings} "
+        "--settings {params.settings:q} --deletions {output.deletions} --maps {output.maps} "
+        "--tcav {output.tcav} 2> {log}"
+
+
+rule gradient_metrics:
+    input:
+        deletion_files=rules.gradients.input,
+        tcav_files=collect(
+            "<results>/tcav/{source}/seed{seed}.csv",
+            source=NAMES["gradient_source"],
+            seed=SEEDS,
+        ),
+        code=collector_code("gpca.gradients.metrics:collect"),
+    output:
+        "<results>/gradients.csv",
+    log:
+        "<logs>/gradients.log",
+    benchmark:
+        "<benchmarks>/gradients.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.gradients.metrics:collect",
+    script:
+        "../scripts/collect.py"
