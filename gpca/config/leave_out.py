@@ -16,6 +16,7 @@ from gpca.recovery.policies import ALWAYS, POLICIES
 LEAVABLE = (
     *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
     *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
+    "readings.groups",
 )
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
 SWITCHES = ("active_learning.strategies", "recovery.policies")

@@ -27,6 +27,8 @@ from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.pairs.synthesis import RegistrationSettings
+from gpca.readings.registry import GROUPS
+from gpca.readings.settings import ReadingSizes
 from gpca.settings import SCHEMA, Bounds
 from gpca.trials.settings import EstimatorPairSettings, PairSettings
 
@@ -94,6 +96,17 @@ class Controls(ControlSettings):
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Readings(ReadingSizes):
+    """What the paper leaves unstated, by group, and how much of the data the readings see."""
+
+    groups: Annotated[
+        dict,
+        Named({name: group.choices for name, group in GROUPS.items()}),
+        Bounds(additionalProperties=False, minProperties=1),
+    ]
+
+
 @dataclass(frozen=True)
 class Config:
     """Configuration of GP-CA Bench: all its sections."""
@@ -123,6 +136,7 @@ class Config:
     learners: Annotated[dict[str, Settings], BY_NAME]
     controls: Annotated[Controls, Keys(required=EVERY)]
     shift: Annotated[sections.Shift, SHIFT]
+    readings: Annotated[Readings, Keys(required=EVERY)]
     real_world: RealWorld
     model: sections.ExplainedModel
     runtime: sections.Runtime

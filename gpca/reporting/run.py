@@ -48,6 +48,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "pool_strategy": [name for name in strategies if name in STRATEGIES],
         "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
         "shown_source": config["figures"]["source"],
+        "reading_group": list(config["readings"]["groups"]),
         "kernel_source": list(kernels["sources"]),
         "printed_kernels": [kernel for kernel, rate, n in PRINTED if _is_fitted(kernels, kernel, rate, n)],
         "frames": REAL_WORLD,

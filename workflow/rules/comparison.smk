@@ -5,10 +5,14 @@ from gpca.code_files import ROOT
 from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import read_published
 
+
+include: "readings.smk"
+
+
 COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
-    *("registration_methods.csv", "estimators.csv", "controls.csv"),
+    *("registration_methods.csv", "estimators.csv", "controls.csv", "readings.csv"),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()
