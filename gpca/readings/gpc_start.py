@@ -41,14 +41,8 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
         fitted: dict[tuple, np.ndarray] = {}
         for reading in progress(readings, f"starts of the GPC on {source}, seed {seed}"):
             for kernel, rate, iterations in FITTED:
-                settings = GPCSettings(
-                    **{
-                        **given.sections["gpca_paper"],
-                        "kernel": kernel,
-                        "learning_rate": rate,
-                        "iterations": iterations,
-                    }
-                )
+                schedule = {"kernel": kernel, "learning_rate": rate, "iterations": iterations}
+                settings = GPCSettings(**given.sections["gpca_paper"] | schedule)
                 # A polynomial kernel has no lengthscale.
                 relevant = {k: v for k, v in reading.items() if kernel != "polynomial" or k != "lengthscale"}
                 key = (kernel, rate, iterations, *relevant.values())

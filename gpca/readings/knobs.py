@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,7 +22,6 @@ from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence, log_determinant, log_residual
 
-
 # Step from the untouched pair, of each knob.
 STEPS = {"small": STEP * KNOB_RANGE, "middle": np.subtract(MIDDLE, UNTOUCHED)}
 
@@ -32,9 +30,8 @@ def sensitivity(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) 
     """Yield the accuracies of local sensitivity analysis under each reading."""
     settings = given.uncertainty()
     for source, seed, pairs in _pairs(given, sizes, settings, settings.starts, "sensitivity"):
-        concept_S, measured = zip(
-            *((concept, _steps(runs["observed"], settings)) for concept, runs in pairs), strict=True
-        )
+        found = [(concept, _steps(runs["observed"], settings)) for concept, runs in pairs]
+        concept_S, measured = zip(*found, strict=True)
         for reading in readings:
             step_3 = STEPS[reading["step"]]
             values_S_K = np.array([of_sample[reading["quantity"]] for of_sample in measured])

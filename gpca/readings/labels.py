@@ -56,12 +56,12 @@ def until(
     accuracy: float, task: Task[np.ndarray], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
 ) -> tuple[list[dict[str, float]], list[int]]:
     """Return the rounds to the first of that accuracy, or all of them, and the rows of the pool that they labelled."""
-    steps, queried = [], []
-    for step, queried in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
-        steps.append(step)
-        if step["accuracy"] >= accuracy:
+    done = []
+    for step_and_rows in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
+        done.append(step_and_rows)
+        if step_and_rows[0]["accuracy"] >= accuracy:
             break
-    return steps, queried
+    return [step for step, _ in done], done[-1][1]
 
 
 def epochs(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:

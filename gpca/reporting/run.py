@@ -15,6 +15,7 @@ from gpca.controls.settings import TRANSFER
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import stand_in_clause, title_of
+from gpca.readings.registry import GROUPS
 from gpca.recovery.policies import policy_entry
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
 from gpca.reporting.tables.kernel_grid import PRINTED
@@ -102,6 +103,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "learners": learners,
         "strategies": strategies,
         "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
+        "reading_groups": {name: GROUPS[name].title for name in config["readings"]["groups"]},
         "target": learning["target"],
         "batch": learning["batch"],
         "test_samples": config["registrations"]["test"],

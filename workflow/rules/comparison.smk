@@ -60,9 +60,11 @@ rule comparison:
     input:
         collected=[f"<results>/{name}" for name in COMPARED],
         predictions=COMPARED_PREDICTIONS,
+        readings="<results>/readings.csv",
         code=code_files(
             "gpca.comparison.claim_verdicts",
             "gpca.comparison.clusters",
+            "gpca.comparison.readings",
             "gpca.reporting.tables.comparison",
             "gpca.reporting.script",
         ),
@@ -70,6 +72,7 @@ rule comparison:
         csv="<results>/comparison.csv",
         md="<results>/comparison.md",
         claims="<results>/claims.csv",
+        readings="<results>/reading_verdicts.csv",
     log:
         "<logs>/comparison.log",
     benchmark:
