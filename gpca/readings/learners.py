@@ -67,11 +67,11 @@ def svm_scores(train: Registrations, asked_S_d: np.ndarray, machine: str, inputs
     fitted = make_pipeline(scaling, svm)
     with warnings.catch_warnings():  # scikit-learn's defaults stop before a LinearSVC on raw inputs has converged
         warnings.simplefilter("ignore")
-        fitted.fit(train.embedding, train.concept)
+        fitted.fit(np.asarray(train.embedding, float), train.concept)
     columns = [list(fitted.classes_).index(concept) for concept in CONCEPTS]
     if probability == "platt":
-        return fitted.predict_proba(asked_S_d)[:, columns]
-    return softmax(fitted.decision_function(asked_S_d)[:, columns], axis=1)
+        return fitted.predict_proba(np.asarray(asked_S_d, float))[:, columns]
+    return softmax(fitted.decision_function(np.asarray(asked_S_d, float))[:, columns], axis=1)
 
 
 def encoder_head(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:

@@ -45,9 +45,11 @@ def run(options: Namespace) -> None:
     names = list(group.choices.__dataclass_fields__)
     if missing := [name for name in names if name not in choices]:
         raise InputError(f"choices of {options.group}", f"lack '{missing[0]}'", "give its values")
-    for kind in group.reads:
-        if not getattr(options, kind):
-            raise InputError(f"--{kind}", f"readings of {options.group} read such files", "give at least one")
+    for kind in KINDS:
+        if bool(getattr(options, kind)) != (kind in group.reads):
+            wanted = "give at least one file" if kind in group.reads else "leave it out"
+            read = ", ".join(group.reads)
+            raise InputError(f"--{kind}", f"readings of {options.group} read {read}", wanted)
     files = {kind: by_name(getattr(options, kind)) for kind, by_name in KINDS.items()}
     inputs = [path for of_kind in files.values() for path in of_kind.values()]
     with record_provenance([options.out], inputs, options.settings):

@@ -82,7 +82,7 @@ rule reading:
         "--settings {params.settings:q} --out {output} 2> {log}"
 
 
-rule readings:
+rule reading_values:
     input:
         paths=collect(
             "<results>/readings/{reading_group}.csv",
@@ -92,9 +92,9 @@ rule readings:
     output:
         "<results>/readings.csv",
     log:
-        "<logs>/readings.log",
+        "<logs>/reading_values.log",
     benchmark:
-        "<benchmarks>/readings.tsv"
+        "<benchmarks>/reading_values.tsv"
     localrule: True
     conda:
         "../envs/gpca.yaml"
