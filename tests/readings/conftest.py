@@ -49,9 +49,9 @@ def given(embedded, tmp_path_factory):
     embedded.save(paths["registrations"])
     columns = {name: getattr(embedded, name) for name in ("split", "sample", "concept", "object_name")}
     distance = np.linspace(0, 1, len(embedded))[:, None] * np.ones(len(DISTANCES))
-    ShiftedSets(
-        set=np.full(len(embedded), "in_distribution"), h=embedded.embedding, distance=distance, **columns
-    ).save(paths["sets"])
+    ShiftedSets(set=np.full(len(embedded), "in_distribution"), h=embedded.embedding, distance=distance, **columns).save(
+        paths["sets"]
+    )
     # Right but for the first test sample of each concept.
     scores_S_3 = 0.8 * (embedded.concept[:, None] == np.array(CONCEPTS)) + 0.1
     scores_S_3[embedded.rows("test")[:3]] = np.roll(scores_S_3[embedded.rows("test")[:3]], 1, axis=1)

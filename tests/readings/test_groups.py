@@ -82,8 +82,9 @@ def test_diagnostics_follow_set_score_and_area(given, halves, tmp_path):
     reading = {"set": "in_distribution", "distance": "knn_embedding", "score": "bald", "area": "aurc"}
     one = diagnostics.diagnostics(rows, reading)
     assert one == diagnostics.diagnostics(rows, reading | {"score": "entropy"})  # it has no BALD
-    rows["entropy"] = (rows["concept_true"] != rows["concept_predicted"]).astype(float)  # knows its errors
-    wrong = rows.assign(concept_predicted=["noise"] * len(rows), entropy=(rows["concept_true"] != "noise").astype(float))
+    wrong = rows.assign(
+        concept_predicted=["noise"] * len(rows), entropy=(rows["concept_true"] != "noise").astype(float)
+    )
     assert diagnostics.diagnostics(wrong, reading | {"area": "auroc_error"})["aurc_max_score"] == 0
     right = rows.assign(concept_predicted=rows["concept_true"])
     assert "aurc_max_score" not in diagnostics.diagnostics(right, reading | {"area": "auroc_error"})

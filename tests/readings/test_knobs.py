@@ -1,4 +1,4 @@
-"""SHAP and sensitivity analysis: the protocol's own reading is what the explainers say; others differ as they should."""
+"""SHAP and sensitivity analysis: the protocol's own reading is what the explainers say."""
 
 import numpy as np
 import pytest

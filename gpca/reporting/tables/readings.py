@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from gpca.comparison.readings import summarise
 from gpca.objects.title import stand_in_clause
-from gpca.reporting.tables.builder import TableBuilder, plain_cell
+from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
     heads = {"number": "Number", "group": "What is open", "where": "Printed number", "nearest": "Nearest reading"}
     table = TableBuilder("table13_readings", {**heads, "close": "Close", "joint": _BEST})
     for key, of_groups in summarise(judged).items():
-        rows = judged[(judged[["table", "row", "column"]] == key).all(axis=1)]
+        rows = rows_where(judged, **dict(zip(("table", "row", "column"), key, strict=True)))
         first = rows.iloc[0]
         for group, of in of_groups.items():
             seeds = int(rows.loc[rows["group"] == group, "n"].max())
