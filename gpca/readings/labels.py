@@ -18,7 +18,7 @@ from gpca.readings.given import Given, Row
 from gpca.readings.settings import Reading, ReadingSizes
 
 NEW = "overlap"  # the paper's new concept
-RANDOM_BATCH = 4  # random choice is the same in rounds of any size
+RANDOM_BATCH = 10  # random choice is the same in rounds of any size, and needs many labels
 EVERY, MOST = 5, 200  # epochs after which the accuracy is looked at, and of which there are at most so many
 
 
@@ -39,9 +39,14 @@ def pool(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Ite
                     started[start] = None
             if (begun := started[start]) is None:
                 continue
-            for strategy, batch in {"bald_kmeans": reading["batch"], "random": RANDOM_BATCH}.items():
+            # BALD has the protocol's budget, several times what the paper prints; random choice has the whole pool.
+            rounds_of = {
+                "bald_kmeans": (reading["batch"], settings.labels),
+                "random": (RANDOM_BATCH, len(begun[0].pool)),
+            }
+            for strategy, (batch, budgeted) in rounds_of.items():
                 if (key := (*start, strategy, batch)) not in found:
-                    budget = replace(settings, batch=batch, labels=len(begun[0].pool))
+                    budget = replace(settings, batch=batch, labels=budgeted)
                     steps, _ = until(target, *begun, strategy, budget, source, seed)
                     found[key] = {
                         "labels_to_target": steps[-1]["labels"],
