@@ -15,6 +15,7 @@ with one_line():
 
 configfile: DEFAULTS[0]
 configfile: DEFAULTS[1]
+configfile: DEFAULTS[2]
 
 
 with one_line():

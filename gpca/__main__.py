@@ -40,6 +40,7 @@ STEPS = {
     "kernel_grid": "embeddings -> every kernel, learning rate and number of iterations",
     "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
     "learners": "embeddings -> predictions of every learner, on test samples and on shifted ones",
+    "readings": "files of a run -> the printed numbers under every reading of what the paper leaves unstated",
     "recover": "settings -> failures on virtual scenes, and what every policy of recovery makes of them",
     "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
     "model": "encoder and embeddings -> one file with all that an explanation needs",

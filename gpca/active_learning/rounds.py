@@ -6,6 +6,7 @@ labelled ones and the GPC is retrained; its accuracy on the test samples over th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -118,19 +119,25 @@ def run_rounds(
         ``accuracy`` on all test samples, ``accuracy_new`` on those of the concept held out, and ``epochs`` of the
         retraining.
     """
+    return [step for step, _ in rounds(task, gpc, strategy, settings, *axes)]
+
+
+def rounds(
+    task: Task[Projection], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
+) -> Iterator[tuple[dict[str, float], list[int]]]:
+    """Yield each step of :func:`run_rounds` as it is made, and the rows of the pool that were labelled so far."""
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc = copy(gpc)
     left = np.arange(len(task.pool))
     queried: list[int] = []
-    steps = [_step(task, gpc, queried, epochs=0)]
+    yield _step(task, gpc, queried, epochs=0), []
     while len(queried) < settings.labels and len(left):
         pool = pool_of(task, gpc, left, queried, require_strategy(strategy).needs_scores)
         chosen = left[select(strategy, pool, min(settings.batch, settings.labels - len(queried)), random)]
         epochs = gpc.update(task.pool.h[chosen], task.pool.concept_N[chosen], settings.iterations, settings.tolerance)
         queried += chosen.tolist()
         left = np.setdiff1d(left, chosen)
-        steps.append(_step(task, gpc, queried, epochs))
-    return steps
+        yield _step(task, gpc, queried, epochs), list(queried)
 
 
 def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:

@@ -136,6 +136,13 @@ def verdict_of(printed: Printed, found: Reproduced, tolerance: Tolerance) -> str
     return CLOSE if abs(apart) <= far else NOT_REPRODUCED
 
 
+def distance(printed: Printed, value: float, tolerance: Tolerance) -> float:
+    """Return how far a value lies from what is printed, in units of what counts as close; 0 within its rounding."""
+    scale = _log if tolerance.factor else float
+    least, most = scale(printed.value - printed.rounding), scale(printed.upper + printed.rounding)
+    return _apart(scale(value), min(max(scale(value), least), most)) / scale(tolerance.close)
+
+
 def judged_once(comparison: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of means, without those that repeat a value of the run that is judged in another row."""
     return comparison[(comparison["statistic"] == "mean") & (comparison["repeat_of"] == "")]

@@ -17,6 +17,7 @@ LEAVABLE = (
     *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
     *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
     "exchange.explainers",
+    "readings.groups",
 )
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
 SWITCHES = ("active_learning.strategies", "recovery.policies")

@@ -29,6 +29,8 @@ from gpca.exchange.settings import ExchangeSettings
 from gpca.files import whole_file
 from gpca.gradients.settings import GradientSettings
 from gpca.pairs.synthesis import RegistrationSettings
+from gpca.readings.registry import GROUPS
+from gpca.readings.settings import ReadingSizes
 from gpca.settings import SCHEMA, Bounds
 from gpca.trials.settings import EstimatorPairSettings, PairSettings
 
@@ -104,6 +106,16 @@ class Exchange(ExchangeSettings):
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
 
 
+class Readings(ReadingSizes):
+    """What the paper leaves unstated, by group, and how much of the data the readings see."""
+
+    groups: Annotated[
+        dict,
+        Named({name: group.choices for name, group in GROUPS.items()}),
+        Bounds(additionalProperties=False, minProperties=1),
+    ]
+
+
 @dataclass(frozen=True)
 class Config:
     """Configuration of GP-CA Bench: all its sections."""
@@ -135,6 +147,7 @@ class Config:
     exchange: Annotated[Exchange, Keys(required=EVERY)]
     gradients: Annotated[GradientSettings, COMPLETE]
     shift: Annotated[sections.Shift, SHIFT]
+    readings: Annotated[Readings, Keys(required=EVERY)]
     real_world: RealWorld
     model: sections.ExplainedModel
     runtime: sections.Runtime

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal
 
 from gpca.errors import InputError
 from gpca.settings import Bounds, Count, PositiveShare, Share
@@ -25,6 +25,7 @@ class EncoderSettings:
         learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
         weight_decay: of AdamW.
         options: further arguments of the backbone.
+        head: what is trained on the embedding with the encoder, and dropped: a linear layer, or two with dropout.
     """
 
     backbone: str = "dgcnn"
@@ -36,6 +37,7 @@ class EncoderSettings:
     weight_decay: Share = 1e-2
     options: dict = field(default_factory=dict)
     fewest_points: Annotated[int, Bounds(minimum=32)] | None = None
+    head: Literal["linear", "two_layer"] = "linear"
 
     def __post_init__(self) -> None:
         if self.fewest_points is None:

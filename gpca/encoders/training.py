@@ -25,6 +25,8 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 
+HIDDEN = 256  # units of a head of two layers
+
 
 def draw_points(
     registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object, fewest: int | None = None
@@ -132,8 +134,8 @@ def embed(
     """Return embeddings h (S, d) of all rows, in their order, and the head's logits (S, C) at them; float32.
 
     h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
-    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. As the head is
-    linear, its logits at h are the mean over the draws too.
+    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. The logits of a
+    linear head at h are their mean over the draws too.
     """
     device, n_points = best_device(), settings.draw_points
     model.to(device).eval()
@@ -172,19 +174,28 @@ def load_model(weights: Path, settings: EncoderSettings, classes: tuple[str, ...
 
 
 class Classifier(nn.Sequential):
-    """An encoder and a linear head over the classes."""
+    """An encoder and a head over the classes."""
 
     encoder: nn.Module
-    head: nn.Linear
+    head: nn.Module
 
-    def __init__(self, encoder: nn.Module, embedding_size: int, classes: int) -> None:
-        super().__init__(OrderedDict(encoder=encoder, head=nn.Linear(embedding_size, classes)))
+    def __init__(self, encoder: nn.Module, head: nn.Module) -> None:
+        super().__init__(OrderedDict(encoder=encoder, head=head))
 
 
 def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
     """Return a new encoder with a head over the classes."""
     encoder = make_encoder(settings.backbone, settings.options)
-    return Classifier(encoder, encoder.embedding_size, len(classes))
+    return Classifier(encoder, _HEADS[settings.head](encoder.embedding_size, len(classes)))
+
+
+def _two_layers(embedding_size: int, classes: int) -> nn.Module:
+    """Return DGCNN's usual kind of head (Wang et al. 2019), of two layers instead of three."""
+    hidden = nn.Linear(embedding_size, HIDDEN)
+    return nn.Sequential(hidden, nn.BatchNorm1d(HIDDEN), nn.LeakyReLU(0.2), nn.Dropout(0.5), nn.Linear(HIDDEN, classes))
+
+
+_HEADS = {"linear": nn.Linear, "two_layer": _two_layers}
 
 
 def _fingerprint(registrations: Registrations) -> str:

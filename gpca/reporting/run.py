@@ -16,6 +16,7 @@ from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import stand_in_clause, title_of
+from gpca.readings.registry import GROUPS
 from gpca.recovery.policies import policy_entry
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
 from gpca.reporting.tables.kernel_grid import PRINTED
@@ -55,6 +56,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "pool_strategy": [name for name in strategies if name in STRATEGIES],
         "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
         "shown_source": config["figures"]["source"],
+        "reading_group": list(config["readings"]["groups"]),
         "kernel_source": list(kernels["sources"]),
         "printed_kernels": [kernel for kernel, rate, n in PRINTED if _is_fitted(kernels, kernel, rate, n)],
         "frames": REAL_WORLD,
@@ -118,6 +120,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "learners": learners,
         "strategies": strategies,
         "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
+        "reading_groups": {name: GROUPS[name].title for name in config["readings"]["groups"]},
         "target": learning["target"],
         "batch": learning["batch"],
         "test_samples": config["registrations"]["test"],

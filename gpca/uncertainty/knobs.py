@@ -18,7 +18,7 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import random_direction
 from gpca.errors import InputError
 from gpca.uncertainty.settings import UncertaintySettings
-from gpca.uncertainty.spread import Outcome, run_from_starts, summarise_runs
+from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarise_runs
 
 
 class Knobs(NamedTuple):
@@ -109,6 +109,14 @@ class KnobRuns:
 
     def _evaluate(self, knobs: Knobs) -> Outcome:
         started = perf_counter()
-        source = self._source.at(knobs)
-        runs = run_from_starts(self._icp, source, self._T_init, knobs.spread * self._xi_n_6)
+        runs, source = self.runs(knobs)
         return summarise_runs(runs, cKDTree(source), self._target, self._T_ref, self._settings, started)
+
+    def runs(self, knobs: Knobs) -> tuple[Runs, np.ndarray]:
+        """Run ICP from all starts under one setting, seen before or not; return the runs and the source (N, 3).
+
+        Raises:
+            InputError: a knob outside its range.
+        """
+        source = self._source.at(knobs)
+        return run_from_starts(self._icp, source, self._T_init, knobs.spread * self._xi_n_6), source

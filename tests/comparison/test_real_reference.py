@@ -4,11 +4,13 @@ import pandas as pd
 import pytest
 import yaml
 
+from gpca.attribution.metrics import read_metrics
 from gpca.code_files import ROOT
 from gpca.comparison.chance import ALL, chance
 from gpca.comparison.claim_verdicts import read_verdicts
 from gpca.comparison.claims import read_claims
 from gpca.comparison.published import read_published
+from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.reasons import NONE_YET, read_reasons
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_RUN, VERDICTS, Tolerance, compare
@@ -27,7 +29,11 @@ def reference():
     numbers = read_published()
     named = {number.counterpart.file for number in numbers if number.counterpart}
     results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named)
-    return compare(numbers, results, objects, TOLERANCES, read_reasons(numbers))
+    comparison = compare(numbers, results, objects, TOLERANCES, read_reasons(numbers))
+    if not (folder / READINGS).is_file():
+        return comparison
+    readings = read_metrics(folder / READINGS)
+    return with_readings(comparison, judge_readings(numbers, comparison, readings, TOLERANCES))
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,8 @@ def merged(*parts):
 
 
 def load(*names):
-    return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in ("sources", "config", *names)))
+    names = ("sources", "config", "readings", *names)
+    return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in names))
 
 
 def changed(key, value):

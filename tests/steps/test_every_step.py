@@ -11,8 +11,12 @@ from gpca.code_files import ROOT
 
 from .command_lines import STEP_OPTIONS, arguments
 
-# tests/frames/test_steps.py, tests/steps/test_recover.py and test_ship.py, tests/comparison/test_reference.py
-ELSEWHERE = {"scenes", "instances", "frame_registrations", "recover", "ship", "check-config", "check-reference"}
+# tests/frames/test_steps.py, tests/steps/test_recover.py, test_readings.py and test_ship.py,
+# tests/comparison/test_reference.py
+ELSEWHERE = {
+    *("scenes", "instances", "frame_registrations", "recover", "readings", "ship"),
+    *("check-config", "check-reference"),
+}
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
 
 

@@ -5,11 +5,15 @@ from gpca.code_files import ROOT
 from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import read_published
 
+
+include: "readings.smk"
+
+
 COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
-    "exchange.csv",
+    *("exchange.csv", "readings.csv"),
     *(["gradients.csv"] if NAMES["gradient_source"] else []),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
@@ -58,9 +62,11 @@ rule comparison:
     input:
         collected=[f"<results>/{name}" for name in COMPARED],
         predictions=COMPARED_PREDICTIONS,
+        readings="<results>/readings.csv",
         code=code_files(
             "gpca.comparison.claim_verdicts",
             "gpca.comparison.clusters",
+            "gpca.comparison.readings",
             "gpca.reporting.tables.comparison",
             "gpca.reporting.script",
         ),
@@ -68,6 +74,7 @@ rule comparison:
         csv="<results>/comparison.csv",
         md="<results>/comparison.md",
         claims="<results>/claims.csv",
+        readings="<results>/reading_verdicts.csv",
     log:
         "<logs>/comparison.log",
     benchmark:

@@ -1,9 +1,11 @@
-"""A run's collected numbers beside the printed ones and the paper's sentences -> comparison.csv, .md, claims.csv."""
+"""A run's collected numbers beside the printed ones and the paper's sentences -> verdicts on both, and on readings."""
 
+from gpca.attribution.metrics import read_metrics
 from gpca.comparison.claim_verdicts import judge
 from gpca.comparison.claims import read_claims
 from gpca.comparison.clusters import cluster_intervals
 from gpca.comparison.published import read_published
+from gpca.comparison.readings import judge_readings, with_readings
 from gpca.comparison.reasons import read_reasons
 from gpca.comparison.values import measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
@@ -25,8 +27,11 @@ with job(snakemake):
         measured_on(given.collected),
         cluster_intervals(numbers, given.predictions),
     )
+    judged = judge_readings(numbers, comparison, read_metrics(given.readings), tolerances)
+    comparison = with_readings(comparison, judged)
     claims = judge(read_claims(), results, params.objects, given.predictions)
-    for frame, path in ((comparison, snakemake.output.csv), (claims, snakemake.output.claims)):
+    out = snakemake.output
+    for frame, path in ((comparison, out.csv), (claims, out.claims), (judged, out.readings)):
         with whole_file(path) as partial:
             frame.to_csv(partial, index=False, lineterminator="\n")
     with whole_file(snakemake.output.md) as partial:

@@ -1,0 +1,199 @@
+"""The printed numbers beside what every reading of the unstated gives in their place (docs/comparison.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gpca.comparison.published import Counterpart, Number
+from gpca.comparison.sampling import Printed
+from gpca.comparison.values import Reproduced, value_of_run
+from gpca.comparison.verdicts import (
+    CLOSE,
+    NOT_COMPARABLE,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    Tolerance,
+    distance,
+    verdict_of,
+)
+from gpca.csv_file import numbers as numbers_in
+from gpca.csv_file import read_csv
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+READINGS = "readings.csv"
+READING_COLUMNS = (
+    *("table", "row", "column", "unit", "published", "upper", "reproduced", "verdict"),
+    *("group", "reading", "value", "at_least", "n", "distance", "close"),
+)
+
+
+def judge_readings(
+    numbers: Sequence[Number], comparison: pd.DataFrame, readings: pd.DataFrame, tolerances: Mapping[str, Tolerance]
+) -> pd.DataFrame:
+    """Return `READING_COLUMNS`, a row per printed number and reading that has a value in its place.
+
+    Args:
+        numbers: printed ones.
+        comparison: what :func:`gpca.comparison.verdicts.compare` returned for them.
+        readings: tidy rows of ``readings.csv``; `table` holds the group and the values of its choices, with / between,
+            and the other columns are those of the counterpart in its own file.
+        tolerances: of each unit.
+
+    Returns:
+        value: of the reading, in the number's unit. distance: of the value from what is printed, in units of what
+        counts as close; of a tolerance that is a ratio, by logarithms. close: whether the mean is within it, whatever
+        its interval.
+    """
+    import pandas as pd
+
+    own = comparison.set_index(["table", "row", "column"])[["reproduced", "verdict"]]
+    parts = dict(iter(readings.groupby("table", sort=False)))
+    named = ["source", "method", "concept"]
+    holds = {name: set(rows[named].itertuples(index=False, name=None)) for name, rows in parts.items()}
+    records = []
+    for number in numbers:
+        if (counterpart := number.counterpart) is None or len(counterpart.sources) > 1:
+            continue
+        wanted = (*counterpart.sources, *counterpart.methods, counterpart.concept)
+        for name in (name for name in parts if wanted in holds[name]):
+            found = _value(number, counterpart, name, parts[name])
+            if found is None:
+                continue
+            group, _, reading = name.partition("/")
+            tolerance, printed = tolerances[number.unit], _exactly(number)
+            records.append(
+                (
+                    *number.key,
+                    number.unit,
+                    number.value,
+                    number.upper,
+                    *own.loc[number.key],
+                    group,
+                    reading,
+                    round(found.value, 6),
+                    found.at_least,
+                    found.n,
+                    round(distance(printed, found.value, tolerance), 6),
+                    verdict_of(printed, _exact(found), tolerance) in (REPRODUCED, CLOSE),
+                )
+            )
+    return pd.DataFrame(records, columns=list(READING_COLUMNS))
+
+
+@dataclass(frozen=True)
+class OfGroup:
+    """What the readings of one group say of one number.
+
+    Attributes:
+        readings: how many there are. close: how many of them are close to what is printed.
+        least, most: of their values.
+        nearest, value: the reading that is nearest, and what it gives.
+        joint, fitted, touched: the reading of the group that is close to the most of its numbers, to how many, and of
+            how many.
+    """
+
+    readings: int
+    close: int
+    least: float
+    most: float
+    nearest: str
+    value: float
+    joint: str
+    fitted: int
+    touched: int
+    inside: bool
+
+    @property
+    def where(self) -> str:
+        """Whether a reading produces it, or what is printed lies between readings, or outside of all."""
+        return "produced" if self.close else "between" if self.inside else "outside"
+
+
+def asked_about(judged: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of the numbers that are not reproduced, and of those that are not judged for their objects."""
+    return judged[judged["verdict"].isin([NOT_REPRODUCED, NOT_COMPARABLE])]
+
+
+def summarise(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGroup]]:
+    """Return number -> group -> what its readings say, of the numbers of :func:`asked_about`."""
+    joint = {}
+    for group, rows in judged.groupby("group", sort=False):
+        fitted = rows.groupby("reading", sort=False)["close"].sum()
+        touched = len(rows[["table", "row", "column"]].drop_duplicates())
+        joint[group] = (str(fitted.idxmax()), int(fitted.max()), touched)
+    found: dict[tuple[str, str, str], dict[str, OfGroup]] = {}
+    asked = asked_about(judged).groupby(["table", "row", "column", "group"], sort=False)
+    for (table, row, column, group), rows in asked:
+        nearest = rows.loc[rows["distance"].abs().idxmin()]
+        least, most = rows["value"].min(), rows["value"].max()
+        found.setdefault((table, row, column), {})[group] = OfGroup(
+            len(rows),
+            int(rows["close"].sum()),
+            float(least),
+            float(most),
+            nearest["reading"],
+            float(nearest["value"]),
+            *joint[group],
+            inside=bool(least <= nearest["upper"] and most >= nearest["published"]),
+        )
+    return found
+
+
+def sentence(groups: Mapping[str, OfGroup]) -> str:
+    """Return what a reason says of the readings."""
+    told = []
+    for group, of in groups.items():
+        span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.nearest}, {of.value:.3g}"
+        if of.close:
+            told.append(f"Readings of {group}: {of.close} of {of.readings} are close, the nearest {nearest}.")
+        elif of.inside:
+            told.append(f"Readings of {group}: none of {of.readings} is close, {span}, the nearest {nearest}.")
+        else:
+            told.append(f"Readings of {group}: outside of all {of.readings}, {span}.")
+    return " ".join(told)
+
+
+def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFrame:
+    """Return the comparison in which the reasons of misses say what the readings give."""
+    found = summarise(judged[judged["verdict"] == NOT_REPRODUCED])
+    reasons = [
+        f"{reason} {sentence(found[key])}" if key in found else reason
+        for *key, reason in comparison[["table", "row", "column", "reason"]].itertuples(index=False)
+        for key in [tuple(key)]
+    ]
+    return comparison.assign(reason=reasons)
+
+
+def read_judged(path: str | Path) -> pd.DataFrame:
+    """Read what :func:`judge_readings` returned.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, something that is not a number.
+    """
+    rows = read_csv(path, READING_COLUMNS)
+    for column in ("published", "upper", "value", "n", "distance"):
+        rows[column] = numbers_in(path, rows, column)
+    rows["reproduced"] = numbers_in(path, rows, "reproduced", needed=rows["reproduced"] != "")
+    for column in ("close", "at_least"):
+        rows[column] = rows[column] == "True"
+    return rows
+
+
+def _value(number: Number, counterpart: Counterpart, name: str, rows: pd.DataFrame) -> Reproduced | None:
+    there = replace(counterpart, file=READINGS, table=name)
+    return value_of_run(replace(number, counterpart=there), {READINGS: rows})
+
+
+def _exactly(number: Number) -> Printed:
+    """Return the number as if its sampling left nothing open."""
+    return Printed(number.value, number.upper, number.rounding, number.value, number.upper)
+
+
+def _exact(found: Reproduced) -> Reproduced:
+    """Return the value as if its interval were none; a few seeds have too wide a one to tell readings apart."""
+    return Reproduced(found.value, found.value, found.value, found.n, found.at_least)

@@ -1,0 +1,1 @@
+"""What the paper leaves unstated, tried value by value: which choice explains a printed number (docs/comparison.md)."""

@@ -1,0 +1,84 @@
+"""The groups of readings by name: what each asks, what it reads, and what runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+
+from gpca.readings import settings
+
+ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of choices that the paper leaves open.
+
+    Attributes:
+        title: what is open.
+        choices: the class of its choices.
+        run: ``module:function`` below :mod:`gpca.readings`, of the files given, the readings and their sizes, that
+            yields reading, source, method, metric, concept, seed and value, named as in published.csv.
+        reads: kinds of files, fields of :class:`gpca.readings.given.Given`.
+        sources: of which printed numbers are asked; empty for depth frames.
+        methods: whose predictions it reads.
+    """
+
+    title: str
+    choices: type
+    run: str
+    reads: tuple[str, ...]
+    sources: tuple[str, ...] = ALL_SOURCES
+    methods: tuple[str, ...] = ()
+
+    @property
+    def module(self) -> str:
+        """The module that runs it."""
+        return f"gpca.readings.{self.run.partition(':')[0]}"
+
+    def function(self) -> Callable:
+        """Return what runs it."""
+        return getattr(import_module(self.module), self.run.partition(":")[2])
+
+
+_LEARNERS = ("gpca_paper", "learner_forest", "learner_linear_svm")
+GROUPS = {
+    "sensitivity": Group("What SA differentiates", settings.Sensitivity, "knobs:sensitivity", ("registrations",)),
+    "shap": Group("What SHAP's uncertainty is of", settings.Shap, "knobs:shap", ("registrations",)),
+    "severities": Group(
+        "How strong the perturbations are",
+        settings.TestSeverities,
+        "severities:run",
+        ("registrations", "predictions"),
+        methods=("gpca_paper", "gpca"),
+    ),
+    "gpc_start": Group("How the GPC starts", settings.GPCStart, "gpc_start:run", ("sets",), ("ycb", "linemod")),
+    "kernel": Group("Kernel of Table V's GPC", settings.TableKernel, "learners:kernel", ("sets",)),
+    "linear_svm": Group("Which linear SVM", settings.LinearSVM, "learners:linear_svm", ("sets",)),
+    "encoder_head": Group(
+        "Head that trains the encoder",
+        settings.EncoderHead,
+        "learners:encoder_head",
+        ("registrations", "sets"),
+        ("linemod",),
+    ),
+    "diagnostics": Group(
+        "Set, distance, score and area of ρ, AUC and ECE",
+        settings.Diagnostics,
+        "diagnostics:run",
+        ("sets", "predictions"),
+        ("ycb",),
+        _LEARNERS,
+    ),
+    "pool": Group("Pool, batch and start of active learning", settings.LabelPool, "labels:pool", ("sets",)),
+    "epochs": Group("What an epoch is", settings.Epochs, "labels:epochs", ("sets",)),
+    "frames": Group(
+        "What varies on depth frames",
+        settings.FrameRepeats,
+        "frames:run",
+        ("registrations", "predictions", "embeddings"),
+        (),
+    ),
+    "features": Group("Classic features", settings.ClassicFeatures, "features:run", ("registrations",), ("ycb",)),
+}

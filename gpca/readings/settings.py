@@ -1,0 +1,158 @@
+"""Choices that the paper leaves open, by group, and how much of the data their readings see: nothing needs torch.
+
+``config/readings.yaml`` holds the values that are tried, with a comment on each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Annotated, Any, Literal
+
+from gpca.classifier.settings import Kernel, LearningRate
+from gpca.settings import Bounds, Count, OpenShare, Positive
+
+Quantity = Literal[
+    *("divergence", "divergence_reversed", "log_determinant", "trace"),
+    *("residual", "inlier_rmse", "inlier_rmse_of_one"),
+]
+Set = Literal[
+    *("in_distribution", "severity", "source", "objects"),
+    *("in_distribution+severity", "in_distribution+source", "seen_objects+objects"),
+]
+Starts = Annotated[int, Bounds(minimum=2)]
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What sensitivity analysis differentiates, and which derivative names the cause."""
+
+    quantity: tuple[Quantity, ...]
+    sign: tuple[Literal["signed", "absolute", "lowest"], ...]
+    unit: tuple[Literal["range", "own"], ...]
+    step: tuple[Literal["small", "middle"], ...]
+
+
+@dataclass(frozen=True)
+class Shap:
+    """What SHAP's uncertainty is of."""
+
+    starts: tuple[Starts, ...]
+    background: tuple[Literal["observed", "clean"], ...]
+    quantity: tuple[Literal["divergence", "divergence_reversed", "log_determinant"], ...]
+    floor: tuple[Positive, ...]
+    sign: tuple[Literal["signed", "absolute"], ...]
+
+
+@dataclass(frozen=True)
+class TestSeverities:
+    """How strong the perturbations of the test samples are."""
+
+    part: tuple[Literal["all", "weakest", "middle", "strongest"], ...]
+    classifier: tuple[Literal["paper", "converged"], ...]
+
+
+@dataclass(frozen=True)
+class GPCStart:
+    """How the Gaussian process classifier starts."""
+
+    inputs: tuple[Literal["standardised", "unit_norm", "raw"], ...]
+    inducing: tuple[Literal["kmeans", "random"], ...]
+    lengthscale: tuple[Literal["median", "default"], ...]
+    batch: tuple[Literal["full", "minibatch"], ...]
+
+
+@dataclass(frozen=True)
+class TableKernel:
+    """Kernel and schedule of Table V's classifier."""
+
+    kernel: tuple[Kernel, ...]
+    iterations: tuple[Count, ...]
+
+
+@dataclass(frozen=True)
+class LinearSVM:
+    """Which linear support vector machine, and how it gives probabilities."""
+
+    machine: tuple[Literal["svc", "linear_svc"], ...]
+    inputs: tuple[Literal["standardised", "raw"], ...]
+    probability: tuple[Literal["platt", "softmax"], ...]
+
+
+@dataclass(frozen=True)
+class EncoderHead:
+    """The head that trains the encoder, and the inputs of the learners on its embeddings."""
+
+    head: tuple[Literal["linear", "two_layer"], ...]
+    inputs: tuple[Literal["standardised", "raw"], ...]
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """Samples, distance, uncertainty and area of Table V's diagnostics."""
+
+    set: tuple[Set, ...]
+    distance: tuple[Literal["knn_analytical", "mahalanobis_analytical", "knn_embedding", "mahalanobis_embedding"], ...]
+    score: tuple[Literal["max_score", "entropy", "bald"], ...]
+    area: tuple[Literal["aurc", "auroc_error"], ...]
+
+
+@dataclass(frozen=True)
+class LabelPool:
+    """What there is to be labelled."""
+
+    new_share: tuple[OpenShare, ...]
+    batch: tuple[Count, ...]
+    initial: tuple[Annotated[int, Bounds(minimum=2)], ...]
+
+
+@dataclass(frozen=True)
+class Epochs:
+    """What an epoch is: a pass of Adam over these labels, at this rate."""
+
+    learning_rate: tuple[LearningRate, ...]
+    labels: tuple[Literal["at_target", "all"], ...]
+
+
+@dataclass(frozen=True)
+class FrameRepeats:
+    """What varies between the repeats on depth frames, and which objects the test samples show."""
+
+    repeats: tuple[Literal["everything", "classifiers", "samples"], ...]
+    objects: tuple[Literal["all", "seen", "unseen"], ...]
+
+
+@dataclass(frozen=True)
+class ClassicFeatures:
+    """Which of the classic features there are."""
+
+    features: tuple[Literal["all", "no_counts", "no_residual", "residual", "counts"], ...]
+
+
+@dataclass(frozen=True)
+class ReadingSizes:
+    """What the readings of a run see.
+
+    Attributes:
+        seeds: the first so many of the run's.
+        encoders: of these, seeds for which another encoder is trained.
+        samples: test samples of each source and seed on which Monte-Carlo ICP is run, balanced, at most.
+    """
+
+    seeds: Count = 2
+    encoders: Annotated[int, Bounds(minimum=0)] = 1
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 15
+
+
+Reading = Mapping[str, Any]
+
+
+def readings_of(choices: Mapping[str, Sequence]) -> list[Reading]:
+    """Return every combination of the values of a group's choices."""
+    return [dict(zip(choices, values, strict=True)) for values in product(*choices.values())]
+
+
+def name_of(group: str, reading: Reading) -> str:
+    """Return what `table` of the tidy rows of a reading says, e.g. ``frames/classifiers/seen``."""
+    return "/".join([group, *(f"{value:g}" if isinstance(value, float) else str(value) for value in reading.values())])

@@ -1,0 +1,62 @@
+"""Step ``readings``: files of a run -> the printed numbers' counterparts under every reading of one group."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from gpca.attribution.metrics import TIDY_COLUMNS, write_metrics
+from gpca.errors import InputError
+from gpca.provenance import record_provenance
+from gpca.readings.given import SECTIONS, Given, by_backbone, by_method, by_source_and_seed
+from gpca.readings.registry import GROUPS
+from gpca.readings.settings import ReadingSizes, name_of, readings_of
+from gpca.settings import check_settings
+from gpca.steps import checked_sections
+
+KINDS = {
+    "registrations": by_source_and_seed,
+    "sets": by_source_and_seed,
+    "predictions": by_method,
+    "embeddings": by_backbone,
+}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files; ``--settings`` holds the group's `choices`, the `sizes`, and sections of the config by name."""
+    parser.add_argument("--group", required=True, choices=GROUPS)
+    for kind in KINDS:
+        parser.add_argument(f"--{kind}", nargs="*", default=[], type=Path, help="named by source, method and seed")
+    parser.add_argument("--out", required=True, type=Path, help="tidy CSV")
+
+
+def run(options: Namespace) -> None:
+    """Run every reading of the group."""
+    torch.set_num_threads(options.threads)
+    group = GROUPS[options.group]
+    settings = dict(options.settings)
+    choices, sizes = settings.pop("choices", {}), settings.pop("sizes", {})
+    check_settings(choices, "readings", "groups", options.group)
+    check_settings(sizes, "readings")
+    sections = checked_sections(settings, SECTIONS)
+    names = list(group.choices.__dataclass_fields__)
+    if missing := [name for name in names if name not in choices]:
+        raise InputError(f"choices of {options.group}", f"lack '{missing[0]}'", "give its values")
+    for kind in KINDS:
+        if bool(getattr(options, kind)) != (kind in group.reads):
+            wanted = "give at least one file" if kind in group.reads else "leave it out"
+            read = ", ".join(group.reads)
+            raise InputError(f"--{kind}", f"readings of {options.group} read {read}", wanted)
+    files = {kind: by_name(getattr(options, kind)) for kind, by_name in KINDS.items()}
+    inputs = [path for of_kind in files.values() for path in of_kind.values()]
+    with record_provenance([options.out], inputs, options.settings):
+        given = Given(**files, sections=sections)
+        readings = readings_of({name: choices[name] for name in names})
+        rows = group.function()(given, readings, ReadingSizes(**sizes))
+        records = [(name_of(options.group, reading), *value) for reading, *value in rows]
+        if not records:
+            raise InputError(f"readings of {options.group}", "have no samples to read", "give larger files")
+        write_metrics(pd.DataFrame(records, columns=list(TIDY_COLUMNS)), options.out)

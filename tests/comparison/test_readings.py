@@ -1,0 +1,88 @@
+"""Readings of the unstated: each way in which a printed number can lie to them, and the one that fits several."""
+
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import TIDY_COLUMNS
+from gpca.comparison.readings import judge_readings, read_judged, summarise, with_readings
+from gpca.errors import InputError
+
+from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy
+
+KEY, OTHER = ("I", "YCB", "GP-CA"), ("I", "Cups", "GP-CA")
+OF_CUPS = ACCURACY.__class__(**{**ACCURACY.__dict__, "sources": ("cups",)})
+
+
+def readings(values, source="ycb"):
+    """Rows of ``readings.csv``: two seeds of each reading."""
+    parts = [tidy([value, value], source=source, table=f"start/{name}") for name, value in values.items()]
+    return pd.concat(parts)
+
+
+def judged(printed, values, here=0.97):
+    numbers = [number(printed)]
+    comparison = compared(numbers, {"metrics.csv": tidy([here, here])})
+    return judge_readings(numbers, comparison, readings(values), TOLERANCES), comparison
+
+
+@pytest.mark.parametrize(
+    ("printed", "values", "where", "nearest"),
+    [
+        (50.0, {"random": 0.515, "kmeans": 0.97}, "produced", "random"),
+        (50.0, {"random": 0.30, "kmeans": 0.97}, "between", "random"),
+        (50.0, {"random": 0.60, "kmeans": 0.97}, "outside", "random"),
+    ],
+)
+def test_a_number_is_produced_or_between_readings_or_outside(printed, values, where, nearest):
+    found, comparison = judged(printed, values)
+    of = summarise(found)[KEY]["start"]
+    assert (of.where, of.nearest, of.readings) == (where, nearest, 2)
+    assert (of.least, of.most) == (100 * min(values.values()), 100 * max(values.values()))
+    [reason] = with_readings(comparison, found)["reason"]
+    assert {"produced": "1 of 2 are close", "between": "none of 2 is close", "outside": "outside of all 2"}[
+        where
+    ] in reason
+
+
+def test_a_number_that_is_reproduced_needs_no_reading():
+    found, comparison = judged(97.0, {"random": 0.5}, here=0.97)
+    assert summarise(found) == {}
+    assert with_readings(comparison, found)["reason"].tolist() == comparison["reason"].tolist()
+
+
+def test_the_joint_reading_fits_most_numbers_of_its_group():
+    numbers = [number(50.0), number(60.0, row="Cups", counterpart=OF_CUPS)]
+    results = {"metrics.csv": pd.concat([tidy([0.9, 0.9]), tidy([0.9, 0.9], source="cups")])}
+    both = pd.concat([readings({"a": 0.5, "b": 0.52}), readings({"a": 0.9, "b": 0.59}, source="cups")])
+    found = summarise(judge_readings(numbers, compared(numbers, results), both, TOLERANCES))
+    assert [(of["start"].joint, of["start"].fitted, of["start"].touched) for of in found.values()] == [("b", 2, 2)] * 2
+    assert found[KEY]["start"].nearest == "a"
+
+
+def test_a_lower_bound_is_no_value_and_a_ratio_is_measured_by_its_logarithm():
+    labels = number(14, decimals=0, unit="labels", counterpart=LABELS)
+    own = tidy([200.0, 200.0], method="random", metric="labels_to_target", concept="overlap", table=LABELS.table)
+    results = {"active_learning.csv": own}
+    rows = [
+        ("pool/all", "ycb", "random", metric, "overlap", 0, value)
+        for metric, value in (("labels_to_target", 14), ("reached", 0))
+    ]
+    rows += [
+        ("pool/few", "ycb", "random", metric, "overlap", 0, value)
+        for metric, value in (("labels_to_target", 130.5), ("reached", 1))
+    ]
+    frame = pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+    found = judge_readings([labels], compared([labels], results), frame, TOLERANCES).set_index("reading")
+    assert found.loc["all", "at_least"]
+    assert not found["close"].any()
+    assert found.loc["few", "distance"] == pytest.approx(2)  # 14.5 × 3²
+
+
+def test_what_was_judged_is_read_back_or_refused(tmp_path):
+    found, _ = judged(50.0, {"random": 0.5})
+    path = tmp_path / "reading_verdicts.csv"
+    found.to_csv(path, index=False)
+    pd.testing.assert_frame_equal(read_judged(path), found, check_dtype=False)
+    path.write_text(path.read_text().replace("50.0", "half"))
+    with pytest.raises(InputError, match="column 'published' holds something that is not a finite number"):
+        read_judged(path)

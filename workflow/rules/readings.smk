@@ -1,0 +1,108 @@
+# Files of a run -> the printed numbers under every reading of what the paper leaves unstated -> readings.csv.
+from gpca.readings.registry import GROUPS
+
+READINGS = config["readings"]
+READING_SIZES = {name: READINGS[name] for name in ("seeds", "encoders", "samples")}
+READING_SECTIONS = {
+    "uncertainty": config["uncertainty"].get("additive", {}),
+    "icp": config["registrations"]["icp"],
+    "encoder": config["encoders"][config["embedding"]["encoder"]],
+    "active_learning": config["active_learning"],
+    **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
+}
+
+
+def read_by_readings(wildcards):
+    """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
+    group = GROUPS[wildcards.reading_group]
+    sources = [name for name in group.sources if name in SOURCES]
+    seeds = SEEDS[: READINGS["seeds"]]
+    made = "predictions"
+    methods = [name for name in group.methods if name in config["explainers"]]
+    if wildcards.reading_group == "diagnostics":
+        made = "learners"
+        methods = [name for name in group.methods if name in config["learners"]]
+    if not group.sources:
+        sources, seeds, methods = [FRAMES], SEEDS, NAMES["backbone"]
+    patterns = {
+        "registrations": "<results>/registrations/{source}/seed{seed}.npz",
+        "sets": "<results>/shifted/{source}/seed{seed}.npz",
+        "predictions": f"<results>/{made}/{{source}}/{{method}}/seed{{seed}}.csv",
+        "embeddings": "<results>/embeddings/{source}/{method}/seed{seed}.npz",
+    }
+    embedded = [method.replace("-", "/") for method in methods]
+    return {
+        kind: collect(
+            patterns[kind],
+            source=sources,
+            method=embedded if kind == "embeddings" else methods,
+            seed=SEEDS[:1] if kind == "embeddings" else seeds,
+        )
+        for kind in group.reads
+    }
+
+
+rule reading:
+    input:
+        unpack(read_by_readings),
+        code=lambda wildcards: code_files(
+            "gpca.steps.readings",
+            GROUPS[wildcards.reading_group].module,
+            encoder_module(config["embedding"]["encoder"]),
+        ),
+    output:
+        "<results>/readings/{reading_group}.csv",
+    log:
+        "<logs>/readings/{reading_group}.log",
+    benchmark:
+        "<benchmarks>/readings/{reading_group}.tsv"
+    wildcard_constraints:
+        reading_group="|".join(GROUPS),
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        settings=lambda wildcards: as_json(
+            {
+                "choices": READINGS["groups"][wildcards.reading_group],
+                "sizes": READING_SIZES,
+                **READING_SECTIONS,
+            }
+        ),
+        files=lambda wildcards, input: [
+            word
+            for kind in GROUPS[wildcards.reading_group].reads
+            for word in (f"--{kind}", *input.get(kind))
+        ],
+    shell:
+        "python -m gpca readings --threads {threads} --group {wildcards.reading_group} {params.files} "
+        "--settings {params.settings:q} --out {output} 2> {log}"
+
+
+rule reading_values:
+    input:
+        paths=collect(
+            "<results>/readings/{reading_group}.csv",
+            reading_group=NAMES["reading_group"],
+        ),
+        code=collector_code("gpca.attribution.metrics:read_all_metrics"),
+    output:
+        "<results>/readings.csv",
+    log:
+        "<logs>/reading_values.log",
+    benchmark:
+        "<benchmarks>/reading_values.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.attribution.metrics:read_all_metrics",
+    script:
+        "../scripts/collect.py"
