@@ -80,6 +80,12 @@ def register_first(situation: Situation, points: int, icp: ICPSettings) -> Attem
     return outcome and replace(outcome, seconds=seconds + outcome.seconds)
 
 
+def register_misplaced(situation: Situation, clean: Attempt, points: int, icp: ICPSettings) -> Attempt | None:
+    """Register what was measured without a pose error from the estimate that has the situation's."""
+    T_init = clean.holding.T_world_object_init @ situation.T_object_estimated
+    return register_held(situation, Holding(clean.holding.shots, T_init, T_init), points, icp)
+
+
 def register_after(
     situation: Situation, before: Attempt, action: Action, actions: tuple[str, ...], points: int, icp: ICPSettings
 ) -> Attempt:
