@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 from gpca.recovery.metrics import wilson_interval
-from gpca.recovery.queueing import DOUBTED, DRAWN, QUEUE_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
+
+DOUBTED, DRAWN = "queued", "random"  # which cases are labelled next: those in doubt, or any
+QUEUE_COLUMNS = ("policy", "order", "draw", "labels", "failures", "unsolved")
 
 
 def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:

@@ -19,14 +19,13 @@ from gpca.recovery.chances import ExpectedUtility, Trial, learn_utility
 from gpca.recovery.episodes import Episode
 from gpca.recovery.loop_explainers import LoopExplainers
 from gpca.recovery.policies import Means, policy_entry
+from gpca.recovery.queue_file import DOUBTED, DRAWN, QUEUE_COLUMNS
 from gpca.recovery.rehearsal import Rehearsal, known
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
 
-DOUBTED, DRAWN = "queued", "random"  # which cases are labelled next: those in doubt, or any
-QUEUE_COLUMNS = ("policy", "order", "draw", "labels", "failures", "unsolved")
 BATCH = 4  # cases that are labelled before anything is learnt from them
 DRAWS = 5  # random orders
 

@@ -5,8 +5,8 @@ import pytest
 from gpca.csv_file import write_csv
 from gpca.errors import InputError
 from gpca.recovery.chances import Trial
-from gpca.recovery.queue_file import read_queues
-from gpca.recovery.queueing import BATCH, DOUBTED, DRAWN, DRAWS, ChancesLearner, error_by_labels
+from gpca.recovery.queue_file import DOUBTED, DRAWN, read_queues
+from gpca.recovery.queueing import BATCH, DRAWS, ChancesLearner, error_by_labels
 from gpca.recovery.rehearsal import Rehearsal
 
 COSTS = {"denoise": 0.01, "new_view": 0.02}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.recovery.queueing import DOUBTED, DRAWN
+from gpca.recovery.queue_file import DOUBTED, DRAWN
 from gpca.reporting.figures.style import BLUE, GREY, TEXT_WIDTH_IN, save_figure, use_style, write_title
 
 if TYPE_CHECKING:
