@@ -9,7 +9,7 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, save_figure, write_title
-from gpca.reporting.words import in_words
+from gpca.reporting.words import in_words, plural
 
 WORDS = {
     "reinitialise": "Reinitialise ICP\nbroader search over orientations",
@@ -65,11 +65,12 @@ def draw_mitigation(title: str, policy_json: str | Path, pdf_path: str | Path, p
     canvas.box(6.05, middles_in[0] - 0.2, 1.06, 0.4, "A person labels it\nthe GPC learns it")
     over_in = middles_in[0] + 0.32
     canvas.arrow((6.58, middles_in[0] + 0.2), (6.58, over_in), (0.69, over_in), (0.69, 1.52))
-    canvas.text(1.1, over_in - 0.04, "with the new label, for all later cases", ha="left", va="top")
+    canvas.text(3.6, over_in + 0.03, "the classifier that has learnt the label decides all later cases", va="bottom")
+    attempts = f"{limits['attempts']:.0f}"
     back = (
         "Register and\nscore anew\n\n"
         r"$\hat{s}_c$ falls by less" + f"\nthan {limits['improvement']:.2f}: next\nconcept; after\n"
-        f"{limits['attempts']:.0f} such attempts:\nqueue"
+        f"{plural(attempts, 'such attempt')}:\nqueue"
     )
     canvas.box(6.05, middles_in[-1] - 0.2, 1.06, middles_in[1] - middles_in[-1] + 0.4, back)
     canvas.arrow((6.58, middles_in[-1] - 0.2), (6.58, 0.06), (0.69, 0.06), (0.69, 0.86))

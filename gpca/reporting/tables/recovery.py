@@ -35,7 +35,7 @@ def table8_recovery(
     within = [f"recovered_within_{k}" for k in range(1, budget + 1)]
     by_cause = {f"{within[-1]}_{cause}": cause for cause in CONCEPTS}
     table = TableBuilder("table8_recovery", {"policy": "Policy"})
-    for policy, title in policies.items():
+    for policy, words in policies.items():
         if pool_share(metrics, policy, within[0]) is None:
             continue
         shares = {key: pool_share(metrics, policy, key) for key in (*within, "wrong_first", "queued", "acted_nominal")}
@@ -47,7 +47,7 @@ def table8_recovery(
                 cells[key] = plain_cell(mean[0], seeds, failures)
         if policy in seconds:
             cells["seconds"] = plain_cell(seconds[policy], seeds, failures)
-        table.add_row([(policy, title)], cells)
+        table.add_row([(policy, words)], cells)
     table.require_rows("metrics", "hold no recovery", "run the step recover first")
     table.compare_down(within)
     failures = table.cells[0, within[0]].test_samples
