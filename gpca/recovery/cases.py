@@ -46,7 +46,7 @@ class RobotIn:
         self.points_m = shelf.objects.points(model)
         self.normals = shelf.objects.normals(model)
         self.vertices_m = shelf.surfaces[model].vertices_m
-        self.faces = shelf.surfaces[model].faces
+        self.faces = shelf.surfaces[model].triangles
         self.diameter_m = situation.diameter_m
         self.camera_seconds = 0.0
         self._situation = situation

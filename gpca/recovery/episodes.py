@@ -119,6 +119,7 @@ def _try_situation(
     for tried in range(1, 1 + MISPLACED):
         situation = situations.misplaced(clean, tried)
         start = register_misplaced(situation, estimated, points, icp)
+        assert start is not None  # the same points were registered before
         if not is_right(start):
             break
     return (situation, start), tried

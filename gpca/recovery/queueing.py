@@ -103,7 +103,7 @@ class ChancesLearner:
         """Return the actions of the largest gains."""
         utility = self._utility()
         gains_N = [utility.gains(known_F, 0.0) for known_F in self._judged_N_F]
-        return [max(gains, key=lambda action, gains=gains: gains[action]) for gains in gains_N]
+        return [max(gains, key=gains.__getitem__) for gains in gains_N]
 
 
 def learners_of(
@@ -130,9 +130,9 @@ def learners_of(
             continue
         starts = [starts_of(episodes, means.actions) for episodes in (queued, judged)]
         if entry.queues:
-            attached = [explainers.attach[entry.explainer](registrations) for registrations in starts]
+            own, others = (explainers.attach[entry.explainer](registrations) for registrations in starts)
             fitted, treatments = explainers.fitted[entry.explainer], means.policy.treatments
-            learners[name] = partial(ClassifierLearner, fitted, *attached, treatments)
+            learners[name] = partial(ClassifierLearner, fitted, own, others, treatments)
         elif means.utility is not None:
             answers = answers_of(explainers.explain[entry.explainer](starts[1].without_labels()))
             known_N_F = [known(e.observe(()), answer) for e, answer in zip(judged, answers, strict=True)]

@@ -49,7 +49,7 @@ def run(options: Namespace) -> None:
     settings = RecoverySettings.from_sections(options.settings)
     recovery = settings.section
     loop = settings.loop
-    objects = resolve(settings.objects, options.data_dir)
+    objects = resolve(dict(settings.objects), options.data_dir)
     actions = {name: action_of(name, given or {}) for name, given in recovery["actions"].items()}
     entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
     outputs = [options.out, options.timings, options.queue, options.policy, options.example]
