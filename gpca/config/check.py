@@ -80,7 +80,7 @@ def check(config: dict) -> dict[str, dict]:
     check_exchange(whole, *(names_left_out(config, key) for key in ("sources", "methods", "estimators")))
     check_tolerances(whole)
     check_real_world(whole, encoders)
-    check_recovery(whole, actions, designs)
+    check_recovery(whole, actions, designs, sources)
     resolved = resolve_sources(whole)
     check_named_sources(whole, sources, encoders)
     return resolved

@@ -69,10 +69,13 @@ class Estimator(InitialPoseSettings):
 class Recovery:
     """What is done about a failed registration, in a closed loop on tables of the virtual camera."""
 
+    objects: str
     policies: tuple[str, ...]
     treatments: Annotated[dict[str, str], Named(dict.fromkeys(CONCEPTS, str), closed=True)]
     actions: Annotated[dict[str, dict | None], Bounds(minProperties=1)]  # an action checks its settings itself
+    costs: dict[str, Share]
     thresholds: DeclaredThresholds
+    rehearsals: Count
     loop: Annotated[LoopSettings, Keys(required=("failures", "tries", "budget"), without=("cloud_points", "icp"))]
     train: TrainSamples
     calibration: TestSamples

@@ -8,11 +8,13 @@ the observed cloud is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.descriptors.pair import ObservedPair
+if TYPE_CHECKING:
+    from gpca.descriptors.pair import ObservedPair
 
 QUANTILES = np.array([0.01, *np.arange(1, 12) / 12, 0.99])  # the very ends belong to single points
 NEIGHBOURS = 12  # so many span a local plane

@@ -33,6 +33,10 @@ class GPCA:
         """Fit the GPC to the labelled embeddings."""
         self._gpc.fit(self._inputs(registrations), registrations.concept)
 
+    def learn(self, registrations: Registrations) -> None:
+        """Learn further labels, see :meth:`gpca.classifier.gpc.GPC.update`."""
+        self._gpc.update(self._inputs(registrations), registrations.concept)
+
     def explain(self, registrations: Registrations) -> Attribution:
         """Draw from the posterior at every embedding and summarise (Eqs. 4 to 7)."""
         started = perf_counter()

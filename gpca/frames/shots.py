@@ -89,12 +89,13 @@ def agreement(
     normals: np.ndarray,
     T_world_object: np.ndarray,
     diameter_m: float,
-) -> float:
-    """Return in [0, 2] how well a pose explains the shots: the share of measured points on the model, and the share of
-    the model's visible surface that was measured where it should be.
+) -> tuple[float, float, float]:
+    """Return how well a pose explains the shots, and how much of the model something else hides, as shares in [0, 1].
 
-    Visible is what faces the camera and is not behind something else that was measured. The first share alone is
-    high for many poses of a partial view. Needs no truth.
+    The first is that of the measured points on the model. The second is that of the model's visible surface that was
+    measured where it should be; visible is what faces the camera and is not behind something else that was measured.
+    The first alone is high for many poses of a partial view. The third is that of the surface facing the camera behind
+    something else. Needs no truth.
 
     Args:
         points_m: measured points (P, 3) in the world. model_m, normals: (Q, 3) in the object's frame.
@@ -103,13 +104,15 @@ def agreement(
     facing_out = rotate(T_world_object, normals)
     reach_m = NEAR * diameter_m
     on_model = np.mean(cKDTree(placed_m).query(points_m, distance_upper_bound=reach_m)[0] < reach_m)
-    explained = visible = 0
+    explained = visible = hidden = 0
     for shot in shots:
         v, u, depth_m = shot.project(placed_m)
         facing = np.sum(facing_out * (placed_m - shot.T_world_camera[:3, 3]), axis=1) < 0
         measured_m = shot.depth_m[v, u]
         mine = shot.mask[v, u]
-        seen = facing & (v >= 0) & (measured_m > 0) & (mine | (measured_m > depth_m - reach_m))
+        compared = facing & (v >= 0) & (measured_m > 0)
+        seen = compared & (mine | (measured_m > depth_m - reach_m))
         visible += seen.sum()
+        hidden += (compared & ~seen).sum()
         explained += (seen & mine & (np.abs(measured_m - depth_m) < reach_m)).sum()
-    return float(on_model + explained / max(1, visible))
+    return float(on_model), float(explained / max(1, visible)), float(hidden / max(1, visible + hidden))

@@ -191,6 +191,14 @@ class Situations:
                 return disturbed, clean
         raise InputError(f"recovery: situation {axes}", f"no room for cause '{cause}'", "widen recovery.hidden")
 
+    def misplaced(self, clean: Situation, number: int) -> Situation:
+        """Return one of many like a situation without a cause, each with a pose error of its own."""
+        return self._misplaced(clean, generator(*clean.axes, "misplaced", number))
+
+    def _misplaced(self, clean: Situation, random: np.random.Generator) -> Situation:
+        T_error = misplace(np.zeros((1, 3)), self._settings.severities, random).T_target_source_true
+        return replace(clean, T_object_estimated=scale_translation(T_error, clean.diameter_m), cause="pose")
+
     def _clean(self, random: np.random.Generator, axes: tuple) -> Situation | None:
         scenes = self._settings.scenes
         number = int(random.integers(scenes.count))
@@ -231,8 +239,7 @@ class Situations:
             scale = settings.scenes.noise.scale * random.uniform(*settings.noise_scale)
             return replace(clean, noise=replace(clean.noise, scale=scale), cause=cause)
         if cause == "pose":
-            T_error = misplace(np.zeros((1, 3)), settings.severities, random).T_target_source_true
-            return replace(clean, T_object_estimated=scale_translation(T_error, clean.diameter_m), cause=cause)
+            return self._misplaced(clean, random)
         if cause == "overlap":
             occluder = self._occluder(clean, random)
             return replace(clean, standing=(*clean.standing, occluder), cause=cause) if occluder else None

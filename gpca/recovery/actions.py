@@ -102,16 +102,35 @@ def new_view(
     elevations_deg: tuple[float, ...] = (20.0, 45.0, 70.0),
 ) -> Holding:
     """Move to the viewpoint that should show most of the surface not seen yet, and fuse what it shows."""
-    from gpca.frames.situations import coarse
-    from gpca.frames.viewpoint import best_viewpoint, candidates, expected_surface
+    from gpca.frames.viewpoint import best_viewpoint
 
-    # The viewpoints surround what was measured, since the estimated centre may be anywhere.
+    poses_n, *surface = look_around(holding, robot, random, azimuths, elevations_deg)
+    shot = robot.shoot(poses_n[best_viewpoint(*surface)], holding.frames)
+    looked = replace(holding, shots=(*holding.shots, shot))
+    return best_start(looked, robot, [robot.estimate(shot, looked.filtered)])
+
+
+def look_around(
+    holding: Holding,
+    robot: Robot,
+    random: np.random.Generator,
+    azimuths: int = 8,
+    elevations_deg: Sequence[float] = (20.0, 45.0, 70.0),
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which of the model's points were and would be seen.
+
+    The last two are those of :func:`gpca.frames.viewpoint.expected_surface`. The viewpoints surround what was measured,
+    since the estimated centre may be anywhere.
+    """
+    from gpca.frames.situations import coarse
+    from gpca.frames.viewpoint import candidates, expected_surface
+
     centre_m = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0)
     first = holding.shots[0]
     distance_m = float(np.linalg.norm(centre_m - first.T_world_camera[:3, 3]))
     poses_n = candidates(centre_m, distance_m, azimuths, elevations_deg)
     points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
-    together_n, alone_n = expected_surface(
+    seen_Q, shown_n_Q = expected_surface(
         holding.shots,
         robot.vertices_m,
         robot.faces,
@@ -121,9 +140,7 @@ def new_view(
         poses_n,
         coarse(first.camera),
     )
-    shot = robot.shoot(poses_n[best_viewpoint(together_n, alone_n)], holding.frames)
-    looked = replace(holding, shots=(*holding.shots, shot))
-    return best_start(looked, robot, [robot.estimate(shot, looked.filtered)])
+    return poses_n, seen_Q, shown_n_Q
 
 
 def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames: int = 10) -> Holding:
@@ -149,7 +166,7 @@ def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None
     model_m = robot.points_m[::step].astype(np.float64)
     normals = robot.normals[::step]
     known = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
-    shares = [agreement(holding.shots, cloud_m, model_m, normals, T, d) for T in known]
+    shares = [sum(agreement(holding.shots, cloud_m, model_m, normals, T, d)[:2]) for T in known]
     return replace(holding, T_world_object_init=known[int(np.argmax(shares))])
 
 

@@ -24,9 +24,10 @@ class CaseKey(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Scores that sum to one, BALD in nats, and the seconds that it took."""
+    """Scores that sum to one, their variances and BALD in nats (NaN where there are none), and the seconds it took."""
 
     scores_C: np.ndarray
+    variances_C: np.ndarray
     bald: float
     seconds: float
 
@@ -46,7 +47,7 @@ class Answers:
     ) -> None:
         self._episodes = episodes
         self._explain = explain
-        self._actions = list(actions)
+        self._actions = actions
         self._budget = budget
         self._answers: dict[CaseKey, Answer] = {}
 
@@ -57,21 +58,37 @@ class Answers:
             new = sorted(key for key in wanted if key.explainer == explainer)
             if not new:
                 continue
-            said = explain(as_registrations([self._record(key) for key in new])[0].without_labels())
-            scores_N_C = as_shares(said.scores_N_C)
-            for n, key in enumerate(new):
-                self._answers[key] = Answer(scores_N_C[n], float(said.bald_N[n]), float(said.seconds_N[n]))
+            records = [record_of(self._episodes[key.episode], key.actions, self._actions, self._budget) for key in new]
+            said = explain(as_registrations(records)[0].without_labels())
+            self._answers |= dict(zip(new, answers_of(said), strict=True))
 
     def history(self, explainer: str, episode: int, actions: tuple[str, ...]) -> list[Answer]:
         """Return what an explainer said at the start and after each of these actions."""
         return [self._answers[CaseKey(explainer, episode, actions[:n])] for n in range(len(actions) + 1)]
 
-    def _record(self, key: CaseKey) -> dict:
-        """Return the registration's row; its sample number, which names random numbers, tells episode and actions."""
-        base = len(self._actions) + 1
-        code = sum((1 + self._actions.index(action)) * base**place for place, action in enumerate(key.actions))
-        record = self._episodes[key.episode].outcomes[key.actions].record
-        return record | {"sample": base**self._budget * key.episode + code, "split": "test"}
+
+def record_of(episode: Episode, taken: tuple[str, ...], actions: Sequence[str], budget: int = 1) -> dict:
+    """Return a registration's row; its sample number, which names random numbers, tells episode and actions taken.
+
+    Args:
+        actions: the names of all.
+        budget: how many of them an episode may take.
+    """
+    base = len(actions) + 1
+    code = sum((1 + list(actions).index(action)) * base**place for place, action in enumerate(taken))
+    return episode.outcomes[taken].record | {"sample": base**budget * episode.number + code, "split": "test"}
+
+
+def starts_of(episodes: Sequence[Episode], actions: Sequence[str]) -> Registrations:
+    """Return the first registrations of episodes, with their causes."""
+    return as_registrations([record_of(episode, (), actions) for episode in episodes])[0]
+
+
+def answers_of(said: Attribution) -> list[Answer]:
+    """Return an attribution's rows as answers."""
+    scores_N_C = as_shares(said.scores_N_C)
+    rows = zip(scores_N_C, said.variances_N_C, said.bald_N, said.seconds_N, strict=True)
+    return [Answer(scores_C, variances_C, float(bald), float(time)) for scores_C, variances_C, bald, time in rows]
 
 
 def as_shares(scores_N_C: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ class RobotIn:
         self.points_m = shelf.objects.points(model)
         self.normals = shelf.objects.normals(model)
         self.vertices_m = shelf.surfaces[model].vertices_m
-        self.faces = shelf.surfaces[model].faces
+        self.faces = shelf.surfaces[model].triangles
         self.diameter_m = situation.diameter_m
         self.camera_seconds = 0.0
         self._situation = situation
@@ -78,6 +78,12 @@ def register_first(situation: Situation, points: int, icp: ICPSettings) -> Attem
     seconds = perf_counter() - started
     outcome = register_held(situation, Holding((shot,), T_init, T_init), points, icp)
     return outcome and replace(outcome, seconds=seconds + outcome.seconds)
+
+
+def register_misplaced(situation: Situation, clean: Attempt, points: int, icp: ICPSettings) -> Attempt | None:
+    """Register what was measured without a pose error from the estimate that has the situation's."""
+    T_init = clean.holding.T_world_object_init @ situation.T_object_estimated
+    return register_held(situation, Holding(clean.holding.shots, T_init, T_init), points, icp)
 
 
 def register_after(

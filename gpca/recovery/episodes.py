@@ -1,4 +1,4 @@
-"""Episodes: failures of a known cause, and everything that is tried about each.
+"""Episodes: registrations disturbed by a known cause, failed or fine, and everything that is tried about each.
 
 A failure is a registration whose pose is wrong (ADD, or ADD-S of symmetric objects, above 10 % of the diameter) and
 whose cause is known: without it, the same registration succeeds. An action gives the same result whichever policy
@@ -9,18 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from gpca.alignment.pose_error import CORRECT
 from gpca.errors import InputError
 from gpca.frames.situations import Situation, Situations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.recovery.actions import Action
-from gpca.recovery.cases import Attempt, register_after, register_first
+from gpca.recovery.cases import Attempt, RobotIn, register_after, register_first, register_misplaced
+from gpca.recovery.observation import observe
 from gpca.recovery.settings import LoopSettings
+
+POSE = "pose"  # the cause that disturbs nothing but ICP's start
+MISPLACED = 40  # so many of its starts are tried in one situation, at most
 
 
 class Episode:
-    """A failure and everything that was tried about it.
+    """A registration that failed, or one that did not, and everything that was tried about it.
 
     Args:
         number: its own among all of a run.
@@ -32,6 +38,19 @@ class Episode:
         self.situation = situation
         self.tries = tries
         self.outcomes: dict[tuple[str, ...], Attempt] = {(): start}
+        self._observed: dict[tuple[str, ...], np.ndarray] = {}
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is anything to recover."""
+        return not is_right(self.outcomes[()])
+
+    def observe(self, actions: tuple[str, ...]) -> np.ndarray:
+        """Return what the robot observes after these actions, see :func:`gpca.recovery.observation.observe`."""
+        if actions not in self._observed:
+            attempt = self.outcomes[actions]
+            self._observed[actions] = observe(attempt.holding, attempt.record, RobotIn(self.situation))
+        return self._observed[actions]
 
     def take(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> Attempt:
         """Return the outcome after these actions, of which all but the last were taken."""
@@ -43,31 +62,64 @@ class Episode:
         return self.outcomes[actions]
 
 
-def find_failures(situations: Situations, settings: LoopSettings) -> list[Episode]:
+def is_right(attempt: Attempt | None) -> bool:
+    """Return whether there is a pose, and a right one."""
+    return attempt is not None and attempt.error <= CORRECT
+
+
+def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episode]:
     """Draw situations of every cause until enough of their registrations have failed for it.
+
+    Of those that did not fail, as many are kept at most. The failures of a cause come first, and each situation gives
+    one episode.
 
     Raises:
         InputError: no failure at all.
     """
     episodes: list[Episode] = []
-    tried: dict[str, int] = {}
+    tries: dict[str, int] = {}
     for cause in CONCEPTS:
-        found: list[tuple[Situation, Attempt]] = []
+        found: dict[bool, list[tuple[Situation, Attempt]]] = {True: [], False: []}
+        tries[cause] = 0
         for number in progress(range(settings.tries), f"failures by {cause}"):
-            if len(found) == settings.failures:
+            if len(found[True]) == settings.failures:
                 break
-            tried[cause] = number + 1
-            disturbed, clean = situations.draw(cause, cause, number)
-            start = register_first(disturbed, settings.cloud_points, settings.icp)
-            if start is None or start.error <= CORRECT:
-                continue
-            without = register_first(clean, settings.cloud_points, settings.icp)
-            if without is not None and without.error <= CORRECT:
-                found.append((disturbed, start))
-        episodes += [
-            Episode(len(episodes) + n, situation, start, tried[cause]) for n, (situation, start) in enumerate(found)
-        ]
-    if not episodes:
-        counts = ", ".join(f"{n} of {cause}" for cause, n in tried.items())
+            case, tried = _try_situation(situations, cause, number, settings)
+            tries[cause] += tried
+            if case and len(of_kind := found[not is_right(case[1])]) < settings.failures:
+                of_kind.append(case)
+        for situation, start in (*found[True], *found[False]):
+            episodes.append(Episode(len(episodes), situation, start, tries[cause]))
+    if not any(episode.failed for episode in episodes):
+        counts = ", ".join(f"{n} of {cause}" for cause, n in tries.items())
         raise InputError("recovery", f"no registration failed ({counts})", "raise recovery.tries or the disturbances")
     return episodes
+
+
+def _try_situation(
+    situations: Situations, cause: str, number: int, settings: LoopSettings
+) -> tuple[tuple[Situation, Attempt] | None, int]:
+    """Register a disturbed situation, and the clean one where that failed; of bad poses, until one fails.
+
+    A pose error changes nothing but ICP's start, so several are tried on the same measurement and the same estimate.
+
+    Returns:
+        the situation with its registration, or None where that failed without the cause too; how many were made.
+    """
+    points, icp = settings.cloud_points, settings.icp
+    disturbed, clean = situations.draw(cause, cause, number)
+    if cause != POSE:
+        start = register_first(disturbed, points, icp)
+        if start is None or not (is_right(start) or is_right(register_first(clean, points, icp))):
+            return None, 1
+        return (disturbed, start), 1
+    estimated = register_first(clean, points, icp)
+    if estimated is None or not is_right(estimated):
+        return None, 1
+    for tried in range(1, 1 + MISPLACED):
+        situation = situations.misplaced(clean, tried)
+        start = register_misplaced(situation, estimated, points, icp)
+        assert start is not None  # the same points were registered before
+        if not is_right(start):
+            break
+    return (situation, start), tried

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from gpca.recovery.answers import Explain
 from gpca.uncertainty.evaluation import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
+Attach = Callable[[Registrations], Registrations]
+
 
 @dataclass(frozen=True)
 class LoopExplainers:
@@ -24,11 +27,15 @@ class LoopExplainers:
 
     Attributes:
         explain: for each name the function that attributes registrations without labels.
+        fitted: for each name the explainer itself.
+        attach: for each name the function that adds to registrations what the explainer reads.
         calibration: for each name what it says of the calibration samples.
         concepts: (N,) the truth about those.
     """
 
     explain: Mapping[str, Explain]
+    fitted: Mapping[str, Any]
+    attach: Mapping[str, Attach]
     calibration: Mapping[str, Attribution]
     concepts: np.ndarray
 
@@ -55,7 +62,7 @@ def learn_explainers(
         most_remedied: training samples whose remedies are run, at most; Monte-Carlo ICP is slow.
     """
     train, held_out = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
-    explain = {}
+    fitted, attached = {}, {}
     model = None
     for name in names:
         entry = explainer_entry(name)
@@ -68,9 +75,10 @@ def learn_explainers(
             attach = _remedies(source, seed, uncertainty)
             learnt = train.subset(np.arange(len(train))[:most_remedied])
         explainer.fit(attach(learnt))
-        explain[name] = _timed(explainer, attach)
+        fitted[name], attached[name] = explainer, attach
+    explain = {name: _timed(explainer, attached[name]) for name, explainer in fitted.items()}
     calibration = {name: of_name(held_out.without_labels()) for name, of_name in explain.items()}
-    return LoopExplainers(explain, calibration, held_out.concept)
+    return LoopExplainers(explain, fitted, attached, calibration, held_out.concept)
 
 
 def _timed(explainer, attach) -> Explain:

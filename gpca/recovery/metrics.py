@@ -12,22 +12,25 @@ from gpca.attribution.metrics import ALL, tidy
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.policy import QUEUE
+from gpca.recovery.policy import NOTHING, QUEUE
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TABLE = "recovery"  # `table` and `source` of the tidy rows read this
-RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "recovered", "tries")
+RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "failed", "recovered", "tries")
 SECONDS = ("explanation_seconds", "action_seconds")
 FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
 
 
-def collect_recovery(files: Iterable[str | Path], treatments: Mapping[str, str], budget: int) -> pd.DataFrame:
+def collect_recovery(
+    files: Iterable[str | Path], treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
+) -> pd.DataFrame:
     """Return the tidy metrics of files named `…/seed{seed}.csv`; results/README.md lists them.
 
     Args:
         treatments: concept -> the action of its own.
+        costs: action -> what it costs, in right poses.
         budget: actions per failure.
 
     Raises:
@@ -40,17 +43,20 @@ def collect_recovery(files: Iterable[str | Path], treatments: Mapping[str, str],
         for policy, of_policy in rows.groupby("policy", sort=False):
             for cause in (ALL, *CONCEPTS):
                 of_cause = of_policy if cause == ALL else of_policy[of_policy["cause"] == cause]
-                if of_cause.empty:
+                if not of_cause["failed"].any():
                     continue
-                values = policy_metrics(of_cause, treatments, budget)
+                values = policy_metrics(of_cause, treatments, costs, budget)
                 records += [(TABLE, TABLE, policy, metric, cause, seed, float(v)) for metric, v in values.items()]
     return tidy(records, "recovery")
 
 
-def policy_metrics(rows: pd.DataFrame, treatments: Mapping[str, str], budget: int) -> dict[str, float]:
-    """Return the metrics of one policy on the failures that the rows are of."""
+def policy_metrics(
+    rows: pd.DataFrame, treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
+) -> dict[str, float]:
+    """Return the metrics of one policy on the failures among the rows, and how often it acts on the others."""
+    fine, rows = rows[~rows["failed"]], rows[rows["failed"]]
     first = rows[rows["step"] == 1]
-    acted = first[first["action"] != QUEUE]
+    acted = first[is_action(first)]
     episodes = first["episode"].nunique()
     values = {
         f"recovered_within_{k}": rows[rows["recovered"] & (rows["step"] <= k)]["episode"].nunique() / episodes
@@ -60,9 +66,17 @@ def policy_metrics(rows: pd.DataFrame, treatments: Mapping[str, str], budget: in
     if len(acted):
         values["wrong_first"] = float((acted["action"] != acted["cause"].map(dict(treatments))).mean())
     values["queued"] = rows[rows["action"] == QUEUE]["episode"].nunique() / episodes
-    values["actions"] = float((rows["action"] != QUEUE).sum() / episodes)
+    values["left_alone"] = float((first["action"] == NOTHING).mean())
+    values["actions"] = float(is_action(rows).sum() / episodes)
+    values["cost"] = float(rows["action"].map(dict(costs)).sum() / episodes)
+    values |= {"nominal": len(fine)} | ({"acted_nominal": float(is_action(fine).mean())} if len(fine) else {})
     counts = first["action"].value_counts()
     return values | {FIRST + action: counts.get(action, 0) for action in (*treatments.values(), QUEUE)}
+
+
+def is_action(rows: pd.DataFrame) -> pd.Series:
+    """Return which rows are of an action, as booleans."""
+    return ~rows["action"].isin((QUEUE, NOTHING))
 
 
 def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
@@ -71,7 +85,8 @@ def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
 
     parts = []
     for path in files:
-        rows = read_csv(path, ("episode", "policy", *SECONDS))
+        rows = read_csv(path, ("episode", "failed", "policy", *SECONDS))
+        rows = rows[rows["failed"] == "True"]
         rows["seconds"] = sum(numbers(path, rows, name) for name in SECONDS)
         parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
     if not parts:
@@ -84,9 +99,11 @@ def read_recovery(path: str | Path) -> pd.DataFrame:
     rows = read_csv(path, RECOVERY_COLUMNS)
     for name in ("episode", "step", "tries"):
         rows[name] = numbers(path, rows, name).astype(int)
-    if not (rows["cause"].isin(CONCEPTS) & rows["recovered"].isin(("True", "False"))).all():
+    flags = ("failed", "recovered")
+    if not (rows["cause"].isin(CONCEPTS) & rows[[*flags]].isin(("True", "False")).all(axis=1)).all():
         raise InputError(path, "holds an unknown cause, or a row neither recovered nor not", "make it anew")
-    rows["recovered"] = rows["recovered"] == "True"
+    for name in flags:
+        rows[name] = rows[name] == "True"
     return rows
 
 
@@ -109,9 +126,10 @@ def wilson_interval(successes: float, trials: int, level: float = 0.95) -> tuple
 def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
     """Return a share over the failures of all seeds, and their number; None where the metrics hold none.
 
-    A wrong first action is a share of the failures that were acted on at all.
+    A wrong first action is a share of the failures that were acted on at all, an action on what did not fail one of
+    those registrations.
     """
-    weight = "acted_first" if metric == "wrong_first" else "episodes"
+    weight = {"wrong_first": "acted_first", "acted_nominal": "nominal"}.get(metric, "episodes")
     of_policy = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
     share_R, count_R = (of_policy[of_policy["metric"] == m].set_index("seed")["value"] for m in (metric, weight))
     if share_R.empty:

@@ -13,7 +13,8 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.policy import Decision, RecoveryPolicy, Thresholds, Treated
+from gpca.recovery.chances import ExpectedUtility
+from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
 
 
 @dataclass(frozen=True)
@@ -23,13 +24,15 @@ class Case:
     Attributes:
         actions: those that were taken, in order.
         scores_T_C, bald_T: what its explainer said at the start and after each action; None where it reads none.
-        cause: the truth, for the oracle alone; empty for all others.
+        known_F: all that is known of the registration (:func:`gpca.recovery.rehearsal.known`), for who learns from it.
+        cause: of a failure, for the oracle alone; empty for all others.
         random: the case's own numbers for policies, from their start: the same at every decision.
     """
 
     actions: tuple[str, ...]
     scores_T_C: np.ndarray | None
     bald_T: np.ndarray | None
+    known_F: np.ndarray | None
     cause: str
     random: np.random.Generator
 
@@ -38,24 +41,38 @@ Decide = Callable[[Case], Decision]
 
 
 @dataclass(frozen=True)
+class Means:
+    """What policies are made from: the robot's thresholds and treatments, its actions, and what it has rehearsed."""
+
+    policy: RecoveryPolicy
+    actions: Sequence[str]
+    utility: ExpectedUtility | None = None
+
+
+@dataclass(frozen=True)
 class PolicyEntry:
     """A policy by name.
 
     Attributes:
         title: what tables call it.
-        make: what makes it from the robot's policy (thresholds, treatments) and the names of the actions.
+        make: what makes it.
         explainer: the one that it reads (:mod:`baselines.registry`), empty for none.
+        queues: whether it leaves cases to a person, whose labels its explainer can learn.
+        learns: whether it needs rehearsals.
         oracle: whether it is told the cause.
     """
 
     title: str
-    make: Callable[[RecoveryPolicy, Sequence[str]], Decide]
+    make: Callable[[Means], Decide]
     explainer: str = ""
+    queues: bool = False
+    learns: bool = False
     oracle: bool = False
 
 
-def follow_scores(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+def follow_scores(means: Means) -> Decide:
     """Follow the scores of an explainer, and queue what is uncertain (:class:`gpca.recovery.policy.RecoveryPolicy`)."""
+    policy = means.policy
     concept_of = {action: concept for concept, action in policy.treatments.items()}
 
     def decide(case: Case) -> Decision:
@@ -72,48 +89,62 @@ def follow_scores(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
     return decide
 
 
-def never_queue(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+def never_queue(means: Means) -> Decide:
     """Follow the scores, however uncertain they are, so that explainers are compared by their actions alone."""
-    limits = policy.thresholds
+    limits = means.policy.thresholds
     sure = Thresholds(uncertain=np.inf, dominant=0.0, improvement=limits.improvement, attempts=1_000_000)
-    return follow_scores(replace(policy, thresholds=sure), actions)
+    return follow_scores(replace(means, policy=replace(means.policy, thresholds=sure)))
 
 
-def act_at_random(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+def weigh_chances(means: Means) -> Decide:
+    """Take what is worth most by its learnt chance and its cost (:class:`gpca.recovery.chances.ExpectedUtility`)."""
+    utility = means.utility
+    assert utility is not None  # whoever learns is given rehearsals
+
+    def decide(case: Case) -> Decision:
+        assert case.known_F is not None
+        return utility.decide(case.known_F, case.actions)
+
+    return decide
+
+
+def act_at_random(means: Means) -> Decide:
     """Take any action, the same one again too."""
 
     def decide(case: Case) -> Decision:
         # The case's numbers start anew at every decision, so the draws before are drawn again.
-        drawn = case.random.integers(len(actions), size=len(case.actions) + 1)[-1]
-        return Decision(actions[int(drawn)], "", "at random")
+        drawn = case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1]
+        return Decision(means.actions[int(drawn)], "", "at random")
 
     return decide
 
 
-def act_in_turn(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
+def act_in_turn(means: Means) -> Decide:
     """Take all actions in turn, in an order drawn for each case."""
 
     def decide(case: Case) -> Decision:
-        order = case.random.permutation(len(actions))
-        return Decision(actions[order[len(case.actions) % len(actions)]], "", "in turn")
+        order = case.random.permutation(len(means.actions))
+        return Decision(means.actions[order[len(case.actions) % len(means.actions)]], "", "in turn")
 
     return decide
 
 
-def follow_truth(policy: RecoveryPolicy, actions: Sequence[str]) -> Decide:
-    """Take the action that treats the true cause, again and again."""
-    return lambda case: Decision(policy.treatments[case.cause], case.cause, "told the cause")
+def follow_truth(means: Means) -> Decide:
+    """Take the action that treats the true cause, again and again; without a cause, none."""
+    treatments = means.policy.treatments
+    return lambda case: Decision(treatments.get(case.cause, NOTHING), case.cause, "told the cause")
 
 
-def always_act(action: str) -> Callable[[RecoveryPolicy, Sequence[str]], Decide]:
+def always_act(action: str) -> Callable[[Means], Decide]:
     """Return what makes the policy of one and the same action."""
-    return lambda policy, actions: lambda case: Decision(action, "", "always")
+    return lambda means: lambda case: Decision(action, "", "always")
 
 
 ALWAYS = "always_"  # with an action's name behind it, the policy that always takes this action
 POLICIES = {
-    "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca"),
+    "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
+    "utility": PolicyEntry("Expected utility, learnt", weigh_chances, explainer="gpca", learns=True),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
     "random": PolicyEntry("Random action", act_at_random),

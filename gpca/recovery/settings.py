@@ -18,6 +18,7 @@ from gpca.uncertainty.settings import UncertaintySettings
 
 SECTIONS = {
     "recovery": ("recovery",),
+    "objects": ("sources", "*"),
     "scenes": ("real_world", "scenes"),
     "registrations": ("registrations",),
     "encoder": ("encoders", "*"),
@@ -31,7 +32,7 @@ class LoopSettings:
 
     Attributes:
         failures: how many are wanted for each cause.
-        tries: how many registrations may be made to find them, for each cause.
+        tries: how many situations may be registered to find them, for each cause.
         budget: how many actions each failure may take.
         cloud_points: how many source and target have.
         icp: how ICP runs.
@@ -50,6 +51,7 @@ class RecoverySettings:
 
     Attributes:
         section: the config's section ``recovery``, for all that it hands on as it is.
+        objects: the entry of the source whose objects lie on the tables.
         loop: how the loop runs.
         situation: what disturbs the registrations, and on which scenes.
         encoder, uncertainty: what the explainers share.
@@ -57,6 +59,7 @@ class RecoverySettings:
     """
 
     section: Mapping
+    objects: Mapping
     loop: LoopSettings
     situation: SituationSettings
     encoder: EncoderSettings
@@ -79,6 +82,7 @@ class RecoverySettings:
         scenes = SceneSettings.from_dict(given["scenes"])
         return cls(
             section=recovery,
+            objects=given["objects"],
             loop=LoopSettings(**recovery["loop"], cloud_points=registration.cloud_points, icp=registration.icp),
             situation=SituationSettings(
                 replace(scenes, count=recovery["tables"], camera=Camera(**recovery["camera"])),

@@ -1,18 +1,20 @@
-"""The virtual tables of a run: those that explainers learn from, those that they are calibrated on, those of failures.
+"""The virtual tables of a run, where explainers learn, are calibrated, actions are rehearsed, and policies are judged.
 
 No two parts share a table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from gpca.alignment.pose_error import CORRECT
+from gpca.environment import require_open3d
+from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import Shelf, Situations
-from gpca.objects import procedural
+from gpca.objects.surface import Surface
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
@@ -20,16 +22,40 @@ from gpca.progress import progress
 from gpca.recovery.cases import register_first
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 
-PARTS = ("train", "test", "failures")
+MOST_FACES = 2000  # of a mesh; what decimation moves is far below the noise of depth
+PARTS = ("train", "test", "rehearsals", "failures")
 
 
-def lay_tables(settings: RecoverySettings, source: str, seed: int) -> dict[str, Situations]:
-    """Return the situations of every part; source and seed name all that is random in them."""
-    families = settings.situation.scenes.families
+def lay_tables(
+    surfaces: Iterable[Surface], settings: RecoverySettings, source: str, seed: int
+) -> dict[str, Situations]:
+    """Return the situations of every part; source and seed name all that is random in them.
+
+    Raises:
+        InputError: an object is a cloud of points, which hides nothing.
+    """
+    surfaces = [simplified(surface) for surface in surfaces]
     recovery = settings.section
-    surfaces = [surface for family in families for surface in procedural.surfaces(family)]
     shelf = Shelf(surfaces, source, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
     return {part: Situations(shelf, settings.situation, (source, seed, part)) for part in PARTS}
+
+
+def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
+    """Return a mesh of at most so many faces, by quadric decimation (Garland and Heckbert 1997): scans have more.
+
+    Raises:
+        InputError: a cloud of points.
+    """
+    if surface.faces is None:
+        fault = f"its object '{surface.name}' is a cloud of points, and a camera looks at meshes"
+        raise InputError("recovery.objects", fault, "name a source of meshes")
+    if len(surface.faces) <= most_faces:
+        return surface
+    o3d = require_open3d()
+    vertices, triangles = o3d.utility.Vector3dVector, o3d.utility.Vector3iVector
+    mesh = o3d.geometry.TriangleMesh(vertices(surface.vertices_m), triangles(surface.faces.astype(np.int32)))
+    mesh = mesh.simplify_quadric_decimation(most_faces)
+    return Surface(surface.name, np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64))
 
 
 def register_situations(

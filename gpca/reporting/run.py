@@ -61,6 +61,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "printed_kernels": [kernel for kernel, rate, n in PRINTED if _is_fitted(kernels, kernel, rate, n)],
         "frames": REAL_WORLD,
         "backbone": backbones,
+        "learning_policy": [name for name in config["recovery"]["policies"] if _learns(name, config["recovery"])],
         "first_backbone": backbones[0],
         "classic": [name for name in CLASSIC if name in config["explainers"]],
     }
@@ -131,6 +132,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],
         "backbone_reductions": list(frames["reductions"]),
         "policies": {name: policy_entry(name, tuple(recovery["actions"])).title for name in recovery["policies"]},
+        "recovery_title": f"Tables of the virtual camera, {title_of(shown[recovery['objects']])}",
         "treatments": recovery["treatments"],
         "budget": recovery["loop"]["budget"],
     }
@@ -186,6 +188,11 @@ def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
         files["uncertainty"] = f"uncertainty/{{source}}/{entry.design}/seed{{seed}}.npz"
         files["uncertainty_timings"] = f"timings/{{source}}/uncertainty_{entry.design}/seed{{seed}}.csv"
     return files
+
+
+def _learns(policy: str, recovery: Mapping) -> bool:
+    entry = policy_entry(policy, tuple(recovery["actions"]))
+    return entry.learns or entry.queues
 
 
 def _is_fitted(kernels: Mapping, kernel: str, rate: float, iterations: int) -> bool:

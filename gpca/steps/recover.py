@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -12,14 +13,18 @@ import torch
 from gpca.arguments import SEED
 from gpca.csv_file import write_csv
 from gpca.files import whole_file
+from gpca.objects.source import data_files, resolve, surfaces
 from gpca.provenance import record_provenance
 from gpca.recovery.actions import action_of
 from gpca.recovery.calibration import robot_policy, summary
-from gpca.recovery.episodes import find_failures
-from gpca.recovery.example import save_example
+from gpca.recovery.chances import learn_utility
+from gpca.recovery.episodes import find_episodes, is_right
+from gpca.recovery.example import ACTION, save_example
 from gpca.recovery.loop import Loop
 from gpca.recovery.loop_explainers import learn_explainers
-from gpca.recovery.policies import policy_entry
+from gpca.recovery.policies import Means, policy_entry
+from gpca.recovery.queueing import error_by_labels, learners_of
+from gpca.recovery.rehearsal import rehearse
 from gpca.recovery.settings import RecoverySettings
 from gpca.recovery.virtual_tables import lay_tables, register_situations
 
@@ -29,27 +34,31 @@ SOURCE = "recovery"  # names every random number of this step, tables included
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files; ``--settings`` holds the sections of the config that are read."""
     parser.add_argument("--seed", required=True, type=SEED)
+    parser.add_argument("--data-dir", help="folder that holds the objects' data; what is there is not downloaded")
+    parser.add_argument("--downloads", default="data/downloads", help="where downloads are kept")
     parser.add_argument("--out", required=True, type=Path, help="CSV: a row per failure, policy and step")
     parser.add_argument("--timings", required=True, type=Path, help="CSV of their seconds")
+    parser.add_argument("--queue", required=True, type=Path, help="CSV of the error by the labels of queued cases")
     parser.add_argument("--policy", required=True, type=Path, help="JSON of the thresholds chosen")
     parser.add_argument("--example", required=True, type=Path, help="npz of one failure, for the figure")
 
 
 def run(options: Namespace) -> None:
-    """Learn the classifier, find failures and let every policy act on them."""
+    """Learn the classifier, rehearse, find failures and let every policy act on them."""
     torch.set_num_threads(options.threads)
     settings = RecoverySettings.from_sections(options.settings)
     recovery = settings.section
     loop = settings.loop
+    objects = resolve(dict(settings.objects), options.data_dir)
     actions = {name: action_of(name, given or {}) for name, given in recovery["actions"].items()}
-    explainers_read = [policy_entry(name, tuple(actions)).explainer for name in recovery["policies"]]
-    outputs = [options.out, options.timings, options.policy, options.example]
+    entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
+    outputs = [options.out, options.timings, options.queue, options.policy, options.example]
     axes = (SOURCE, options.seed)
-    with record_provenance(outputs, [], options.settings, seed=options.seed):
-        tables = lay_tables(settings, *axes)
+    with record_provenance(outputs, data_files(objects), options.settings, seed=options.seed):
+        tables = lay_tables(surfaces(objects, options.downloads), settings, *axes)
         registrations, failed_S = register_situations(tables, recovery["train"], recovery["calibration"], loop)
         explainers = learn_explainers(
-            [name for name in dict.fromkeys(explainers_read) if name],
+            [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],
             registrations,
             settings.encoder,
             settings.explainers,
@@ -59,11 +68,21 @@ def run(options: Namespace) -> None:
         )
         policy = robot_policy(recovery, explainers, failed_S[registrations.rows("test")])
         _write_summary(options.policy, summary(policy, explainers))
-        episodes = find_failures(tables["failures"], loop)
-        rows, seconds = Loop(episodes, actions, explainers.explain, policy, loop, axes).run(recovery["policies"])
+        means, rehearsal = Means(policy, tuple(actions)), None
+        if learner := next((entry.explainer for entry in entries if entry.learns or entry.queues), ""):
+            training = find_episodes(tables["rehearsals"], replace(loop, failures=recovery["rehearsals"]))
+            rehearsal = rehearse(training, actions, learner, explainers.explain[learner], loop)
+            means = replace(means, utility=learn_utility(rehearsal.trials.values(), recovery["costs"], tuple(actions)))
+        episodes = find_episodes(tables["failures"], loop)
+        rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes).run(recovery["policies"])
+        judged = [episode for episode in episodes if episode.failed]
+        solved = [{name: is_right(e.take((name,), actions, loop)) for name in actions} for e in judged]
+        learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers)
+        write_csv(options.queue, error_by_labels(learners, solved, rehearsal, axes))
         write_csv(options.out, rows)
         write_csv(options.timings, seconds)
-        save_example(options.example, episodes, rows, actions, loop)
+        views = recovery["actions"].get(ACTION) or {}
+        save_example(options.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop)
 
 
 def _write_summary(path: Path, content: dict) -> None:

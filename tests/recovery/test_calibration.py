@@ -22,7 +22,7 @@ def explainers():
     said = Attribution.of_scores(CONCEPTS, scores, seconds=0.0)
     said.bald_N[:] = BALD
     truth = np.array([CONCEPTS[0]] * 15 + [CONCEPTS[1]] * 15)
-    return LoopExplainers({}, {"gpca": said}, truth)
+    return LoopExplainers({}, {}, {}, {"gpca": said}, truth)
 
 
 def test_failed_samples_choose_the_threshold(explainers):
@@ -38,7 +38,7 @@ def test_all_samples_choose_it_where_hardly_any_failed(explainers):
 
 
 def test_without_gpca_nothing_is_too_uncertain(explainers):
-    other = LoopExplainers({}, {"softmax_head": explainers.calibration["gpca"]}, explainers.concepts)
+    other = LoopExplainers({}, {}, {}, {"softmax_head": explainers.calibration["gpca"]}, explainers.concepts)
     assert robot_policy(SECTION, other, np.ones(len(BALD), bool)).thresholds.uncertain == np.inf
 
 

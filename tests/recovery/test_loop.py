@@ -11,8 +11,8 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.episodes import Episode
 from gpca.recovery.loop import Loop
-from gpca.recovery.policies import POLICIES
-from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds
+from gpca.recovery.policies import POLICIES, Means
+from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 
 from .conftest import LOOP
 
@@ -37,11 +37,13 @@ def loop(start):
     episode = Episode(0, *start, tries=5)
     actions = {name: action_of(name, {}) for name in ACTIONS}
 
-    def run(policies, concept="overlap", **thresholds):
+    def run(policies, concept="overlap", others=(), **thresholds):
         explain = stub(concept)
         given = {"gpca": explain, "softmax_head": stub(concept)}
         policy = RecoveryPolicy(Thresholds(**{"uncertain": 0.2, "dominant": 0.4} | thresholds))
-        rows, seconds = Loop([episode], actions, given, policy, LOOP, ("tiny", 0)).run(policies)
+        rows, seconds = Loop([episode, *others], actions, given, Means(policy, tuple(actions)), LOOP, ("tiny", 0)).run(
+            policies
+        )
         return rows, seconds, explain
 
     return run
@@ -73,6 +75,18 @@ def test_a_queued_case_ends_there(loop):
     assert queued["action"].tolist() == [QUEUE]
     assert not queued["recovered"].any()
     assert (rows.loc[rows["policy"] == "gpca_acting", "action"] != QUEUE).all()
+
+
+def test_about_what_did_not_fail_a_policy_only_decides(loop, start):
+    situation, outcome = start
+    fine = Episode(1, situation, replace(outcome, error=0.01), tries=5)
+    rows, *_ = loop(["gpca_acting", "oracle"], others=[fine])
+    assert rows[rows["episode"] == 1].set_index("policy")["action"].to_dict() == {
+        "gpca_acting": "new_view",
+        "oracle": NOTHING,
+    }
+    assert not rows.loc[rows["episode"] == 1, ["failed", "recovered"]].any(axis=None)
+    assert list(fine.outcomes) == [()]
 
 
 def test_a_policy_does_not_insist_on_what_did_not_help(loop):

@@ -11,7 +11,9 @@ from gpca.recovery.metrics import (
     read_recovery,
     wilson_interval,
 )
-from gpca.recovery.policy import QUEUE, TREATMENTS
+from gpca.recovery.policy import NOTHING, QUEUE, TREATMENTS
+
+COSTS = {"denoise": 0.02, "reinitialise": 0.01, "new_view": 0.03}
 
 
 def rows_of(*episodes, policy="gpca"):
@@ -23,6 +25,7 @@ def rows_of(*episodes, policy="gpca"):
             "policy": policy,
             "step": step,
             "action": action,
+            "failed": True,
             "recovered": recovered and step == len(actions),
             "tries": {"noise": 10, "pose": 20, "overlap": 30}[cause],
         }
@@ -48,18 +51,27 @@ def files(tmp_path):
 
 
 def test_the_metrics_of_a_policy_by_hand():
-    values = policy_metrics(rows_of(*EPISODES), TREATMENTS, 3)
+    values = policy_metrics(rows_of(*EPISODES), TREATMENTS, COSTS, 3)
     assert [values[f"recovered_within_{k}"] for k in (1, 2, 3)] == [0.25, 0.5, 0.5]
     assert values["wrong_first"] == pytest.approx(2 / 3)  # of the three that acted
     assert values["queued"] == 0.25
     assert values["actions"] == 6 / 4
+    assert values["cost"] == pytest.approx((3 * 0.02 + 2 * 0.01 + 0.03) / 4)
     assert values["episodes"] == 4
     assert values["tries"] == 60
     assert [values[f"first_{a}"] for a in ("denoise", "reinitialise", "new_view", QUEUE)] == [1, 1, 1, 1]
 
 
+def test_what_did_not_fail_counts_apart():
+    fine = rows_of(("noise", ["denoise"], False), ("pose", [NOTHING], False)).assign(failed=False)
+    values = policy_metrics(pd.concat([rows_of(*EPISODES), fine]), TREATMENTS, COSTS, 3)
+    assert (values["nominal"], values["acted_nominal"], values["episodes"]) == (2, 0.5, 4)
+    left = policy_metrics(rows_of(("pose", [NOTHING], False)), TREATMENTS, COSTS, 3)
+    assert (left["left_alone"], left["queued"], left["recovered_within_3"]) == (1, 0, 0)
+
+
 def test_shares_are_pooled_over_the_failures_of_all_seeds(files):
-    metrics = collect_recovery(files, TREATMENTS, 3)
+    metrics = collect_recovery(files, TREATMENTS, COSTS, 3)
     assert pool_share(metrics, "gpca", "recovered_within_1") == (pytest.approx(3 / 6), 6)
     assert pool_share(metrics, "gpca", "recovered_within_2", "noise") == (pytest.approx(1), 4)
     assert pool_share(metrics, "gpca", "recovered_within_2", "pose") == (0, 1)
@@ -79,7 +91,13 @@ def test_the_wilson_interval_is_that_of_the_literature():
 
 def test_seconds_are_summed_over_a_failure_and_averaged_over_failures(tmp_path):
     path = tmp_path / "seed0.csv"
-    columns = {"episode": [0, 0, 1], "policy": "gpca", "explanation_seconds": 0.5, "action_seconds": [1.0, 2.0, 3.0]}
+    columns = {
+        "episode": [0, 0, 1],
+        "failed": True,
+        "policy": "gpca",
+        "explanation_seconds": 0.5,
+        "action_seconds": [1.0, 2.0, 3.0],
+    }
     write_csv(path, pd.DataFrame(columns))
     assert mean_seconds([path]) == {"gpca": pytest.approx((4.0 + 3.5) / 2)}
     with pytest.raises(InputError, match="no files of seconds"):
@@ -95,6 +113,6 @@ def test_faulty_files_are_refused(files, tmp_path):
         read_recovery(tmp_path / "less.csv")
     files[0].rename(tmp_path / "first.csv")
     with pytest.raises(InputError, match=r"is not named …/seed\{number\}.csv"):
-        collect_recovery([tmp_path / "first.csv"], TREATMENTS, 3)
+        collect_recovery([tmp_path / "first.csv"], TREATMENTS, COSTS, 3)
     with pytest.raises(InputError, match="no files were given"):
-        collect_recovery([], TREATMENTS, 3)
+        collect_recovery([], TREATMENTS, COSTS, 3)

@@ -2,22 +2,23 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.recovery.policies import Case, policy_entry
-from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds
+from gpca.recovery.chances import Chances, ExpectedUtility, Trial
+from gpca.recovery.policies import Case, Means, policy_entry
+from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.seeds import generator
 
 ACTIONS = ("reinitialise", "new_view", "denoise")
 POLICY = RecoveryPolicy(Thresholds(uncertain=0.2, dominant=0.4))
 
 
-def case(actions=(), scores=None, bald=None, cause="", episode=0):
+def case(actions=(), scores=None, bald=None, known=None, cause="", episode=0):
     scores = None if scores is None else np.array(scores, float)
     bald = None if bald is None else np.array(bald, float)
-    return Case(actions, scores, bald, cause, generator("test", episode))
+    return Case(actions, scores, bald, known, cause, generator("test", episode))
 
 
-def made(name):
-    return policy_entry(name, ACTIONS).make(POLICY, ACTIONS)
+def made(name, utility=None):
+    return policy_entry(name, ACTIONS).make(Means(POLICY, ACTIONS, utility))
 
 
 def test_gpca_follows_the_scores_and_queues_what_is_uncertain_while_the_acting_one_never_does():
@@ -37,6 +38,13 @@ def test_after_an_action_the_fall_of_its_concept_counts():
 
 def test_scores_without_uncertainty_are_followed():
     assert made("softmax_head")(case(scores=[[0.8, 0.1, 0.1]], bald=[np.nan])).action == "denoise"
+
+
+def test_the_learnt_policy_decides_by_what_is_known_and_done():
+    trials = [Trial(np.zeros(1), action, action == "new_view") for action in ACTIONS for _ in range(8)]
+    utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.01))
+    assert made("utility", utility)(case(known=np.zeros(1))).action == "new_view"
+    assert made("utility", utility)(case(("new_view",), known=np.zeros(1))).action != "new_view"
 
 
 def test_round_robin_takes_every_action_once_in_an_order_of_the_case():
@@ -64,6 +72,7 @@ def test_fixed_actions_and_the_oracle():
         "reinitialise",
         "new_view",
     ]
+    assert made("oracle")(case()).action == NOTHING  # it is told that nothing is wrong
     assert policy_entry("oracle", ACTIONS).oracle
     assert not any(policy_entry(name, ACTIONS).oracle for name in ("gpca", "random", "always_denoise"))
 

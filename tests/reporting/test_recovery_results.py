@@ -1,8 +1,9 @@
-"""Table VIII and the three figures of recovery."""
+"""Table VIII and the figures of recovery."""
 
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from gpca.arrays import save_arrays
@@ -12,10 +13,12 @@ from gpca.files import read_image
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import wilson_interval
 from gpca.reporting.figures.policy import draw_mitigation, read_policy
+from gpca.reporting.figures.queued_labels import draw_queued_labels
 from gpca.reporting.figures.recovery_example import draw_recovery_example
 from gpca.reporting.figures.recovery_rates import draw_recovery_rates
 from gpca.reporting.tables.recovery import table8_recovery
 
+TITLE = "Tables, YCB"
 POLICIES = {"gpca": "GP-CA", "random": "Random action", "absent": "Absent"}
 POLICY = {
     "thresholds": {"uncertain": 0.25, "dominant": 0.4, "improvement": 0.1, "attempts": 3},
@@ -36,6 +39,9 @@ def metrics():
                 "wrong_first": 0.5,
                 "queued": 0.0,
                 "actions": 1.5,
+                "cost": 0.03,
+                "nominal": episodes,
+                "acted_nominal": 0.25,
             }
             for seed in (0, 1):
                 records += [("recovery", "recovery", policy, m, cause, seed, v) for m, v in values.items()]
@@ -43,7 +49,7 @@ def metrics():
 
 
 def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
-    table = table8_recovery(metrics, {"gpca": 0.25}, POLICIES, 3)
+    table = table8_recovery(metrics, {"gpca": 0.25}, TITLE, POLICIES, 3)
     assert [labels[0][0] for labels in table.rows] == ["gpca", "random"]
     cell = table.cells[0, "recovered_within_1"]
     low, high = wilson_interval(12, 24)
@@ -52,15 +58,17 @@ def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
     assert records["gpca", "recovered_within_1"][3:5] == (pytest.approx(100 * low), pytest.approx(100 * high))
     assert table.cells[0, "recovered_within_3_pose"].test_samples == 8
     assert table.cells[0, "seconds"].mean == 0.25
+    assert table.cells[0, "acted_nominal"].mean == pytest.approx(25)
+    assert table.cells[0, "cost"].mean == pytest.approx(0.03)
     assert (1, "seconds") not in table.cells
     assert {key for key in table.best() if key[1].startswith("recovered")} == {
         (0, f"recovered_within_{k}") for k in (1, 2, 3)
     }
     text = table.markdown()
     assert "24 failures over 2 seeds: 8 by noise among 80 registrations" in text
-    assert "procedural stand-in" in text
+    assert TITLE in text
     with pytest.raises(InputError, match="hold no recovery"):
-        table8_recovery(metrics, {}, {"absent": "Absent"}, 3)
+        table8_recovery(metrics, {}, TITLE, {"absent": "Absent"}, 3)
 
 
 def drawn_twice(draw, tmp_path):
@@ -72,18 +80,32 @@ def drawn_twice(draw, tmp_path):
 
 
 def test_rates_are_drawn(metrics, tmp_path):
-    image = drawn_twice(lambda *out: draw_recovery_rates(metrics, POLICIES, 3, *out), tmp_path)
+    image = drawn_twice(lambda *out: draw_recovery_rates(metrics, TITLE, POLICIES, 3, *out), tmp_path)
     assert np.ptp(image) > 100
     with pytest.raises(InputError, match="hold no recovery rates"):
-        draw_recovery_rates(metrics, {"absent": "Absent"}, 3, tmp_path / "c.pdf", tmp_path / "c.png")
+        draw_recovery_rates(metrics, TITLE, {"absent": "Absent"}, 3, tmp_path / "c.pdf", tmp_path / "c.png")
 
 
 def test_the_mapping_is_drawn_from_the_thresholds(tmp_path):
     path = tmp_path / "policy.json"
     path.write_text(json.dumps(POLICY))
-    first = drawn_twice(lambda *out: draw_mitigation(path, *out), tmp_path)
+    first = drawn_twice(lambda *out: draw_mitigation(TITLE, path, *out), tmp_path)
     path.write_text(json.dumps(POLICY | {"thresholds": POLICY["thresholds"] | {"uncertain": 0.125}}))
-    assert (drawn_twice(lambda *out: draw_mitigation(path, *out), tmp_path) != first).any()
+    assert (drawn_twice(lambda *out: draw_mitigation(TITLE, path, *out), tmp_path) != first).any()
+
+
+def test_what_queued_cases_teach_is_drawn(tmp_path):
+    rows = [
+        (policy, order, labels, 24, 0.6 - share * labels, 0.3, 0.7)
+        for policy in ("gpca", "random")
+        for order, share in (("queued", 0.02), ("random", 0.01))
+        for labels in (0, 4, 8)
+    ]
+    columns = ["policy", "order", "labels", "failures", "error", "low", "high"]
+    queues = pd.DataFrame(rows, columns=columns)
+    image = drawn_twice(lambda *out: draw_queued_labels(queues, TITLE, POLICIES, *out), tmp_path)
+    flat = drawn_twice(lambda *out: draw_queued_labels(queues.assign(error=0.5), TITLE, POLICIES, *out), tmp_path)
+    assert (image != flat).any()
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"thresholds": {}}'])
@@ -98,11 +120,12 @@ def test_a_faulty_policy_file_is_refused(text, tmp_path):
 def test_the_example_is_drawn_and_one_without_its_second_view_refused(tmp_path):
     image, mask = np.full((48, 64, 3), 128, np.uint8), np.zeros((48, 64), bool)
     mask[20:30, 25:40] = True
-    T = np.eye(4)
-    T[2, 3] = 0.7
     arrays = {
-        "camera_3_3": np.array([[60, 0, 31.5], [0, 60, 23.5], [0, 0, 1]]),
-        "model_m": np.random.default_rng(0).normal(scale=0.03, size=(200, 3)),
+        "viewpoints_n_3": np.array([[0.6, 0, 0.8], [0, 0.6, 0.8]]),
+        "viewpoint_first": np.array([-0.8, 0, 0.6]),
+        "surface_n": np.array([0.4, 0.6]),
+        "surface_first": np.array(0.2),
+        "chosen": np.array(1),
         "object": np.array("brick"),
         "cause": np.array("overlap"),
         "action": np.array("new_view"),
@@ -110,10 +133,11 @@ def test_the_example_is_drawn_and_one_without_its_second_view_refused(tmp_path):
         "errors": np.array([0.4, 0.02]),
     }
     for view in ("first", "next"):
-        arrays |= {f"image_{view}": image, f"mask_{view}": mask, f"T_camera_object_{view}": T}
+        placed = np.roll(mask, 8 if view == "first" else 1, axis=1)
+        arrays |= {f"image_{view}": image, f"mask_{view}": mask, f"true_{view}": mask, f"placed_{view}": placed}
     save_arrays(tmp_path / "example.npz", arrays)
-    shown = drawn_twice(lambda *out: draw_recovery_example(tmp_path / "example.npz", *out), tmp_path)
+    shown = drawn_twice(lambda *out: draw_recovery_example(TITLE, tmp_path / "example.npz", *out), tmp_path)
     assert np.ptp(shown) > 100
     save_arrays(tmp_path / "half.npz", {name: a for name, a in arrays.items() if not name.endswith("_next")})
     with pytest.raises(InputError, match="_next' is missing"):
-        draw_recovery_example(tmp_path / "half.npz", tmp_path / "c.pdf", tmp_path / "c.png")
+        draw_recovery_example(TITLE, tmp_path / "half.npz", tmp_path / "c.pdf", tmp_path / "c.png")

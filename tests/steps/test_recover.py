@@ -13,6 +13,8 @@ from gpca.settings import SCHEMA
 from ..config.test_check import load
 from ..frames.tiny import surfaces
 
+OTHERS = {"--policy": "policy.json", "--example": "example.npz"}
+
 
 @pytest.fixture(autouse=True)
 def tiny_objects(monkeypatch):
@@ -23,8 +25,9 @@ def tiny_objects(monkeypatch):
 def settings(**changed):
     config = load("smoke")
     recovery = config["recovery"] | {
-        "policies": ["gpca_acting", "softmax_head", "always_new_view"],
+        "policies": ["gpca_acting", "utility", "softmax_head", "always_new_view"],
         "loop": {"failures": 1, "tries": 6, "budget": 1},
+        "rehearsals": 1,
         "train": 9,
         "calibration": 6,
         "tables": 1,
@@ -33,6 +36,7 @@ def settings(**changed):
     encoder = config["encoders"]["dgcnn"] | {"draw_points": 32, "epochs": 1, "draws": 1, "options": {"k": 4}}
     given = {
         "recovery": recovery | changed,
+        "objects": config["sources"]["ycb"],
         "scenes": config["real_world"]["scenes"] | {"objects": [3, 3]},
         "registrations": config["registrations"] | {"cloud_points": 256},
         "encoder": encoder,
@@ -43,7 +47,7 @@ def settings(**changed):
 
 
 def call(folder, given):
-    files = {"--out": "seed7.csv", "--timings": "t/seed7.csv", "--policy": "policy.json", "--example": "example.npz"}
+    files = {"--out": "seed7.csv", "--timings": "t/seed7.csv", "--queue": "q/seed7.csv"} | OTHERS
     paths = [word for option, name in files.items() for word in (option, str(folder / name))]
     return main(["recover", "--seed", "7", "--settings", given, *paths])
 
@@ -51,17 +55,20 @@ def call(folder, given):
 def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     assert call(tmp_path, settings()) == 0
     rows, seconds = (pd.read_csv(tmp_path / name) for name in ("seed7.csv", "t/seed7.csv"))
-    assert set(rows["policy"]) == {"gpca_acting", "softmax_head", "always_new_view"}
+    assert set(rows["policy"]) == {"gpca_acting", "utility", "softmax_head", "always_new_view"}
     assert set(rows["cause"]) <= set(CONCEPTS)
     assert len(seconds) == len(rows)
-    assert (rows["error_before"] > 0.1).all()
+    assert (rows["failed"] == (rows.groupby(["episode", "policy"])["error_before"].transform("first") > 0.1)).all()
+    queue = pd.read_csv(tmp_path / "q/seed7.csv")
+    assert set(queue["policy"]) == {"utility"}
+    assert queue["labels"].min() == 0
     policy = json.loads((tmp_path / "policy.json").read_text())
     assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
     assert 0 <= policy["thresholds"]["uncertain"] < 1.1
     assert call(tmp_path / "again", settings()) == 0
-    for name in ("seed7.csv", "policy.json", "example.npz"):
+    for name in ("seed7.csv", "q/seed7.csv", "policy.json", "example.npz"):
         assert (tmp_path / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
-    for name in ("seed7.csv", "t/seed7.csv", "policy.json", "example.npz"):
+    for name in ("seed7.csv", "t/seed7.csv", "q/seed7.csv", "policy.json", "example.npz"):
         assert (tmp_path / f"{name}.provenance.json").is_file()
 
 

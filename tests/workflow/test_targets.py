@@ -28,7 +28,7 @@ FRAMES = jobs("real_world", "table6_backbones", "confusion_real_world")
 PICTURES = jobs("fig5_real_world_example", "real_world_failures")
 RUNTIME = jobs("time_stages", "table7_runtime", "runtime")
 MODEL = jobs("model") + RUNTIME
-RECOVERY_FIGURES = jobs("recovery_rates", "fig6_mitigation", "fig1_recovery_example")
+RECOVERY_FIGURES = jobs("recovery_rates", "queued_labels", "fig6_mitigation", "fig1_recovery_example")
 RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
 ESTIMATED = jobs("estimator_metrics", "table12_uncertainty", "estimators")

@@ -1,7 +1,9 @@
 # Failures on virtual tables, and what every policy makes of them -> recovery.csv.
+from gpca.objects.source import data_files, data_options, source_modules
 from gpca.recovery.policies import policy_entry
 
 RECOVERY = config["recovery"]
+STANDING = SOURCES[RECOVERY["objects"]]  # what stands on the tables
 RECOVERY_EXPLAINERS = sorted(
     {
         entry.explainer
@@ -11,6 +13,7 @@ RECOVERY_EXPLAINERS = sorted(
 )
 RECOVERY_SETTINGS = {
     "recovery": RECOVERY,
+    "objects": config["sources"][RECOVERY["objects"]],
     "scenes": config["real_world"]["scenes"],
     "registrations": config["registrations"],
     "encoder": config["encoders"][config["embedding"]["encoder"]] | RECOVERY["encoder"],
@@ -23,14 +26,16 @@ RECOVERY_SETTINGS = {
 
 rule recover:
     input:
+        data=data_files(STANDING),
         code=code_files(
             "gpca.steps.recover",
             encoder_module(config["embedding"]["encoder"]),
             *map(explainer_module, RECOVERY_EXPLAINERS),
-            *shapes_code(config["real_world"]["scenes"]["families"]),
+            *source_modules(STANDING),
         ),
     output:
         rows="<results>/recovery/seed{seed}.csv",
+        queue="<results>/recovery/queue_seed{seed}.csv",
         policy="<results>/recovery/policy_seed{seed}.json",
         example="<results>/recovery/example_seed{seed}.npz",
         timings="<results>/timings/recovery/seed{seed}.csv",
@@ -47,9 +52,10 @@ rule recover:
         runtime=30,
     params:
         settings=as_json(RECOVERY_SETTINGS),
+        data=data_options(STANDING, config["data_dir"], config["downloads"]),
     shell:
-        "python -m gpca recover --threads {threads} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.rows} --timings {output.timings} --policy {output.policy} --example {output.example} 2> {log}"
+        "python -m gpca recover --threads {threads} --seed {wildcards.seed} --settings {params.settings:q} {params.data:q} "
+        "--out {output.rows} --timings {output.timings} --queue {output.queue} --policy {output.policy} --example {output.example} 2> {log}"
 
 
 rule recovery:
@@ -72,6 +78,7 @@ rule recovery:
     params:
         collector="gpca.recovery.metrics:collect_recovery",
         treatments=RECOVERY["treatments"],
+        costs=RECOVERY["costs"],
         budget=RECOVERY["loop"]["budget"],
     script:
         "../scripts/collect.py"

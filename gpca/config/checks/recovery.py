@@ -9,18 +9,25 @@ from baselines.registry import explainer_entry, require_settings
 from gpca.config.checks.named import require_names, with_key
 from gpca.errors import InputError
 from gpca.frames.situations import SituationSettings
-from gpca.recovery.actions import action_of
+from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import policy_entry
 from gpca.recovery.policy import Thresholds
 
 DECLARED = ("uncertain", "dominant", "improvement")  # thresholds that are given; null leaves one to the calibration
 
 
-def check_recovery(config: dict, actions_left_out: Set[str], designs_left_out: Set[str]) -> None:
+def check_recovery(
+    config: dict, actions_left_out: Set[str], designs_left_out: Set[str], sources_left_out: Set[str]
+) -> None:
     """Check the section against what exists."""
     section = config["recovery"]
+    require_names("recovery.objects", [section["objects"]], config["sources"], "source", sources_left_out)
     for name, settings in section["actions"].items():
         with_key(f"recovery.actions.{name}", action_of, name, settings or {})
+    require_names("recovery.costs", list(section["costs"]), ACTIONS, "action")
+    for action in section["actions"]:
+        if action not in section["costs"]:
+            raise InputError("config key recovery.costs", f"has none of the action '{action}'", "give each its cost")
     for concept, action in section["treatments"].items():
         key = f"recovery.treatments.{concept}"
         require_names(key, [action], section["actions"], "action", actions_left_out)

@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.objects.title import STAND_IN
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, save_figure, write_title
-from gpca.reporting.words import in_words
+from gpca.reporting.words import in_words, plural
 
 WORDS = {
     "reinitialise": "Reinitialise ICP\nbroader search over orientations",
@@ -39,16 +38,19 @@ def read_policy(path: str | Path) -> dict:
     return content
 
 
-def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
-    """Draw the mapping of one policy: what it reads, the four branches in the order of asking, and the way back."""
+def draw_mitigation(title: str, policy_json: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
+    """Draw the mapping of one policy: what it reads, its branches in the order of asking, and the ways back.
+
+    An action leads to new scores; what is queued leads to a label and to a classifier that has learnt it.
+    """
     policy = read_policy(policy_json)
     limits = policy["thresholds"]
     treatments = policy["treatments"]
-    canvas = Canvas(TEXT_WIDTH_IN, 2.45)
-    write_title(canvas.figure, f"Thresholds of this run, on virtual tables ({STAND_IN})")
+    canvas = Canvas(TEXT_WIDTH_IN, 2.62)
+    write_title(canvas.figure, f"{title}: thresholds of this run")
     words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"
     canvas.box(0.04, 0.86, 1.3, 0.66, words)
-    branches = [(_queue_condition(limits), "Abstain\nqueue for labelling, retrain", GREY)]
+    branches = [(_queue_condition(limits), "Abstain\nqueue for a person", GREY)]
     branches += [
         (ASKED.get(concept, concept), WORDS.get(action, in_words(action)), CONCEPT_COLOURS[concept])
         for concept, action in sorted(treatments.items(), key=lambda item: ("pose", "overlap", "noise").index(item[0]))
@@ -59,12 +61,16 @@ def draw_mitigation(policy_json: str | Path, pdf_path: str | Path, png_path: str
         canvas.box(3.95, middle_in - 0.2, 1.85, 0.4, branch, colour)
         canvas.arrow((1.34, 1.19), (1.62, 1.19), (1.62, middle_in), (1.95, middle_in))
         canvas.arrow((3.55, middle_in), (3.95, middle_in), colour=colour)
-        if colour != GREY:
-            canvas.arrow((5.8, middle_in), (6.05, middle_in))
+        canvas.arrow((5.8, middle_in), (6.05, middle_in))
+    canvas.box(6.05, middles_in[0] - 0.2, 1.06, 0.4, "A person labels it\nthe GPC learns it")
+    over_in = middles_in[0] + 0.32
+    canvas.arrow((6.58, middles_in[0] + 0.2), (6.58, over_in), (0.69, over_in), (0.69, 1.52))
+    canvas.text(3.6, over_in + 0.03, "the classifier that has learnt the label decides all later cases", va="bottom")
+    attempts = f"{limits['attempts']:.0f}"
     back = (
         "Register and\nscore anew\n\n"
         r"$\hat{s}_c$ falls by less" + f"\nthan {limits['improvement']:.2f}: next\nconcept; after\n"
-        f"{limits['attempts']:.0f} such attempts:\nqueue"
+        f"{plural(attempts, 'such attempt')}:\nqueue"
     )
     canvas.box(6.05, middles_in[-1] - 0.2, 1.06, middles_in[1] - middles_in[-1] + 0.4, back)
     canvas.arrow((6.58, middles_in[-1] - 0.2), (6.58, 0.06), (0.69, 0.06), (0.69, 0.86))

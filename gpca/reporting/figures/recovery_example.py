@@ -2,37 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from gpca.alignment.pose_error import CORRECT
-from gpca.alignment.rigid import transform
 from gpca.arrays import load_arrays
-from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.frame_views import draw_score_bars
-from gpca.reporting.figures.style import TARGET_COLOUR, TEXT_WIDTH_IN, YELLOW, save_figure, use_style, write_title
+from gpca.reporting.figures.style import (
+    BLACK,
+    SMALL_PT,
+    TARGET_COLOUR,
+    TEXT_WIDTH_IN,
+    YELLOW,
+    blues,
+    save_figure,
+    use_style,
+    write_title,
+)
 from gpca.reporting.words import in_words
 
+SILHOUETTES = ("mask", "true", "placed")
 SHAPES: dict[str, tuple[int | str, ...]] = {
-    "camera_3_3": (3, 3),
-    "model_m": ("Q", 3),
     "object": (),
     "cause": (),
     "action": (),
     "scores": (len(CONCEPTS),),
     "errors": (2,),
+    "viewpoints_n_3": ("V", 3),
+    "viewpoint_first": (3,),
+    "surface_n": ("V",),
+    "surface_first": (),
+    "chosen": (),
     **{f"image_{view}": ("H", "W", 3) for view in ("first", "next")},
-    **{f"mask_{view}": ("H", "W") for view in ("first", "next")},
-    **{f"T_camera_object_{view}": (4, 4) for view in ("first", "next")},
+    **{f"{silhouette}_{view}": ("H", "W") for view in ("first", "next") for silhouette in SILHOUETTES},
 }
 
 
-def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
-    """Draw (a) the first view with the model where ICP put it, (b) the concept scores, (c, d) the new view.
+def draw_recovery_example(title: str, example_npz: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
+    """Draw (a) the first view, (b) the concept scores, (c) the viewpoints to choose from, (d) the new view.
 
-    The last panel shows the new view once more, with the model where ICP put it then.
+    Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit.
 
     Raises:
         InputError: an unusable file.
@@ -41,38 +53,66 @@ def draw_recovery_example(example_npz: str | Path, pdf_path: str | Path, png_pat
     use_style()
     import matplotlib.pyplot as plt
 
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, 1.78))
-    panels = [figure.add_axes((left, 0.13, 0.245, 0.74)) for left in (0.003, 0.497, 0.751)]
-    scores = figure.add_axes((0.325, 0.33, 0.15, 0.5))
-    for panel, view, posed in zip(panels, ("first", "next", "next"), (True, False, True), strict=True):
-        panel.imshow(found[f"image_{view}"], alpha=0.75 if posed else 1.0)
-        if posed:
-            seen = transform(found[f"T_camera_object_{view}"], found["model_m"]) @ found["camera_3_3"].T
-            ahead = seen[:, 2] > 0.05  # Points nearer to the camera than this, in metres, are left out.
-            u, v = (seen[ahead, :2] / seen[ahead, 2:]).T
-            panel.scatter(u, v, s=0.6, color=TARGET_COLOUR, linewidths=0)
-        else:
-            panel.contour(found[f"mask_{view}"], [0.5], colors=YELLOW, linewidths=0.9)
-        height, width = found[f"mask_{view}"].shape
-        panel.set(xlim=(0, width - 1), ylim=(height - 1, 0))
-        panel.set_axis_off()
+    figure = plt.figure(figsize=(TEXT_WIDTH_IN, 1.95))
+    for left, view in ((0.003, "first"), (0.722, "next")):
+        panel = figure.add_axes((left, 0.12, 0.275, 0.75))
+        _draw_view(panel, found[f"image_{view}"], *(found[f"{name}_{view}"].astype(bool) for name in SILHOUETTES))
+    scores = figure.add_axes((0.345, 0.32, 0.125, 0.48))
     shown = found["scores"]
     draw_score_bars(scores, shown.tolist(), str(found["cause"]))
     scores.set(xlim=(min(0, shown.min()), max(1, shown.max())))
     scores.set_xlabel("score", labelpad=1)
+    _draw_viewpoints(figure, figure.add_axes((0.487, 0.17, 0.185, 0.67), projection="polar"), found)
     before, after = (100 * error for error in found["errors"])
     solved = "solved" if after <= 100 * CORRECT else "not solved"
+    chosen, first = (100 * share for share in (found["surface_n"][int(found["chosen"])], found["surface_first"]))
     captions = (
         f"(a) Occluded: pose {before:.0f} % $d$ off" if str(found["cause"]) == "overlap" else f"(a) {before:.0f} % off",
-        f"(b) Attributed to {CONCEPTS[int(np.argmax(shown))]}{_instead(str(found['action']))}",
-        "(c) New viewpoint",
-        f"(d) After it: {after:.1f} % $d$ off, {solved}",
+        f"(b) {CONCEPTS[int(np.argmax(shown))].capitalize()} leads{_instead(str(found['action']))}",
+        f"(c) Surface seen: {first:.0f} % $\\to$ {chosen:.0f} %",
+        f"(d) New view: {after:.1f} % $d$ off, {solved}",
     )
-    for centre, caption in zip((0.1255, 0.395, 0.6195, 0.8735), captions, strict=True):
+    for centre, caption in zip((0.14, 0.385, 0.585, 0.86), captions, strict=True):
         figure.text(centre, 0.02, caption, ha="center", va="bottom")
     name = in_words(found["object"])
-    write_title(figure, f"Tables of the virtual depth camera ({STAND_IN}): {name}; dots: model where ICP put it")
+    write_title(figure, f"{title}: {name}; outlines: where it is (yellow), where ICP put it (red)")
     save_figure(figure, pdf_path, png_path)
+
+
+def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, placed: np.ndarray) -> None:
+    """Show the part of an image around both outlines; what is seen of the object is outlined in full."""
+    panel.imshow(image)
+    for silhouette, colour, line in ((true, YELLOW, "--"), (mask, YELLOW, "-"), (placed, TARGET_COLOUR, "-")):
+        if silhouette.any():
+            panel.contour(silhouette, [0.5], colors=colour, linewidths=1.0, linestyles=line)
+    height, width = mask.shape
+    v, u = np.nonzero(true | placed | mask)
+    half_v = np.clip(0.75 * max(np.ptp(v), np.ptp(u) * height / width), height / 5, height / 2)
+    half_u = half_v * width / height
+    centre_u = np.clip((u.min() + u.max()) / 2, half_u, width - half_u)
+    centre_v = np.clip((v.min() + v.max()) / 2, half_v, height - half_v)
+    panel.set(xlim=(centre_u - half_u, centre_u + half_u - 1), ylim=(centre_v + half_v - 1, centre_v - half_v))
+    panel.set_axis_off()
+
+
+def _draw_viewpoints(figure, panel, found: Mapping[str, np.ndarray]) -> None:
+    """Show the viewpoints from above: the darker, the more surface should be seen after it; the chosen is ringed."""
+    towards = found["viewpoints_n_3"]
+    azimuth, zenith_deg = np.arctan2(towards[:, 1], towards[:, 0]), _zenith_deg(towards)
+    look = {"cmap": blues(), "vmin": 0, "vmax": 1, "edgecolors": BLACK}
+    widths = np.where(np.arange(len(towards)) == int(found["chosen"]), 1.6, 0.3)
+    dots = panel.scatter(azimuth, zenith_deg, c=found["surface_n"], s=24, linewidths=widths, **look)
+    first = found["viewpoint_first"]
+    panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=TARGET_COLOUR)
+    panel.set(rlim=(0, 90), xticks=[], yticks=[30, 60, 90])
+    panel.set_yticklabels([])
+    bar = figure.colorbar(dots, cax=figure.add_axes((0.683, 0.25, 0.008, 0.5)), ticks=[0, 0.5, 1])
+    bar.ax.tick_params(labelsize=SMALL_PT, length=1.5, pad=1)
+    bar.outline.set_linewidth(0.4)
+
+
+def _zenith_deg(towards: np.ndarray) -> np.ndarray:
+    return np.rad2deg(np.arccos(np.clip(towards[..., 2], -1, 1)))
 
 
 def _instead(action: str) -> str:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
-from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import pool_share, wilson_interval
 from gpca.reporting.figures.style import (
@@ -31,12 +30,18 @@ SHADES = (SKY_BLUE, BLUE, BLACK)  # The shade grows darker with every action.
 
 
 def draw_recovery_rates(
-    metrics: pd.DataFrame, policies: Mapping[str, str], budget: int, pdf_path: str | Path, png_path: str | Path
+    metrics: pd.DataFrame,
+    title: str,
+    policies: Mapping[str, str],
+    budget: int,
+    pdf_path: str | Path,
+    png_path: str | Path,
 ) -> None:
     """Draw (left) the rate within 1 to `budget` actions with its Wilson interval, (right) that within all by cause.
 
     Args:
         metrics: The tidy metrics that :func:`gpca.recovery.metrics.collect_recovery` makes.
+        title: Where the failures are from.
         policies: The title of each name, from top to bottom; those without numbers are left out.
         budget: The number of actions that a policy may take.
         pdf_path, png_path: The two files to write.
@@ -70,7 +75,6 @@ def draw_recovery_rates(
         panel.legend(
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.2, columnspacing=1.0, borderpad=0
         )
-    title = f"Failures on tables of the virtual depth camera ({STAND_IN})"
     _, episodes = pool_share(metrics, shown[0], "recovered_within_1") or (nan, 0)
     write_title(figure, f"{title}: {episodes} failures; right: within {budget} actions, by cause")
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.16 / height_in), pad=0.4)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.objects.title import STAND_IN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import pool_share, wilson_interval
 from gpca.reporting.tables.builder import TableBuilder, plain_cell
@@ -18,13 +17,14 @@ if TYPE_CHECKING:
 
 
 def table8_recovery(
-    metrics: pd.DataFrame, seconds: Mapping[str, float], policies: Mapping[str, str], budget: int
+    metrics: pd.DataFrame, seconds: Mapping[str, float], title: str, policies: Mapping[str, str], budget: int
 ) -> Table:
     """Return recovery within 1 to `budget` actions, wrong first actions, queued cases and seconds, by policy.
 
     Args:
         metrics: The tidy metrics that :func:`gpca.recovery.metrics.collect_recovery` makes.
         seconds: The mean seconds of a failure, by policy.
+        title: Where the failures are from.
         policies: The title of each name, in order.
         budget: The number of actions that a policy may take.
 
@@ -35,29 +35,32 @@ def table8_recovery(
     within = [f"recovered_within_{k}" for k in range(1, budget + 1)]
     by_cause = {f"{within[-1]}_{cause}": cause for cause in CONCEPTS}
     table = TableBuilder("table8_recovery", {"policy": "Policy"})
-    for policy, title in policies.items():
+    for policy, words in policies.items():
         if pool_share(metrics, policy, within[0]) is None:
             continue
-        shares = {key: pool_share(metrics, policy, key) for key in (*within, "wrong_first", "queued")}
+        shares = {key: pool_share(metrics, policy, key) for key in (*within, "wrong_first", "queued", "acted_nominal")}
         shares |= {key: pool_share(metrics, policy, within[-1], cause) for key, cause in by_cause.items()}
         cells = {key: share_cell(*share, seeds) for key, share in shares.items() if share is not None}
         failures = cells[within[0]].test_samples
-        if actions := pool_share(metrics, policy, "actions"):
-            cells["actions"] = plain_cell(actions[0], seeds, failures)
+        for key in ("actions", "cost"):
+            if mean := pool_share(metrics, policy, key):
+                cells[key] = plain_cell(mean[0], seeds, failures)
         if policy in seconds:
             cells["seconds"] = plain_cell(seconds[policy], seeds, failures)
-        table.add_row([(policy, title)], cells)
+        table.add_row([(policy, words)], cells)
     table.require_rows("metrics", "hold no recovery", "run the step recover first")
     table.compare_down(within)
     failures = table.cells[0, within[0]].test_samples
     return table.build(
-        caption=f"Failed registrations recovered (%), on tables of the virtual depth camera ({STAND_IN})",
+        caption=f"Failed registrations recovered (%): {title}",
         column_head="metric",
         columns={
             **{key: Column(f"Within {k} (%)") for k, key in enumerate(within, start=1)},
             **{key: Column(f"{cause.capitalize()} (%)", decimals=0, interval=False) for key, cause in by_cause.items()},
             "wrong_first": Column("Wrong first (%)", decimals=0, interval=False, least_is_best=True),
             "queued": Column("Queued (%)", decimals=0, interval=False),
+            "acted_nominal": Column("Acts on fine (%)", decimals=0, interval=False, least_is_best=True),
+            "cost": Column("Cost", decimals=3, interval=False, limits=(0, inf)),
             "actions": Column("Actions", decimals=2, interval=False, limits=(0, inf)),
             "seconds": Column("Seconds", decimals=2, interval=False, limits=(0, inf)),
         },
@@ -66,8 +69,10 @@ def table8_recovery(
             "more than 10 % of the diameter (ADD; ADD-S for symmetric objects) that is not off without its cause. ± is "
             "half the width of the Wilson interval (95 %), whose bounds the CSV holds.",
             f"Noise, Pose, Overlap: by cause, within {budget} actions. Wrong first: of the first actions, those that "
-            "are not the cause's own. Queued: left to a person instead. Seconds: of explaining, acting and "
-            "registering, per failure; the camera's and the robot's own times are not in them.",
+            "are not the cause's own. Queued: left to a person instead. Acts on fine: of registrations on the same "
+            "tables whose pose is right, those that the policy would change. Cost: of the actions on a failure, in "
+            "right poses, as the config declares it. Seconds: of explaining, acting and registering, per failure; the "
+            "camera's and the robot's own times are not in them.",
         ),
     )
 

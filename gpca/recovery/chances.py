@@ -1,0 +1,104 @@
+"""Chances, learnt from failures of the training tables: that a pose is right, and that an action makes it right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gpca.recovery.policy import NOTHING, QUEUE, Decision
+
+INVERSE_REGULARISATION = 0.3  # chosen on failures of development seeds
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What was known of a registration when an action was tried on it, and whether that made its pose right.
+
+    Attributes:
+        known_F: see :func:`gpca.recovery.rehearsal.known`.
+        action: its name; `NOTHING` where the registration was left as it was.
+    """
+
+    known_F: np.ndarray
+    action: str
+    right: bool
+
+
+class Chances:
+    """A logistic regression for each action, and one for doing nothing, on standardised numbers.
+
+    What always or never helped in the trials gets the rate of Laplace's rule of succession, whatever is known.
+
+    Args:
+        trials: of the training tables.
+        inverse_regularisation: of the weights (C of scikit-learn); the smaller, the nearer to each action's own rate.
+    """
+
+    def __init__(
+        self, trials: Sequence[Trial], actions: Sequence[str], inverse_regularisation: float = INVERSE_REGULARISATION
+    ) -> None:
+        self._models = {
+            name: _fitted([trial for trial in trials if trial.action == name], inverse_regularisation)
+            for name in (NOTHING, *actions)
+        }
+
+    def of(self, name: str, known_F: np.ndarray) -> float:
+        """Return the probability that the pose is right after the action, or as it is for `NOTHING`."""
+        model = self._models[name]
+        return model if isinstance(model, float) else float(model.predict_proba(known_F[None])[0, 1])
+
+
+def learn_utility(
+    trials: Iterable[Sequence[Trial]], costs: Mapping[str, float], actions: Sequence[str]
+) -> ExpectedUtility:
+    """Return the policy that the trials of these episodes teach."""
+    together = [trial for of_episode in trials for trial in of_episode]
+    return ExpectedUtility(Chances(together, actions), {action: costs[action] for action in actions})
+
+
+def _fitted(trials: Sequence[Trial], inverse_regularisation: float) -> Any:
+    from baselines.concept_classifier import standardised_regression
+
+    right_N = np.array([trial.right for trial in trials], bool)
+    if right_N.all() or not right_N.any():
+        return float((right_N.sum() + 1) / (len(right_N) + 2))
+    return standardised_regression(inverse_regularisation).fit(np.array([trial.known_F for trial in trials]), right_N)
+
+
+@dataclass(frozen=True)
+class ExpectedUtility:
+    """Takes the action whose success is worth most by what it costs, and none that is not worth it.
+
+    A right pose is worth 1. With the chance p that the pose is right as it is and the chance p_a that action a makes a
+    wrong one right, the action gains (1 - p) p_a - c_a over doing nothing. The k actions of the largest p_a also have
+    the largest chance that any of k helps (if they help independently of each other, given what is known), so that one
+    order is best for every budget k where costs are alike.
+
+    Attributes:
+        chances: learnt on the training tables.
+        costs: action -> c_a, in right poses.
+    """
+
+    chances: Chances
+    costs: Mapping[str, float]
+
+    def decide(self, known_F: np.ndarray, before: Iterable[str]) -> Decision:
+        """Choose what is done next.
+
+        An action that was taken without success comes again only after all others. A robot that is asked again knows
+        that its pose is wrong yet.
+        """
+        before = list(before)
+        fewest = min(before.count(action) for action in self.costs)
+        gains = self.gains(known_F, 0.0 if before else self.chances.of(NOTHING, known_F))
+        best = max((action for action in gains if before.count(action) == fewest), key=lambda action: gains[action])
+        if gains[best] > 0:
+            return Decision(best, "", f"{best} gains {gains[best]:.2f}")
+        return Decision(QUEUE if before else NOTHING, "", f"no action is worth its cost: {best} {gains[best]:.2f}")
+
+    def gains(self, known_F: np.ndarray, right: float) -> dict[str, float]:
+        """Return what each action gains over doing nothing, where the pose is right with this chance."""
+        return {a: (1 - right) * self.chances.of(a, known_F) - cost for a, cost in self.costs.items()}

@@ -1,0 +1,62 @@
+"""What is learnt before a policy decides: every action tried on failures of the training tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.recovery.actions import Action
+from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
+from gpca.recovery.chances import Trial
+from gpca.recovery.episodes import Episode, is_right
+from gpca.recovery.policy import NOTHING
+from gpca.recovery.settings import LoopSettings
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """Episodes of the training tables, and the trials of each by its number."""
+
+    episodes: Sequence[Episode]
+    trials: Mapping[int, Sequence[Trial]]
+
+    @property
+    def failures(self) -> list[Episode]:
+        """Those that every action was tried on."""
+        return [episode for episode in self.episodes if episode.failed]
+
+
+def known(observed_F: np.ndarray, answer: Answer) -> np.ndarray:
+    """Return all that a policy may weigh: what the robot observes; scores, variances and BALD of an explainer."""
+    return np.concatenate([observed_F, np.nan_to_num([*answer.scores_C, *answer.variances_C, answer.bald])])
+
+
+def rehearse(
+    episodes: Sequence[Episode], actions: Mapping[str, Action], explainer: str, explain: Explain, settings: LoopSettings
+) -> Rehearsal:
+    """Try every action on every failure, and one more where that did not help.
+
+    The second action is each of the others in turn. What did not fail is only told from what did.
+    """
+    names = tuple(actions)
+    taken: list[tuple[Episode, tuple[str, ...]]] = []
+    for episode in episodes:
+        for n, first in enumerate(names if episode.failed else ()):
+            taken.append((episode, (first,)))
+            others = [name for name in names if name != first]
+            if others and settings.budget > 1 and not is_right(episode.take((first,), actions, settings)):
+                taken.append((episode, (first, others[(episode.number + n) % len(others)])))
+    answers = Answers(episodes, {explainer: explain}, names, settings.budget)
+    answers.ask(CaseKey(explainer, episode.number, ()) for episode in episodes)
+    answers.ask(CaseKey(explainer, episode.number, sequence[:-1]) for episode, sequence in taken)
+
+    def state(episode: Episode, sequence: tuple[str, ...]) -> np.ndarray:
+        return known(episode.observe(sequence), answers.history(explainer, episode.number, sequence)[-1])
+
+    trials = {e.number: [Trial(state(e, ()), NOTHING, not e.failed)] for e in episodes}
+    for episode, sequence in taken:
+        right = is_right(episode.take(sequence, actions, settings))
+        trials[episode.number].append(Trial(state(episode, sequence[:-1]), sequence[-1], right))
+    return Rehearsal(episodes, trials)

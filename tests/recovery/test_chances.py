@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from gpca.recovery.chances import Chances, ExpectedUtility, Trial
+from gpca.recovery.policy import NOTHING, QUEUE
+
+COSTS = {"denoise": 0.02, "new_view": 0.03}
+
+
+@pytest.fixture(scope="module")
+def chances():
+    """The first number tells whether the pose is right, the second which action helps."""
+    random = np.random.default_rng(0)
+    trials = []
+    for _ in range(60):
+        known_F = random.choice([-1.0, 1.0], 2)
+        trials.append(Trial(known_F, NOTHING, known_F[0] > 0))
+        trials += [Trial(known_F, "denoise", known_F[1] > 0), Trial(known_F, "new_view", known_F[1] < 0)]
+    return Chances(trials, tuple(COSTS), inverse_regularisation=1.0)
+
+
+def test_chances_follow_what_is_known(chances):
+    assert chances.of("denoise", np.array([0.0, 1.0])) > 0.8 > 0.2 > chances.of("denoise", np.array([0.0, -1.0]))
+    assert chances.of(NOTHING, np.array([1.0, 0.0])) > 0.8
+
+
+def test_what_always_helped_has_the_rate_of_succession_and_what_was_never_tried_one_half():
+    trials = [Trial(np.zeros(2), "denoise", True)] * 4
+    chances = Chances(trials, tuple(COSTS))
+    assert chances.of("denoise", np.zeros(2)) == pytest.approx(5 / 6)
+    assert chances.of("new_view", np.zeros(2)) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("known_F", "before", "action"),
+    [
+        ((-1, 1), (), "denoise"),
+        ((-1, -1), (), "new_view"),
+        ((-1, 1), ("denoise",), "new_view"),  # not again before the other
+        ((-1, 1), ("denoise", "new_view"), "denoise"),
+        ((9, 1), (), NOTHING),
+    ],
+)
+def test_the_action_of_the_largest_gain_is_taken_and_none_where_nothing_is_wrong(chances, known_F, before, action):
+    decision = ExpectedUtility(chances, COSTS).decide(np.array(known_F, float), before)
+    assert decision.action == action
+
+
+def test_costs_weigh_against_chances(chances):
+    dear = ExpectedUtility(chances, {"denoise": 0.95, "new_view": 0.0})
+    assert dear.decide(np.array([-1.0, 1.0]), ()).action == "new_view"
+    hopeless = ExpectedUtility(chances, dict.fromkeys(COSTS, 1.0))
+    assert hopeless.decide(np.array([-1.0, 1.0]), ("denoise",)).action == QUEUE
