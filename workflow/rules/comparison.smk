@@ -8,7 +8,7 @@ from gpca.comparison.published import read_published
 COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
-    *("registration_methods.csv", "estimators.csv", "controls.csv"),
+    *("registration_methods.csv", "estimators.csv", "controls.csv", "new_concepts.csv"),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

@@ -120,7 +120,7 @@ def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], condit
 
 def _within(metrics: pd.DataFrame, test: int) -> Cell | None:
     wide = rows_where(metrics, method=PAPERS).pivot_table(index=["seed", "concept"], columns="metric", values="value")
-    if wide.empty:
+    if not {"labels_to_target", "reached"} <= set(wide):
         return None
     done = (wide["labels_to_target"] <= WITHIN) & (wide["reached"] == 1)
     shares = 100 * done.groupby(level="seed").mean()
