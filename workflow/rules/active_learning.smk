@@ -103,6 +103,7 @@ NEW_SETTINGS = {
     "descriptors": DIAGNOSIS["descriptors"],
 }
 
+
 rule learn_new_concepts:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
