@@ -95,28 +95,39 @@ def run(options: Namespace) -> None:
 
 
 class _Work:
-    """What the experiments of one source and seed read."""
+    """What the experiments of one source and seed read; all files are read at once, so that a fault is found first."""
 
     def __init__(self, options: Namespace, given: dict[str, dict], own: NewConceptSettings) -> None:
         self._options = options
         self._given = given
         self._own = own
         self._axes = (options.source, options.seed)
+        self._encoder = EncoderSettings(**given["encoder"])
+        self._cause_encoder = EncoderSettings(**given["cause_encoder"])
+        self._registrations = Registrations.load(options.registrations)
+        self._models = {
+            name: load_model(path, self._encoder)
+            for name, path in zip(options.encoders_of, options.encoders, strict=True)
+        }
+        self._cause_model = load_model(options.cause_encoder, self._cause_encoder, LABELS)
+        causes = Causes.load(options.causes)
+        made_by = "python -m gpca train_on_causes"
+        h_S_d = load_embeddings(options.cause_embeddings, causes.registrations, {"h": ("S", "d")}, made_by)["h"]
+        self._seen = _seen(causes, h_S_d, Descriptors.load(options.descriptors, causes.registrations))
+        self._objects = ObjectClouds.load(options.objects)
 
     def experiments(self) -> Iterator[Experiment]:
-        registrations = Registrations.load(self._options.registrations)
-        held_out = self._given["active_learning"].get("held_out", CONCEPTS)
+        """Yield every new concept, in every embedding."""
+        registrations = self._registrations
         for name, h_S_d in self._embeddings(registrations):
             samples = Embedded(h_S_d, registrations.concept, registrations.split)
             errors = self._own.errors if name in self._own.erring else ()
-            for concept in held_out:
+            for concept in self._given["active_learning"].get("held_out", CONCEPTS):
                 yield Experiment(name, samples, concept, CONCEPTS, errors)
         yield from self._of_causes()
 
     def _embeddings(self, registrations: Registrations) -> Iterator[tuple[str, np.ndarray]]:
         """Yield each embedding's name and the samples (S, d) in it."""
-        weights = dict(zip(self._options.encoders_of, self._options.encoders, strict=True))
-        encoder = EncoderSettings(**self._given["encoder"])
         measured_S_F = describe_registrations(registrations, *self._axes, points=self._own.points)["relations"]
         pair_S_F = _normalised(measured_S_F, registrations.split == "train", *self._axes)
         for name in self._own.embeddings:
@@ -125,25 +136,20 @@ class _Work:
             elif name == "self_supervised":
                 own = EncoderSettings(**self._given["encoder"] | self._given["new_concepts"].get("encoder", {}))
                 yield name, self_supervised(registrations, pair_S_F, *self._axes, own)
-            elif name in weights:
-                yield name, embed(load_model(weights[name], encoder), registrations, *self._axes, encoder)[0]
+            elif name in self._models:
+                yield name, embed(self._models[name], registrations, *self._axes, self._encoder)[0]
             else:
                 _leave_out(self._options.source, name, f"it needs {FROM_OTHERS[name]}")
 
     def _of_causes(self) -> Iterator[Experiment]:
         """Yield what has causes as new concepts: by the encoder of the causes, and by what was measured of the pair."""
-        causes = Causes.load(self._options.causes)
-        made_by = "python -m gpca train_on_causes"
-        h_S_d = load_embeddings(self._options.cause_embeddings, causes.registrations, {"h": ("S", "d")}, made_by)["h"]
-        seen = _seen(causes, h_S_d, Descriptors.load(self._options.descriptors, causes.registrations))
+        seen = self._seen
         known = tuple(label for label in LABELS if label in seen["encoder"].concept)
         if NOMINAL in self._own.causes:
             yield Experiment("pretrained", seen["encoder"], NOMINAL, known)
             yield Experiment("pair", self._normalised(seen["pair"]), NOMINAL, known)
         if GEOMETRY in self._own.causes and (drawn := self._geometry()) is not None:
-            encoder = EncoderSettings(**self._given["cause_encoder"])
-            model = load_model(self._options.cause_encoder, encoder, LABELS)
-            h_G_d = embed(model, drawn.registrations, *self._axes, encoder)[0]
+            h_G_d = embed(self._cause_model, drawn.registrations, *self._axes, self._cause_encoder)[0]
             icp, descriptors = ICPSettings(**self._given["icp"]), DescriptorSettings(**self._given["descriptors"])
             new = _seen(drawn, h_G_d, describe_all(drawn, *self._axes, descriptors, icp)[0], GEOMETRY)
             both = {name: seen[name].followed_by(new[name]) for name in new}
@@ -152,7 +158,7 @@ class _Work:
 
     def _geometry(self) -> Causes | None:
         drawn = draw_geometry(
-            ObjectClouds.load(self._options.objects),
+            self._objects,
             *self._axes,
             CauseSettings.from_dict(self._given["causes"], self._given["icp"]),
             {"train": self._own.geometry_train, "test": self._own.geometry_test},
