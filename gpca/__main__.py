@@ -37,6 +37,7 @@ STEPS = {
     "gradients": "registrations, encoder and embeddings -> what GP-CA's scores react to: saliency maps and TCAV",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
+    "new_concepts": "registrations, causes and encoders -> learning curves of concepts that no encoder has seen",
     "kernel_grid": "embeddings -> every kernel, learning rate and number of iterations",
     "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
     "learners": "embeddings -> predictions of every learner, on test samples and on shifted ones",

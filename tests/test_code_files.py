@@ -99,6 +99,10 @@ STEPS = {
         {"gpca/classifier/latents.py", "gpca/active_learning/stream.py"},
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
+    "new_concepts": (
+        {"gpca/causes/drawing.py", "gpca/descriptors/dataset.py", "gpca/active_learning/oracle.py"},
+        {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
+    ),
     "uncertainty": (
         {"gpca/alignment/icp_kernels.py", "gpca/uncertainty/designs.py"},
         {"gpca/classifier/gpc.py", "gpca/explainers/interface.py"},

@@ -14,6 +14,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, require_strategy, select
+from gpca.active_learning.embedded import Embedded
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
@@ -52,27 +53,29 @@ class Task(Generic[Inputs]):
 
 
 def make_task(
-    registrations: Registrations,
+    samples: Registrations | Embedded,
     held_out: str,
     settings: ActiveLearningSettings,
     *axes: object,
+    classes: tuple[str, ...] = CONCEPTS,
     new_share: float | None = None,
 ) -> Task[np.ndarray]:
     """Split the training samples into those labelled at the start and the pool, which holds all the rest.
 
     Args:
-        registrations: they carry their embeddings.
+        samples: they carry their embeddings.
         held_out: the concept of which no sample is labelled at the start.
         axes: names of the draw (source, seed).
+        classes: all concepts; the start has equally many samples of each known one.
         new_share: share, below 1, of the pool that is of that concept, or as much of it as there is; by default all of
             its training samples are in the pool.
 
     Raises:
         InputError: too few training samples.
     """
-    train = generator(*axes, "initial", held_out).permutation(registrations.rows("train"))
-    concept_S = registrations.concept
-    known = [concept for concept in CONCEPTS if concept != held_out]
+    train = generator(*axes, "initial", held_out).permutation(samples.rows("train"))
+    concept_S = samples.concept
+    known = [concept for concept in classes if concept != held_out]
     each = settings.initial // len(known)
     initial = np.concatenate([train[concept_S[train] == concept][:each] for concept in known])
     pool = np.setdiff1d(train, initial)
@@ -85,19 +88,21 @@ def make_task(
         raise InputError(
             f"active learning with {settings.initial} labelled samples of {' and '.join(known)}",
             f"leaves no pool of {len(train)} training samples",
-            "lower active_learning.initial or raise registrations.train",
+            f"lower active_learning.initial or raise {'registrations' if classes == CONCEPTS else 'causes'}.train",
         )
-    rows = (initial, pool, registrations.rows("test"))
-    return Task(held_out, *(Samples(registrations.embedding[part], concept_S[part]) for part in rows))
+    rows = (initial, pool, samples.rows("test"))
+    return Task(held_out, *(Samples(samples.embedding[part], concept_S[part]) for part in rows))
 
 
-def initial_gpc(task: Task[np.ndarray], settings: ActiveLearningSettings, *axes: object) -> GPC:
-    """Fit the GPC that knows two of its three concepts.
+def initial_gpc(
+    task: Task[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
+) -> GPC:
+    """Fit the GPC that knows all of its concepts but one.
 
     Scaling, inducing inputs and lengthscale are initialised on the unlabelled pool too: it lies open, and inducing
     inputs at the labelled samples alone would leave none where the new concept is.
     """
-    gpc = GPC(CONCEPTS, settings.gpc, *axes, "active_learning", task.held_out)
+    gpc = GPC(classes, settings.gpc, *axes, "active_learning", task.held_out)
     around = np.concatenate([task.initial.h, task.pool.h])
     gpc.fit(task.initial.h, task.initial.concept_N, around)
     gpc.level()
@@ -105,7 +110,12 @@ def initial_gpc(task: Task[np.ndarray], settings: ActiveLearningSettings, *axes:
 
 
 def run_rounds(
-    task: Task[Projection], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
+    task: Task[Projection],
+    gpc: GPC,
+    strategy: str,
+    settings: ActiveLearningSettings,
+    *axes: object,
+    answers_N: np.ndarray | None = None,
 ) -> list[dict[str, float]]:
     """Spend the budget by one strategy.
 
@@ -113,31 +123,38 @@ def run_rounds(
         task: projected by `gpc`.
         gpc: what :func:`initial_gpc` returns; it is not changed.
         axes: the names of the draws (source, seed, …).
+        answers_N: what the oracle says of each sample of the pool; the truth by default.
 
     Returns:
         a step per round, the first before any label: ``labels`` spent, ``new_labels`` of the concept held out,
         ``accuracy`` on all test samples, ``accuracy_new`` on those of the concept held out, and ``epochs`` of the
         retraining.
     """
-    return [step for step, _ in rounds(task, gpc, strategy, settings, *axes)]
+    return [step for step, _ in rounds(task, gpc, strategy, settings, *axes, answers_N=answers_N)]
 
 
 def rounds(
-    task: Task[Projection], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
+    task: Task[Projection],
+    gpc: GPC,
+    strategy: str,
+    settings: ActiveLearningSettings,
+    *axes: object,
+    answers_N: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, float], list[int]]]:
     """Yield each step of :func:`run_rounds` as it is made, and the rows of the pool that were labelled so far."""
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc = copy(gpc)
+    answers_N = task.pool.concept_N if answers_N is None else answers_N
     left = np.arange(len(task.pool))
     queried: list[int] = []
-    yield _step(task, gpc, queried, epochs=0), []
+    yield step_of(task, gpc, queried, epochs=0), []
     while len(queried) < settings.labels and len(left):
         pool = pool_of(task, gpc, left, queried, require_strategy(strategy).needs_scores)
         chosen = left[select(strategy, pool, min(settings.batch, settings.labels - len(queried)), random)]
-        epochs = gpc.update(task.pool.h[chosen], task.pool.concept_N[chosen], settings.iterations, settings.tolerance)
+        epochs = gpc.update(task.pool.h[chosen], answers_N[chosen], settings.iterations, settings.tolerance)
         queried += chosen.tolist()
         left = np.setdiff1d(left, chosen)
-        yield _step(task, gpc, queried, epochs), list(queried)
+        yield step_of(task, gpc, queried, epochs), list(queried)
 
 
 def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
@@ -152,7 +169,8 @@ def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[in
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labelled, task.pool.concept_N[left])
 
 
-def _step(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
+def step_of(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
+    """Return a step of :func:`run_rounds`, after the labels of these rows of the pool are known."""
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
         "labels": len(queried),

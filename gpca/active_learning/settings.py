@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Annotated
+from typing import Annotated, Literal
 
 from gpca.classifier.settings import GPCSettings
-from gpca.settings import Bounds, Count, PositiveShare
+from gpca.errors import InputError
+from gpca.settings import Bounds, Count, OpenShare, PositiveShare
 
 
 @dataclass(frozen=True)
@@ -52,3 +53,51 @@ class StreamSettings:
     budget: PositiveShare = 0.1
     window: Annotated[int, Bounds(minimum=2)] = 50
     every: Count = 10
+
+
+ALL_LABELS = "all_labels"  # of the pool, at once: what labels can give at most
+NEW_CONCEPT_STRATEGIES = ("bald_kmeans", "random", ALL_LABELS)
+FROM_OTHERS = {  # embeddings by encoders of other jobs -> what there has to be
+    "other_samples": "two seeds or more",
+    "other_source": "two sources or more",
+}
+SeenBy = Literal["other_samples", "other_source", "self_supervised", "pair"]
+NewCause = Literal["nominal", "geometry"]
+
+
+@dataclass(frozen=True)
+class NewConceptSettings:
+    """What a concept is learnt from where no encoder has seen the samples, or the concept, before.
+
+    Attributes:
+        seeds: the first so many of the run's.
+        embeddings: of the samples: by an encoder that learnt from other samples of the same source, or from another
+            source; what one predicts that learnt without labels; or what was measured of the pair.
+        errors: shares of the oracle's answers that are wrong.
+        erring: embeddings with which such an oracle is asked.
+        points: drawn from each cloud to describe a pair.
+        causes: new concepts where the truth is measured: that nothing is wrong, or that the shape cannot hold the pose.
+        geometry_train, geometry_test: samples of the latter, drawn beside those of the other causes, at most.
+        geometry_candidates: drawn for them in each split, at most.
+    """
+
+    seeds: Count = 3
+    embeddings: tuple[SeenBy, ...] = ("other_samples", "other_source", "self_supervised", "pair")
+    errors: tuple[OpenShare, ...] = (0.05, 0.1, 0.2, 0.3)
+    erring: tuple[SeenBy, ...] = ("other_samples", "pair")
+    points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
+    causes: tuple[NewCause, ...] = ("nominal", "geometry")
+    geometry_train: Annotated[int, Bounds(minimum=2)] = 60
+    geometry_test: Annotated[int, Bounds(minimum=1)] = 30
+    geometry_candidates: Count = 1500
+
+    def __post_init__(self) -> None:
+        if missing := set(self.erring) - set(self.embeddings):
+            fault = f"'{sorted(missing)[0]}' is none of the embeddings"
+            raise InputError("setting erring of new_concepts", fault, f"choose among {', '.join(self.embeddings)}")
+
+    @classmethod
+    def from_dict(cls, section: dict) -> NewConceptSettings:
+        """Build from the config's section ``new_concepts``, of which the encoder is another part."""
+        given = {name: value for name, value in section.items() if name != "encoder"}
+        return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from gpca.causes.candidate import draw_applied, draw_candidate
 from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.dataset import COLUMNS, Causes
 from gpca.causes.quotas import UNSEEN, Group, Quotas, Tally, group_of, state_of
-from gpca.causes.settings import CauseSettings
+from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.shapley import ALL, NONE, SUBSETS
 from gpca.causes.subjects import Subject, measure_clean_pairs, read_subjects, split_by_object
 from gpca.causes.truth import Truth, joined
@@ -50,6 +50,34 @@ def draw_causes(
     return causes, drawing.tally, icp_seconds_S
 
 
+def draw_geometry(
+    objects: ObjectClouds, source: str, seed: int, settings: CauseSettings, wanted: Mapping[str, int], most: int
+) -> Causes | None:
+    """Draw what fails without any cause: candidates that :func:`draw_causes` refuses, of the same objects per split.
+
+    Args:
+        settings: those of the other causes.
+        wanted: samples of each split, at most.
+        most: candidates of each split.
+
+    Returns:
+        the registrations; None where a split has none.
+    """
+    subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
+    alone = replace(
+        settings,
+        present=0.0,
+        limits=replace(settings.limits, nominal=settings.limits.failed),
+        shares=Shares(0, 0, 0, 0, 0, geometry=1),
+    )
+    drawing = _Drawing(source, seed, alone, uncertainty_limit)
+    of_splits = [
+        drawing.up_to(most, split, of_split, Quotas(wanted[split], alone))
+        for split, of_split in split_by_object(subjects, source, seed, settings).items()
+    ]
+    return _as_causes([record for records in of_splits for record in records])[0] if all(of_splits) else None
+
+
 @dataclass
 class _Drawing:
     source: str
@@ -62,8 +90,15 @@ class _Drawing:
         """Return the rows of one split; its candidates show its objects in turn."""
         wanted = getattr(self.settings, split)
         quotas = Quotas(wanted, self.settings)
-        records: list[dict[str, Any]] = []
         most = self.settings.candidates * wanted
+        records = self.up_to(most, split, subjects, quotas)
+        if not quotas.all_filled():
+            raise quotas.refuse_to_go_on(self.source, self.seed, split, most)
+        return records
+
+    def up_to(self, most: int, split: str, subjects: list[Subject], quotas: Quotas) -> list[dict[str, Any]]:
+        """Return the rows that are wanted of so many candidates, or of fewer where nothing is wanted any more."""
+        records: list[dict[str, Any]] = []
         for number in progress(range(most), f"candidates of {self.source}, seed {self.seed}, {split}", total=None):
             subject = subjects[number % len(subjects)]
             record, group = self._try(split, number, subject, quotas)
@@ -72,8 +107,8 @@ class _Drawing:
                 quotas.take(group)
                 records.append(record | {"sample": len(records), "split": split, "candidate": number})
             if quotas.all_filled():
-                return records
-        raise quotas.refuse_to_go_on(self.source, self.seed, split, most)
+                break
+        return records
 
     def _try(self, split: str, number: int, subject: Subject, quotas: Quotas) -> tuple[dict[str, Any] | None, Group]:
         """Return the row of a candidate and its group; no row where it is refused, as soon as it cannot be wanted."""

@@ -141,6 +141,7 @@ class Config:
     diagnosis: Diagnosis
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
     active_learning: Annotated[sections.ActiveLearning, LEARNING]
+    new_concepts: Annotated[sections.NewConcepts, Keys(required=EVERY)]
     kernel_grid: Annotated[sections.Grid, GRID]
     learners: Annotated[dict[str, Settings], BY_NAME]
     controls: Annotated[Controls, Keys(required=EVERY)]

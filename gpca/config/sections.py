@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.active_learning.settings import ActiveLearningSettings, NewConceptSettings, StreamSettings
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.kernel_grid import KernelGrid
 from gpca.classifier.settings import GPCSettings
@@ -68,6 +68,13 @@ class ActiveLearning(ActiveLearningSettings):
     without: EncoderSettings
     stream: StreamSettings
     strategies: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewConcepts(NewConceptSettings):
+    """The same where no encoder has seen the samples or the concept, and the encoder that learns without labels."""
+
+    encoder: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -61,11 +61,14 @@ def train_encoder(
     settings: EncoderSettings,
     checkpoint: Path | None = None,
     classes: tuple[str, ...] = CONCEPTS,
+    targets_S_C: np.ndarray | None = None,
 ) -> tuple[Classifier, list[dict[str, float]]]:
     """Train on the rows of split ``train``.
 
     Args:
         classes: what ``concept`` names.
+        targets_S_C: numbers that the head learns to predict, by least squares, in the place of the concepts; `classes`
+            then names its columns, and the curve has no accuracy.
         checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
             continues from it and ends with the same weights as an unbroken run.
 
@@ -79,14 +82,18 @@ def train_encoder(
     rows = registrations.rows("train")
     if len(rows) < 2:
         raise InputError(f"registrations of {source}, seed {seed}", "hold no training samples", "raise their number")
-    labels_S = torch.from_numpy(np.array([classes.index(concept) for concept in registrations.concept]))
+    if targets_S_C is None:
+        wanted_S = torch.from_numpy(np.array([classes.index(concept) for concept in registrations.concept]))
+    else:
+        wanted_S = torch.from_numpy(targets_S_C.astype(np.float32))
+    loss_of = nn.functional.cross_entropy if targets_S_C is None else nn.functional.mse_loss
     batches = -(-len(rows) // settings.batch_size)
     # At least 5 steps long: of a length of 4, a quarter of which rises, torch divides by zero.
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, settings.learning_rate, total_steps=max(5, settings.epochs * batches), pct_start=0.25
     )
     state = {"model": model, "optimiser": optimiser, "schedule": schedule}
-    identity = repr((source, seed, asdict(settings), _fingerprint(registrations)))
+    identity = repr((source, seed, asdict(settings), _fingerprint(registrations, targets_S_C)))
     curve = _resume(checkpoint, identity, state)
 
     model.train()
@@ -100,14 +107,14 @@ def train_encoder(
                 fewest=settings.fewest_points,
             )
             logits_B_C = model(_on(device, clouds))
-            labels_B = labels_S[batch_rows].to(device)
-            loss = nn.functional.cross_entropy(logits_B_C, labels_B)
+            wanted_B = wanted_S[batch_rows].to(device)
+            loss = loss_of(logits_B_C, wanted_B)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
             schedule.step()
             loss_sum += loss.item() * len(batch_rows)
-            correct += float((logits_B_C.argmax(dim=1) == labels_B).sum())
+            correct += float((logits_B_C.argmax(dim=1) == wanted_B).sum()) if targets_S_C is None else np.nan
         curve.append(
             {
                 "epoch": epoch + 1,
@@ -198,9 +205,10 @@ def _two_layers(embedding_size: int, classes: int) -> nn.Module:
 _HEADS = {"linear": nn.Linear, "two_layer": _two_layers}
 
 
-def _fingerprint(registrations: Registrations) -> str:
-    """Hash what training sees: the clouds, their labels and their splits."""
+def _fingerprint(registrations: Registrations, targets_S_C: np.ndarray | None) -> str:
+    """Hash what training sees: the clouds, their labels or targets, and their splits."""
     digest = hashlib.sha256(registrations.points.tobytes())
+    digest.update(b"" if targets_S_C is None else targets_S_C.tobytes())
     for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
         digest.update(repr(column.tolist()).encode())
     return digest.hexdigest()

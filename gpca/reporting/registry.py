@@ -248,7 +248,7 @@ def _input(argument: str, given: str | Mapping) -> Input:
     files = given.get("from", {})
     of_key = files if isinstance(files, Mapping) else {"": files}
     patterns = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in of_key.items()}
-    return Input(argument, patterns, given["read"])
+    return Input(argument, patterns, given.get("read", ""))
 
 
 def _expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:

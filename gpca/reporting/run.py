@@ -10,6 +10,7 @@ from typing import Any
 
 from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.alignment.methods.registry import left_out, method_entry
 from gpca.controls.settings import TRANSFER
 from gpca.encoders.registry import DIFFERENTIABLE
@@ -53,6 +54,9 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
         "strategy": strategies,
+        "new_concept_strategy": list(NEW_CONCEPT_STRATEGIES),
+        "erring": list(config["new_concepts"]["erring"]),
+        "new_concept_seed": new_concept_seeds(config),
         "pool_strategy": [name for name in strategies if name in STRATEGIES],
         "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
         "shown_source": config["figures"]["source"],
@@ -122,6 +126,12 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "strategies": strategies,
         "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
         "reading_groups": {name: GROUPS[name].title for name in config["readings"]["groups"]},
+        "new_concepts": {
+            **learning,
+            **config["new_concepts"],
+            "seeds": new_concept_seeds(config),
+            "test": config["registrations"]["test"],
+        },
         "target": learning["target"],
         "batch": learning["batch"],
         "test_samples": config["registrations"]["test"],
@@ -154,6 +164,11 @@ def _title_of_all(sources: Mapping[str, Mapping]) -> str:
 def controlled_seeds(config: Mapping) -> list[int]:
     """Return the seeds for which the controls are run."""
     return list(config["seeds"])[: config["controls"]["seeds"]]
+
+
+def new_concept_seeds(config: Mapping) -> list[int]:
+    """Return the seeds for which new concepts are learnt where no encoder has seen them."""
+    return list(config["seeds"])[: config["new_concepts"]["seeds"]]
 
 
 def transfers(config: Mapping, sources: Mapping) -> bool:

@@ -8,9 +8,9 @@ from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes import drawing
 from gpca.causes.counterfactuals import Registrar, Unmeasurable
-from gpca.causes.drawing import draw_causes
+from gpca.causes.drawing import draw_causes, draw_geometry
 from gpca.causes.quotas import group_of
-from gpca.causes.settings import CauseSettings, CauseSeverities
+from gpca.causes.settings import CauseSettings, CauseSeverities, Limits
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.uncertainty.settings import FEWEST_STARTS
@@ -133,3 +133,18 @@ def test_a_single_object_is_refused(four):
 def test_a_method_that_needs_normals_is_refused(four):
     with pytest.raises(InputError, match="ICP method 'point_to_plane': the target has no normals; use point_to_point"):
         draw_causes(four, "four", 100, CauseSettings.from_dict(FEW, {"method": "point_to_plane"}))
+
+
+def test_what_fails_without_a_cause_is_drawn_of_other_objects_for_each_split(four):
+    often = CauseSettings(**FEW, limits=Limits(nominal=0.012, failed=0.014))
+    geometry = draw_geometry(four, "four", 100, often, {"train": 3, "test": 2}, 60)
+    assert [len(geometry.rows(split)) for split in ("train", "test")] == [3, 2]
+    assert not geometry.applied.any()
+    assert (geometry.truth.error[:, 0] >= 0.014).all()
+    assert set(geometry.truth.dominant.tolist()) == {"geometry"}
+    shown = [set(geometry.registrations.object_name[geometry.rows(split)].tolist()) for split in ("train", "test")]
+    assert not shown[0] & shown[1]
+
+
+def test_where_nothing_fails_without_a_cause_there_is_nothing(four):
+    assert draw_geometry(four, "four", 100, CauseSettings(**FEW), {"train": 3, "test": 2}, 4) is None

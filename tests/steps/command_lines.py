@@ -139,6 +139,24 @@ STEP_OPTIONS = {
         "--embeddings-without": "without.npz", "--strategies": ["random", "bald_kmeans", "stream_bald"],
         "--out": ["random.csv", "bald_kmeans.csv", "stream_bald.csv"],
     },
+    "new_concepts": COMMON | {
+        "--settings": {
+            "new_concepts": {
+                "embeddings": ["other_source", "self_supervised", "pair"], "errors": [0.5], "erring": ["pair"],
+                "points": 64, "encoder": {"epochs": 1}, "geometry_train": 2, "geometry_test": 1,
+                "geometry_candidates": 2,
+            },
+            "active_learning": LEARNING | {"held_out": ["overlap"], "initial": 4},
+            "encoder": ENCODER, "cause_encoder": ENCODER,
+            "causes": CAUSES, "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
+            "icp": {"max_iterations": 30},
+        },
+        "--seed": 100, "--registrations": "registrations.npz", "--encoders": "weights.pt",
+        "--encoders-of": "other_source", "--objects": "objects.npz", "--causes": "causes.npz",
+        "--descriptors": "descriptors.npz", "--cause-encoder": "cause_weights.pt",
+        "--cause-embeddings": "cause_embeddings.npz", "--strategies": ["bald_kmeans", "all_labels"],
+        "--out": ["new_bald_kmeans.csv", "new_all_labels.csv"],
+    },
     "kernel_grid": COMMON | {
         "--settings": {"kernels": ["rbf", "polynomial"], "iterations": [2, 4], "inducing": 6, "draws": 20},
         "--seeds": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "grid.csv",

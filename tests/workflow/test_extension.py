@@ -20,6 +20,8 @@ COLLECTORS = {"metrics": 1, "timings": 1, "fig_attribution_confusions": 1, "tabl
 TABLES = dict.fromkeys(("table1_single_baselines", "table2_per_concept"), 1)
 TABLES |= dict.fromkeys(("active_learning", "active_learning_curves", "diagnostics"), 1)
 TABLES |= dict.fromkeys(("table3_active_learning", "table3_extended", "table3_stream"), 1)
+TABLES |= dict.fromkeys(("active_learning_overlap", "new_concepts", "table15_new_concepts", "table15_oracle"), 1)
+TABLES |= dict.fromkeys(("new_concept_curves",), 1)
 TABLES |= dict.fromkeys(("table5_learners", "table5_compact", "table5_shift"), 1)
 TABLES |= dict.fromkeys(("cause_metrics", "cause_intervals", "table9_causes", "cause_confusions"), 1)
 TABLES |= dict.fromkeys(("nominal_reliability", "model", "time_stages", "table7_runtime", "runtime"), 1)
@@ -47,8 +49,8 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
     finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     planned = finished.dry_run("all", *SMOKE, *data_dir)
-    # What was learnt from the two other sources is asked about the new one too.
-    of_row = {"objects_my_parts": 1, "explain_controls": 3}
+    # What was learnt from the two other sources is asked about the new one too, and the one before it is seen by it.
+    of_row = {"objects_my_parts": 1, "explain_controls": 3, "learn_new_concepts": 2}
     assert without_ends(planned.jobs) == ROW | COLLECTORS | TABLES | of_row
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in planned.outputs
 
@@ -58,7 +60,7 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
             (finished.folder / file).write_text(text)
     planned = finished.dry_run("all", *SMOKE, *data_dir)
     both = {rule: 2 * count for rule, count in ROW.items()} | {"sample_objects": 1, "torus": 1}
-    of_rows = {"objects_my_parts": 1, "objects_torus": 1, "explain_controls": 4}
+    of_rows = {"objects_my_parts": 1, "objects_torus": 1, "explain_controls": 4, "learn_new_concepts": 3}
     assert without_ends(planned.jobs) == both | COLLECTORS | TABLES | of_rows
     assert "results/smoke/predictions/torus/gpca_paper/seed0.csv" in planned.outputs
 

@@ -18,7 +18,9 @@ def jobs(*rules, **counts):
 TABLES1 = jobs("table1_single_baselines", "table1_extended", "table2_per_concept")
 COLLECTORS = jobs("metrics", "timings", "table1_extended", "fig_attribution_confusions")
 TABLES3 = jobs("table3_active_learning", "table3_extended", "table3_stream")
-LEARNED = jobs("active_learning", "active_learning_curves") + TABLES3
+NEW_SHOWN = jobs("table15_new_concepts", "table15_oracle", "new_concept_curves")
+NEW = jobs("new_concepts", learn_new_concepts=2)
+LEARNED = jobs("active_learning", "active_learning_curves", "active_learning_overlap") + TABLES3 + NEW_SHOWN
 TABLES5 = jobs("table5_learners", "table5_compact", "table5_shift")
 DIAGNOSED = jobs("diagnostics", "coverage_risk", "reliability", "uncertainty_vs_distance", fit_learners=2) + TABLES5
 TABLES4 = jobs("table4_kernels", "table4_grid")
@@ -74,6 +76,13 @@ def test_table3_needs_no_uncertainty_and_no_explainer(planned):
     }  # fmt: skip
 
 
+def test_table15_needs_the_causes_and_the_encoders_of_other_seeds_and_sources(planned):
+    before = planned.before("results/smoke/tables/table15_new_concepts.md")
+    assert before["learn_new_concepts"] == before["sample_causes"] == before["train_on_causes"] == 2
+    assert before["train_encoder"] == before["learn_actively"] == 4
+    assert not {"attribute", "diagnose", "explain_controls", "run_icp"} & set(before)
+
+
 def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
     assert planned.before("results/smoke/tables/table4_kernels.md") == {
         "sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "fit_kernel_grid": 1, "table4_kernels": 1,
@@ -124,17 +133,19 @@ def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
 EDITS = {
     "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
     + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD
-    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS + EXCHANGED,
+    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW,
     "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
-    "gpca/active_learning/acquisition.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + RUNTIME,
+    "gpca/active_learning/acquisition.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + NEW + RUNTIME,
     "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED,
-    "gpca/reporting/figures/active_learning.py": jobs("active_learning_curves", "fig4_pipeline"),
+    "gpca/reporting/figures/active_learning.py":
+        jobs("active_learning_curves", "active_learning_overlap", "new_concept_curves", "fig4_pipeline"),
     # Not Table II: it shows GP-CA alone.
     "gpca/alignment/icp_kernels.py":
         jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED + CONTROLS + EXCHANGED,
+        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED + CONTROLS + EXCHANGED
+        + NEW + NEW_SHOWN,
     "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
     "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
     "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN + CONTROLS,
@@ -154,17 +165,17 @@ EDITS = {
     "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
     + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
-    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS + EXCHANGED,
+    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=5)
     + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
     + jobs(sample_model_causes=1, describe_model_causes=1, train_control=1) + MODEL
-    + jobs("register_methods", "estimate") + METHODS + ESTIMATED + CONTROLS,
+    + jobs("register_methods", "estimate") + METHODS + ESTIMATED + CONTROLS + NEW,
     "gpca/descriptors/entropy.py":
         jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED
-        + EXCHANGED,
+        + EXCHANGED + NEW + NEW_SHOWN,
     "gpca/uncertainty/estimators/censi.py": jobs(estimate=2) + ESTIMATED + EXCHANGED,
     "gpca/reporting/figures/estimators.py": jobs("estimators"),
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,

@@ -1,4 +1,4 @@
-# Embeddings -> learning curves of every acquisition strategy -> active_learning.csv.
+# Embeddings -> learning curves of every acquisition strategy; and of concepts that are new to the encoder, too.
 rule embed_without:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
@@ -77,6 +77,90 @@ rule active_learning:
         "<logs>/active_learning.log",
     benchmark:
         "<benchmarks>/active_learning.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        collector="gpca.active_learning.metrics:collect_curves",
+        target=config["active_learning"]["target"],
+    script:
+        "../scripts/collect.py"
+
+
+NEW = config["new_concepts"]
+NEW_SEEDS = NAMES["new_concept_seed"]
+NEW_ENCODER = config["embedding"]["encoder"]
+NEW_SETTINGS = {
+    "new_concepts": NEW,
+    "active_learning": config["active_learning"],
+    "encoder": config["encoders"][NEW_ENCODER],
+    "cause_encoder": DIAGNOSIS["encoder"],
+    "causes": config["causes"],
+    "descriptors": DIAGNOSIS["descriptors"],
+}
+
+
+rule learn_new_concepts:
+    input:
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        encoders=lambda wildcards: [*encoders_of_others(wildcards).values()],
+        objects="<results>/objects/{source}.npz",
+        causes="<results>/causes/{source}/seed{seed}.npz",
+        descriptors="<results>/descriptors/{source}/seed{seed}.npz",
+        cause_encoder="<results>/cause_encoders/{source}/seed{seed}.pt",
+        cause_embeddings="<results>/cause_embeddings/{source}/seed{seed}.npz",
+        code=code_files(
+            "gpca.steps.new_concepts",
+            encoder_module(NEW_ENCODER),
+            backbone_module(DIAGNOSIS["encoder"]),
+        ),
+    output:
+        collect(
+            "<results>/new_concepts/{{source}}/{strategy}/seed{{seed}}.csv",
+            strategy=NAMES["new_concept_strategy"],
+        ),
+    log:
+        "<logs>/new_concepts/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/new_concepts/{source}/seed{seed}.tsv"
+    priority: 6
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=as_json(NEW_SETTINGS | ICP),
+        encoders_of=lambda wildcards: [*encoders_of_others(wildcards)],
+        strategies=NAMES["new_concept_strategy"],
+    shell:
+        "python -m gpca new_concepts --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
+        "--registrations {input.registrations} --encoders {input.encoders} --encoders-of {params.encoders_of} "
+        "--objects {input.objects} --causes {input.causes} --descriptors {input.descriptors} "
+        "--cause-encoder {input.cause_encoder} --cause-embeddings {input.cause_embeddings} "
+        "--settings {params.settings:q} --strategies {params.strategies} --out {output} 2> {log}"
+
+
+rule new_concepts:
+    input:
+        files=collect(
+            "<results>/new_concepts/{source}/{strategy}/seed{seed}.csv",
+            source=SOURCES,
+            strategy=NAMES["new_concept_strategy"],
+            seed=NEW_SEEDS,
+        ),
+        code=collector_code("gpca.active_learning.metrics:collect_curves"),
+    output:
+        "<results>/new_concepts.csv",
+    log:
+        "<logs>/new_concepts.log",
+    benchmark:
+        "<benchmarks>/new_concepts.tsv"
     localrule: True
     conda:
         "../envs/gpca.yaml"

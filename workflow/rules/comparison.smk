@@ -13,7 +13,7 @@ COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
-    *("exchange.csv", "readings.csv"),
+    *("exchange.csv", "readings.csv", "new_concepts.csv"),
     *(["gradients.csv"] if NAMES["gradient_source"] else []),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]

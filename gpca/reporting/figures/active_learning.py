@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
+OVERLAP_ROWS = {**ROWS, "rare": "encoder saw all;\nthe new one is rare"}
+LEGEND_COLUMNS = 5
 STYLES = {  # The paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER.
     "bald_kmeans": (BLUE, "-", 1.8),
     "random": (BLACK, "-", 1.8),
@@ -51,6 +53,8 @@ def draw_learning_curves(
     target: float,
     pdf_path: str | Path,
     png_path: str | Path,
+    rows: Mapping[str, str] = ROWS,
+    held_out: Collection[str] | None = None,
 ) -> None:
     """Draw the accuracy over labels: its mean over the concepts held out, then over the seeds.
 
@@ -59,51 +63,109 @@ def draw_learning_curves(
         sources, strategies: The title of each name, in order; those without curves are left out.
         target: The accuracy that counts as reached, which a dashed line marks.
         pdf_path, png_path: The two files to write.
+        rows: The settings that are shown, and what stands beside their panels.
+        held_out: The concepts over which the mean is; all by default.
 
     Raises:
         InputError: an unusable file, or no curve of these.
     """
-    curves = mean_curves(curve_files)
-    columns = [name for name in sources if any(source == name for source, _, _ in curves)]
-    rows = [name for name in ROWS if any(setting == name for _, _, setting in curves)]
-    shown = [name for name in strategies if any(strategy == name for _, strategy, _ in curves)]
-    if not (columns and rows and shown):
+    means = mean_curves(curve_files, held_out)
+    curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in means.items()}
+    draw_panels(curves, sources, rows, strategies, STYLES, target, pdf_path, png_path)
+
+
+def draw_overlap_curves(
+    curve_files: Iterable[str | Path],
+    sources: Mapping[str, str],
+    strategies: Mapping[str, str],
+    target: float,
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw the same of the paper's experiment alone: overlap is the new concept, common in the pool or rare."""
+    paths = pdf_path, png_path
+    draw_learning_curves(curve_files, sources, strategies, target, *paths, rows=OVERLAP_ROWS, held_out=("overlap",))
+
+
+def draw_panels(
+    curves: Mapping[tuple[str, str, str], pd.DataFrame],
+    sources: Mapping[str, str],
+    rows: Mapping[str, str],
+    lines: Mapping[str, str],
+    styles: Mapping[str, tuple],
+    target: float,
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw curves as lines of panels; rows share an axis of labels where they have as many of them.
+
+    Args:
+        curves: What :func:`mean_curves` makes of them, by source, row and line.
+        sources, rows, lines: The title of each name, in order; those without curves are left out.
+        styles: Colour, dashes and width of a line; an interval is drawn where the width is above 1.
+        target: The accuracy that a dashed line marks.
+        pdf_path, png_path: The two files to write.
+
+    Raises:
+        InputError: no curve of these.
+    """
+    shown = {key for key in curves if key[0] in sources and key[1] in rows and key[2] in lines}
+    columns, down, across = ([name for name in part if any(key[i] == name for key in shown)]
+                             for i, part in enumerate((sources, rows, lines)))  # fmt: skip
+    if not shown:
         raise InputError("active learning", "holds no curve of these sources and strategies", "run it first")
     use_style()
     import matplotlib.pyplot as plt
 
-    height_in = 0.62 + 1.5 * len(rows)
+    below = -(-len(across) // LEGEND_COLUMNS)
+    height_in = 0.22 + 0.2 * below + 1.5 * len(down)
+    alike = len({curves[key]["labels"].iloc[-1] for key in shown}) == 1
     figure, axes = plt.subplots(
-        len(rows), len(columns), figsize=(TEXT_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
+        *(len(down), len(columns)),
+        figsize=(TEXT_WIDTH_IN, height_in),
+        sharex=True if alike else "row",
+        sharey=True,
+        squeeze=False,
     )
-    for row, setting in enumerate(rows):
+    for row, name in enumerate(down):
         for column, source in enumerate(columns):
             panel = axes[row, column]
             panel.axhline(100 * target, color=GREY, linewidth=0.6, linestyle=(0, (4, 3)))
-            for strategy in reversed(shown):
-                if (source, strategy, setting) in curves:
-                    _draw(panel, strategy, strategies[strategy], curves[source, strategy, setting])
+            for line in reversed(across):
+                if (source, name, line) in shown:
+                    _draw(panel, styles.get(line, _OTHER), lines[line], curves[source, name, line])
             panel.margins(x=0.01)
             if row == 0:
                 panel.set_title(sources[source])
-            if row == len(rows) - 1:
+            if row == len(down) - 1:
                 panel.set_xlabel("labels")
-        axes[row, 0].set_ylabel(f"accuracy (%)\n{ROWS[setting]}")
-    handles = {line.get_label(): line for line in axes[0, 0].get_lines() if not line.get_label().startswith("_")}
-    ordered = [strategies[name] for name in shown if strategies[name] in handles]
-    figure.legend([handles[title] for title in ordered], ordered, ncol=5, loc="lower center", columnspacing=1.4)
-    figure.tight_layout(rect=(0, 0.4 / height_in, 1, 1), pad=0.4, h_pad=0.8)
+        axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}")
+    handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
+    ordered = [lines[line] for line in across]
+    figure.legend(
+        [handles[title] for title in ordered], ordered, ncol=LEGEND_COLUMNS, loc="lower center", columnspacing=1.4
+    )
+    figure.tight_layout(rect=(0, 0.2 * below / height_in, 1, 1), pad=0.4, h_pad=0.8)
     save_figure(figure, pdf_path, png_path)
 
 
-def mean_curves(curve_files: Iterable[str | Path]) -> dict[tuple[str, str, str], pd.DataFrame]:
-    """Return labels, mean, low and high accuracy in % by source, strategy and setting; intervals are over the seeds."""
+def mean_curves(
+    curve_files: Iterable[str | Path], held_out: Collection[str] | None = None
+) -> dict[tuple[str, str, str], pd.DataFrame]:
+    """Return labels, mean, low and high accuracy in % by source, strategy and setting; intervals are over the seeds.
+
+    Args:
+        curve_files: As for :func:`draw_learning_curves`.
+        held_out: The concepts over which the mean is; all by default.
+    """
     import pandas as pd
 
     parts: dict[tuple[str, str, str], list] = {}
     for path in curve_files:
         source, strategy, seed = source_method_seed(path)
-        for (setting, _), curve in read_curves(path).items():
+        for (setting, concept), curve in read_curves(path).items():
+            if held_out is not None and concept not in held_out:
+                continue
             parts.setdefault((source, strategy, setting), []).append(curve[["labels", "accuracy"]].assign(seed=seed))
     means = {}
     for key, of_key in parts.items():
@@ -113,8 +175,8 @@ def mean_curves(curve_files: Iterable[str | Path]) -> dict[tuple[str, str, str],
     return means
 
 
-def _draw(axes, strategy: str, title: str, curve: pd.DataFrame) -> None:
-    colour, line, width = STYLES.get(strategy, _OTHER)
+def _draw(axes, style: tuple, title: str, curve: pd.DataFrame) -> None:
+    colour, line, width = style
     axes.plot(curve["labels"], curve["mean"], line, color=colour, linewidth=width, label=title)
     if width > 1:
         axes.fill_between(

@@ -31,7 +31,7 @@ SETTINGS = {
     "unseen": "the known concepts only",
     "rare": "all concepts; the new one rare",
 }
-_COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
+COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
 _SHARES = ("reached", "area_under_curve", "area_gain")  # These and every accuracy lie in [0, 1] and are printed in %.
 _NOTHING = ("metrics", "hold nothing", "run its strategies first")  # The error of a table without rows says this.
 
@@ -53,12 +53,12 @@ def table3_active_learning(
     of_table = metrics[metrics["concept"] == PAPERS_HELD_OUT]
     quantities = {
         "labels_bald_kmeans": Quantity(
-            "labels_to_target", Column("Labels, BALD + k-means", **_COUNT), strategy="bald_kmeans"
+            "labels_to_target", Column("Labels, BALD + k-means", **COUNT), strategy="bald_kmeans"
         ),
-        "labels_random": Quantity("labels_to_target", Column("Labels, random", **_COUNT), strategy="random"),
+        "labels_random": Quantity("labels_to_target", Column("Labels, random", **COUNT), strategy="random"),
         "accuracy_bald_kmeans": Quantity("final_accuracy", Column("Acc. BALD (%)"), strategy="bald_kmeans"),
         "accuracy_random": Quantity("final_accuracy", Column("Acc. random (%)"), strategy="random"),
-        "epochs_bald_kmeans": Quantity("epochs_to_target", Column("Epochs", **_COUNT), strategy="bald_kmeans"),
+        "epochs_bald_kmeans": Quantity("epochs_to_target", Column("Epochs", **COUNT), strategy="bald_kmeans"),
     }
     table = TableBuilder("table3_active_learning", {"source": "Dataset", "setting": "Encoder saw"})
     for source, entry in sources.items():
@@ -88,7 +88,7 @@ def table3_extended(
 ) -> Table:
     """Return every strategy, encoder and concept held out, with means over the three where one column is for all."""
     quantities = {
-        f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **_COUNT), concept=c)
+        f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), concept=c)
         for c in _concepts(metrics)
     } | {
         "reached": Quantity("reached", Column("Reached (%)", decimals=0, interval=False)),
@@ -130,10 +130,10 @@ def table3_stream(
     """Return the stream form: labels asked for, arrivals until a new concept is recognised, accuracy."""
     stream = conditions["stream"]
     quantities = {
-        f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **_COUNT), concept=c) for c in _concepts(metrics)
+        f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **COUNT), concept=c) for c in _concepts(metrics)
     } | {
-        "labels": Quantity("labels", Column("Labels", interval=False, **_COUNT)),
-        "new_labels": Quantity("new_labels", Column("of the new", interval=False, **_COUNT)),
+        "labels": Quantity("labels", Column("Labels", interval=False, **COUNT)),
+        "new_labels": Quantity("new_labels", Column("of the new", interval=False, **COUNT)),
         "running_accuracy": Quantity("running_accuracy", Column("Running (%)")),
         "final_accuracy": Quantity("final_accuracy", Column("Accuracy (%)")),
         "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),
@@ -174,10 +174,10 @@ def _columns(quantities: Mapping[str, Quantity]) -> dict[str, Column]:
 
 def _cells(metrics: pd.DataFrame, quantities: Mapping[str, Quantity], conditions: Mapping) -> dict[str, Cell | None]:
     """Return the cells of a row, given its metrics."""
-    return {key: _cell(metrics, quantity, conditions["test"]) for key, quantity in quantities.items()}
+    return {key: cell_of(metrics, quantity, conditions["test"]) for key, quantity in quantities.items()}
 
 
-def _cell(metrics: pd.DataFrame, quantity: Quantity, test: int) -> Cell | None:
+def cell_of(metrics: pd.DataFrame, quantity: Quantity, test: int) -> Cell | None:
     """Return the mean of a quantity over the concepts held out that the rows hold, then over the seeds."""
     if quantity.strategy is not None:
         metrics = rows_where(metrics, method=quantity.strategy)

@@ -1,0 +1,72 @@
+"""One new concept, learnt from one embedding: the rounds of the paper's strategy, random ones, and all labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.active_learning.embedded import Embedded
+from gpca.active_learning.oracle import answers
+from gpca.active_learning.rounds import Task, initial_gpc, make_task, run_rounds, step_of
+from gpca.active_learning.settings import ALL_LABELS, ActiveLearningSettings
+from gpca.classifier.gpc import GPC
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is tried.
+
+    Attributes:
+        embedding: name of what the samples are seen by.
+        samples: by it.
+        held_out: the new concept.
+        classes: all concepts.
+        errors: shares of wrong answers, besides none, of the oracles that are asked.
+    """
+
+    embedding: str
+    samples: Embedded
+    held_out: str
+    classes: tuple[str, ...]
+    errors: tuple[float, ...] = ()
+
+
+def setting_of(embedding: str, errors: float) -> str:
+    """Return what a file of curves calls an embedding and an oracle that errs in a share of its answers."""
+    return f"{embedding}_errors_{round(100 * errors)}" if errors else embedding
+
+
+def run_experiment(
+    experiment: Experiment, strategies: Iterable[str], settings: ActiveLearningSettings, *axes: object
+) -> Iterator[tuple[str, str, list[dict[str, float]]]]:
+    """Yield setting, strategy and learning curve (:func:`gpca.active_learning.rounds.run_rounds`).
+
+    Start, pool and the strategies' draws are the same for all oracles. All labels are those of the one that never errs.
+    """
+    held_out, classes = experiment.held_out, experiment.classes
+    task = make_task(experiment.samples, held_out, settings, *axes, classes=classes)
+    axes = (*axes, experiment.embedding)
+    gpc = initial_gpc(task, settings, *axes, classes=classes)
+    projected = task.project(gpc)
+    for errors in (0.0, *experiment.errors):
+        answers_N = answers(task.pool.concept_N, classes, errors, *axes, held_out)
+        for strategy in strategies:
+            if strategy != ALL_LABELS:
+                curve = run_rounds(projected, gpc, strategy, settings, *axes, answers_N=answers_N)
+            elif not errors:
+                curve = [step_of(projected, gpc, [], epochs=0), _with_all_labels(task, classes, settings, *axes)]
+            else:
+                continue
+            yield setting_of(experiment.embedding, errors), strategy, curve
+
+
+def _with_all_labels(
+    task: Task[np.ndarray], classes: tuple[str, ...], settings: ActiveLearningSettings, *axes: object
+) -> dict[str, float]:
+    """Return the step after the whole pool is labelled: of a classifier that is fitted anew, as labels alone allow."""
+    h_L_d = np.concatenate([task.initial.h, task.pool.h])
+    labels_L = np.concatenate([task.initial.concept_N, task.pool.concept_N])
+    gpc = GPC(classes, settings.gpc, *axes, ALL_LABELS, task.held_out).fit(h_L_d, labels_L)
+    return step_of(task.project(gpc), gpc, list(range(len(task.pool))), settings.gpc.iterations)

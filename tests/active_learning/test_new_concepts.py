@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+
+from gpca.active_learning.embedded import Embedded
+from gpca.active_learning.new_concepts import Experiment, run_experiment
+from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, ActiveLearningSettings, NewConceptSettings
+from gpca.classifier.settings import GPCSettings
+from gpca.errors import InputError
+
+CLASSES = ("nominal", "noise", "pose", "overlap", "geometry")
+SETTINGS = ActiveLearningSettings(
+    initial=16, labels=8, batch=4, gpc=GPCSettings(learning_rate=0.05, iterations=30, inducing=12, draws=50)
+)
+
+
+@pytest.fixture(scope="module")
+def samples():
+    """Five clusters, of which the last has few samples."""
+    random = np.random.default_rng(0)
+    counts = [12, 12, 12, 12, 6]
+    concept_S = np.repeat(CLASSES, counts)
+    centres = 4 * np.repeat(np.eye(5, 8), counts, axis=0)
+    splits = np.concatenate([np.where(np.arange(count) % 3 == 0, "test", "train") for count in counts])
+    return Embedded(centres + random.normal(scale=0.5, size=(54, 8)), concept_S, splits)
+
+
+@pytest.fixture(scope="module")
+def curves(samples):
+    experiment = Experiment("pair", samples, "geometry", CLASSES, errors=(0.25,))
+    found = run_experiment(experiment, NEW_CONCEPT_STRATEGIES, SETTINGS, "tiny", 0)
+    return {(setting, strategy): curve for setting, strategy, curve in found}
+
+
+def test_every_strategy_learns_from_every_oracle_and_all_labels_are_right(curves):
+    assert list(curves) == [
+        *(("pair", strategy) for strategy in NEW_CONCEPT_STRATEGIES),
+        *(("pair_errors_25", strategy) for strategy in NEW_CONCEPT_STRATEGIES[:2]),
+    ]
+
+
+def test_all_start_from_the_same_samples_and_know_nothing_of_the_new_concept(curves):
+    assert {(curve[0]["accuracy"], curve[0]["accuracy_new"]) for curve in curves.values()} == {(16 / 18, 0)}
+
+
+def test_the_new_concept_is_learnt_with_all_labels_at_once(curves):
+    labels = [step["labels"] for step in curves["pair", "all_labels"]]
+    assert labels == [0, 36 - 16]
+    assert curves["pair", "all_labels"][-1]["accuracy_new"] == 1
+
+
+def test_wrong_answers_are_learnt_and_counted_by_what_is_true(samples, curves):
+    experiment = Experiment("pair", samples, "geometry", CLASSES, errors=(0.9,))
+    [*_, (setting, _, wrong)] = run_experiment(experiment, ["random"], SETTINGS, "tiny", 0)
+    assert setting == "pair_errors_90"
+    right = curves["pair", "random"]
+    assert [step["new_labels"] for step in wrong] == [step["new_labels"] for step in right]
+    assert wrong[-1]["accuracy"] < right[-1]["accuracy"]
+
+
+def test_samples_follow_each_other(samples):
+    both = samples.followed_by(samples)
+    assert len(both.concept) == 108
+    assert both.rows("test").tolist() == [*samples.rows("test"), *(samples.rows("test") + 54)]
+
+
+def test_embeddings_with_an_erring_oracle_are_among_those_that_are_tried():
+    with pytest.raises(InputError, match="erring of new_concepts: 'pair' is none of the embeddings; choose among oth"):
+        NewConceptSettings.from_dict({"embeddings": ["other_samples"], "erring": ["pair"]})

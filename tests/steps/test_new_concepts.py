@@ -1,0 +1,45 @@
+"""The step ``new_concepts`` by hand, and what it says of faulty files and settings."""
+
+import pytest
+
+from .command_lines import STEP_OPTIONS, arrays_changed, refused, removed, settings, truncated, untouched
+
+OWN = STEP_OPTIONS["new_concepts"]["--settings"]
+
+
+def changed(section, **keys):
+    return settings("new_concepts", **{section: OWN[section] | keys})
+
+
+FAULTS = [
+    (removed("weights.pt"), {}, r"weights.pt: no such weights; make them anew with 'python -m gpca train'"),
+    (truncated("cause_weights.pt"), {}, r"cause_weights.pt: not the weights of backbone 'dgcnn', or damaged"),
+    (removed("causes.npz"), {}, r"causes.npz: no such file; make it with 'python -m gpca causes'"),
+    (arrays_changed("cause_embeddings.npz", sample=lambda s: s + 1), {}, r"cause_embeddings.npz: holds other samples"),
+    (arrays_changed("descriptors.npz", sample=lambda s: s + 1), {}, r"descriptors.npz: holds other samples than the"),
+    (untouched, changed("new_concepts", cause=["nominal"]), r"setting cause: unknown; did you mean causes\?"),
+    (untouched, changed("new_concepts", causes=["noise"]), r"setting causes.0: 'noise' is not one of"),
+    (untouched, changed("new_concepts", errors=[1]), r"setting errors.0: 1 is greater than or equal to the maximum"),
+    (untouched, changed("new_concepts", erring=["other_samples"]), r"'other_samples' is none of the embeddings; cho"),
+    (untouched, changed("active_learning", initial=18), r"leaves no pool of 18 training samples; lower active_lear"),
+    (untouched, {"--encoders": None}, r"--encoders: 0 file\(s\) for 1 of --encoders-of; give one each"),
+    (untouched, {"--strategies": ["random"]}, r"--out: 2 file\(s\) for 1 of --strategies; give one each"),
+]
+
+
+@pytest.mark.parametrize("fault", range(len(FAULTS)))
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
+    refused(folder, capsys, "new_concepts", *FAULTS[fault])
+
+
+def test_what_cannot_be_tried_is_left_out_and_named(folder, capsys):
+    from gpca.__main__ import main
+
+    from .command_lines import arguments
+
+    assert main(arguments("new_concepts", {"--encoders": None, "--encoders-of": None})) == 0
+    err = capsys.readouterr().err
+    assert "new concepts of tiny: 'other_source' is left out: it needs two sources or more" in err
+    assert "'geometry' is left out: of 2 candidates of a split none fails without a cause" in err
+    settings_found = {line.split(",")[0] for line in (folder / "new_bald_kmeans.csv").read_text().splitlines()[1:]}
+    assert settings_found == {"self_supervised", "pair", "pair_errors_50", "pretrained"}
