@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
+from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import asdict
 from pathlib import Path
 
@@ -59,22 +61,32 @@ def train_encoder(
     settings: EncoderSettings,
     checkpoint: Path | None = None,
     classes: tuple[str, ...] = CONCEPTS,
+    start: Mapping[str, torch.Tensor] | None = None,
+    group_S: np.ndarray | None = None,
 ) -> tuple[Classifier, list[dict[str, float]]]:
-    """Train on the rows of split ``train``.
+    """Train on the rows of split ``train``, of which a share of the groups can be held out for validation.
+
+    With validation, the weights are those of the epoch with the smallest validation loss, and training may end early.
 
     Args:
         classes: what ``concept`` names.
+        start: the weights to start from; random ones where None.
+        group_S: (S,) of each row; rows of one group are held out together. By default rows of one object that were
+            made one after the other.
         checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
             continues from it and ends with the same weights as an unbroken run.
 
     Returns:
-        the model (``model.encoder``, ``model.head``), and the training curve: epoch, learning_rate, loss, accuracy.
+        the model (``model.encoder``, ``model.head``), and the training curve: epoch, learning_rate, loss, accuracy,
+        and validation_loss and validation_accuracy where samples are held out.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     device = best_device()
     model = make_model(settings, classes).to(device)
+    if start is not None:
+        model.load_state_dict(start)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
-    rows = registrations.rows("train")
+    rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
     if len(rows) < 2:
         raise InputError(f"registrations of {source}, seed {seed}", "hold no training samples", "raise their number")
     labels_S = torch.from_numpy(np.array([classes.index(concept) for concept in registrations.concept]))
@@ -83,13 +95,16 @@ def train_encoder(
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, settings.learning_rate, total_steps=max(5, settings.epochs * batches), pct_start=0.25
     )
-    state = {"model": model, "optimiser": optimiser, "schedule": schedule}
-    identity = repr((source, seed, asdict(settings), _fingerprint(registrations)))
+    best = deepcopy(model) if len(held_out) else model
+    state = {"model": model, "optimiser": optimiser, "schedule": schedule} | ({"best": best} if len(held_out) else {})
+    identity = repr((source, seed, asdict(settings), _fingerprint(registrations), _fingerprint_of_weights(start)))
     curve = _resume(checkpoint, identity, state)
 
-    model.train()
     title = f"{settings.backbone} on {source}, seed {seed}"
     for epoch in progress(range(len(curve), settings.epochs), title, initial=len(curve), total=settings.epochs):
+        if _is_settled(curve, settings.patience):
+            break
+        model.train()
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
@@ -116,8 +131,50 @@ def train_encoder(
         )
         if not np.isfinite(loss_sum):
             raise InputError(title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
+        if len(held_out):
+            curve[-1] |= _validate(model, registrations, held_out, labels_S, source, seed, settings)
+            if curve[-1]["validation_loss"] == min(record["validation_loss"] for record in curve):
+                best.load_state_dict(model.state_dict())
         _keep(checkpoint, identity, state, curve)
-    return model.cpu().eval(), curve
+    return best.cpu().eval(), curve
+
+
+def _held_out(
+    registrations: Registrations, source: str, seed: int, share: float, group_S: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows to train on and those to validate on, whole groups of the split ``train``."""
+    rows = registrations.rows("train")
+    if not share:
+        return rows, rows[:0]
+    # Samples 3t, 3t + 1 and 3t + 2 show one object under the concepts in turn.
+    group_R = (registrations.sample // len(CONCEPTS) if group_S is None else group_S)[rows]
+    groups = generator(source, seed, "validation").permutation(np.unique(group_R))
+    is_held_out = np.isin(group_R, groups[: max(1, round(share * len(groups)))])
+    return rows[~is_held_out], rows[is_held_out]
+
+
+@torch.inference_mode()
+def _validate(
+    model: Classifier, registrations: Registrations, rows: np.ndarray, labels_S, source: str, seed: int, settings
+) -> dict[str, float]:
+    """Return loss and accuracy on rows, of one draw from each cloud that is the same in every epoch."""
+    model.eval()
+    parts = []
+    for batch_rows in np.array_split(rows, -(-len(rows) // settings.batch_size)):
+        clouds = draw_points(
+            registrations, batch_rows, settings.draw_points, source, seed, "validation", fewest=settings.fewest_points
+        )
+        parts.append(model(_on(next(model.parameters()).device, clouds)).cpu())
+    logits_R_C, labels_R = torch.cat(parts), labels_S[rows]
+    loss = nn.functional.cross_entropy(logits_R_C, labels_R).item()
+    hits = float((logits_R_C.argmax(dim=1) == labels_R).double().mean())
+    return {"validation_loss": loss, "validation_accuracy": hits}
+
+
+def _is_settled(curve: list[dict[str, float]], patience: int | None) -> bool:
+    """Return whether the validation loss has had no new minimum for so many epochs."""
+    losses = [record["validation_loss"] for record in curve if "validation_loss" in record]
+    return bool(patience and losses and len(losses) - 1 - int(np.argmin(losses)) >= patience)
 
 
 def best_device() -> torch.device:
@@ -192,6 +249,14 @@ def _fingerprint(registrations: Registrations) -> str:
     digest = hashlib.sha256(registrations.points.tobytes())
     for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
         digest.update(repr(column.tolist()).encode())
+    return digest.hexdigest()
+
+
+def _fingerprint_of_weights(weights: Mapping[str, torch.Tensor] | None) -> str:
+    """Hash what training starts from, where it is given."""
+    digest = hashlib.sha256()
+    for name, tensor in (weights or {}).items():
+        digest.update(name.encode() + tensor.numpy().tobytes())
     return digest.hexdigest()
 
 
