@@ -18,7 +18,6 @@ from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.settings import LoopSettings
 from gpca.settings import Bounds, Count, NotNegative, OpenShare, Share
 
-
 Training = Annotated[EncoderSettings, Keys(without=("backbone", "options", "reading", "draw_points", "draws"))]
 Conditions = Annotated[dict[str, InitialPoseSettings], Bounds(propertyNames=NAME)]
 

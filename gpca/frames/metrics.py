@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.diagnostics import calibration_error
-from gpca.attribution.metrics import ALL, attribution_metrics, source_method_seed, tidy
+from gpca.attribution.metrics import ALL, attribution_metrics, read_metrics, source_method_seed, tidy
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.frames.sample_file import read_samples_of_frames
+from gpca.frames.source import REAL_WORLD
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +59,16 @@ def collect(
         metrics = attribution_metrics(rows[rows["split"] == "test"], concepts_of(rows))
         records += [(TOGETHER, source, method, "accuracy", ALL, seed, metrics["accuracy"][ALL])]
     return tidy(records, "predictions")
+
+
+def read_together(path: str | Path) -> pd.DataFrame:
+    """Read of a file that :func:`collect` made the rows of Table VI: all test samples of the frames, a seed for each.
+
+    Raises:
+        InputError: as :func:`gpca.attribution.metrics.read_metrics` raises it.
+    """
+    metrics = read_metrics(path)
+    return metrics[(metrics["table"] == TOGETHER) & (metrics["source"] == REAL_WORLD)]
 
 
 def _parts(path, test: pd.DataFrame, pose_file: str | Path) -> Iterator[tuple[str, pd.DataFrame]]:

@@ -160,14 +160,14 @@ def read_instances(
     if not seen:
         reasons = f"; the first: {left_out[0]}" if left_out else ""
         raise InputError(", ".join(datasets), f"no object of any frame is left{reasons}", "check masks and depth")
-    for fault in left_out:
-        print(f"left out: {fault}", file=sys.stderr)
     # Results last: they are measured against poses that fit what was seen.
     find = _from_results(datasets, seen) if settings.form == "results" else None
     rows = []
     for found, frame, n, row in progress(seen, "initial poses"):
         init_from, T_init = find(found, frame, n, row) if find else (settings.form, found.initial_pose(frame, n, row))
         rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
+    for fault in left_out:
+        print(f"left out: {fault}", file=sys.stderr)
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")}
     ragged = {name: np.concatenate([row[name] for row in rows]) for name in ("points_m", "pixels")}
     offsets = np.cumsum([0, *(len(row["points_m"]) for row in rows)], dtype=np.int64)
@@ -175,7 +175,7 @@ def read_instances(
 
 
 def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:
-    """Return what finds the initial pose of an object: an estimator's where one spoke of it, else an error of theirs."""
+    """Return what finds an initial pose: an estimator's where one spoke of the object, else the truth with an error."""
     estimators = {name: _estimators(dataset) for name, (dataset, _, _) in datasets.items()}
     said: dict[int, tuple[str, np.ndarray]] = {}
     errors = PoseErrors({(found.name, number) for found, _, _, _ in seen for number in found.symmetric_ids()})

@@ -48,8 +48,9 @@ def make_frame_registrations(
     """Perturb the clouds of instances about their initial poses, align them by ICP and label them.
 
     Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; the instances
-    of the split take turns, so that objects are as unequally frequent as in the frames. The source frame is the object's at the initial pose, so that ICP starts at the identity.
-    What is wrong with the initial pose and with the depth itself is in every sample, whatever its label.
+    of the split take turns, so that objects are as unequally frequent as in the frames. The source frame is the
+    object's at the initial pose, so that ICP starts at the identity. What is wrong with the initial pose and with the
+    depth itself is in every sample, whatever its label.
 
     Returns:
         the registrations, the seconds (S,) of ICP, and a row per sample: where it comes from, whether any training
