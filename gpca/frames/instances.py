@@ -67,7 +67,8 @@ class Instances:
         Raises:
             InputError: all frames are of one scene.
         """
-        _, scene_I = np.unique([f"{of} {number}" for of, number in zip(self.dataset, self.scene)], return_inverse=True)
+        names = [f"{of} {number}" for of, number in zip(self.dataset, self.scene, strict=True)]
+        _, scene_I = np.unique(names, return_inverse=True)
         scenes = generator(source, seed, "split").permutation(scene_I.max() + 1)
         if len(scenes) < 2:
             raise InputError(f"instances of {source}", "all are of one scene", "give frames of two scenes")
