@@ -30,16 +30,11 @@ def has_estimates(datasets: Mapping[str, dict]) -> bool:
 
 
 def conditions_of(config: Mapping) -> dict[str, dict]:
-    """Return the config's further initial poses, without those from results where every pattern matches no file."""
+    """Return the config's further initial poses, without those from results where no dataset has any."""
     section = config["real_world"]
-    resolved = resolve_datasets(section["datasets"], config["data_dir"])
-    declared = any(entry.get("results") or entry.get("errors") for entry in (section["datasets"] or {}).values())
-    absent = declared and not has_estimates(resolved)
-    return {
-        name: entry
-        for name, entry in (section["conditions"] or {}).items()
-        if not (absent and entry.get("form") == "results")
-    }
+    estimated = has_estimates(resolve_datasets(section["datasets"], config["data_dir"]))
+    conditions = (section["conditions"] or {}).items()
+    return {name: entry for name, entry in conditions if estimated or entry.get("form") != "results"}
 
 
 def patterns(split: str = "test") -> list[str]:

@@ -9,7 +9,7 @@ from gpca.config.checks.named import require_names, with_key
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.frames.rgbd_scene import SceneSettings
-from gpca.frames.source import REAL_WORLD, conditions_of, has_estimates, resolve_datasets
+from gpca.frames.source import REAL_WORLD, has_estimates, resolve_datasets
 from gpca.objects import procedural
 
 
@@ -23,12 +23,10 @@ def check_real_world(config: dict, encoders_left_out: Set[str]) -> None:
     for family in section["scenes"].get("families", ()):
         with_key("real_world.scenes.families", procedural.require_family, family)
     with_key("real_world.datasets", resolve_datasets, section["datasets"], config["data_dir"])
-    forms = {"initial_pose": section["initial_pose"]} | {f"conditions.{n}": e for n, e in conditions_of(config).items()}
     datasets = resolve_datasets(section["datasets"], config["data_dir"])
-    for key, settings in forms.items():
-        if settings.get("form") == "results" and not has_estimates(datasets):
-            fault = "form results needs a dataset with results or errors"
-            raise InputError(f"config key real_world.{key}", fault, "name the files, or take another form")
+    if section["initial_pose"].get("form") == "results" and not has_estimates(datasets):
+        fault = "form results needs a dataset with results or errors"
+        raise InputError("config key real_world.initial_pose", fault, "name the files, or take another form")
     _check_training(config)
     names = ("condition_backbones", section["condition_backbones"] or [])
     require_names(f"real_world.{names[0]}", names[1], section["backbones"], "backbone", encoders_left_out)
