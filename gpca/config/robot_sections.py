@@ -46,7 +46,7 @@ class RealWorld:
     datasets: Annotated[dict[str, FrameDataset], Bounds(propertyNames=NAME)] | None
     initial_pose: InitialPoseSettings
     conditions: Conditions | None
-    condition_backbones: list[str] | None
+    condition_backbones: Annotated[list[str], Bounds(minItems=0)]
     train: TrainSamples
     test: TestSamples
     test_share: OpenShare

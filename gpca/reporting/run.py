@@ -56,7 +56,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "classic": [name for name in CLASSIC if name in config["explainers"]],
         "frame_explainer": list(frames["explainers"]),
         "condition": [f"{REAL_WORLD}_{name}" for name in conditions_of(config)],
-        "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"] or []],
+        "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
     }
 

@@ -28,7 +28,7 @@ def check_real_world(config: dict, encoders_left_out: Set[str]) -> None:
         fault = "form results needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files, or take another form")
     _check_training(config)
-    names = ("condition_backbones", section["condition_backbones"] or [])
+    names = ("condition_backbones", section["condition_backbones"])
     require_names(f"real_world.{names[0]}", names[1], section["backbones"], "backbone", encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
