@@ -137,7 +137,7 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
         test = rows[rows["split"] == "test"]
         if test.empty:
             raise InputError(path, "holds no test rows", "make it anew")
-        metrics = _attribution_metrics(test, concepts_of(rows))
+        metrics = attribution_metrics(test, concepts_of(rows))
         if (source, seed) in causal:
             metrics |= _causal_metrics(path, test, *causal[source, seed])
         for metric, of_concept in metrics.items():
@@ -145,7 +145,7 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
     return tidy(records, "predictions")
 
 
-def _attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, dict[str, float]]:
+def attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, dict[str, float]]:
     """Return metric -> concept or `ALL` -> value; a concept without samples has none."""
     judged = _judged(test)
     counts = confusion(*judged, concepts)

@@ -28,6 +28,7 @@ LISTED = {
     "exchange.methods": "methods",
     "exchange.estimators": "estimators",
     "real_world.backbones": "encoders",
+    "real_world.condition_backbones": "encoders",
     "real_world.reductions": "reductions",
 }
 
@@ -49,6 +50,8 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
         _change(whole, key, lambda switches, key=key: list(_names_switched_on(key, switches)))
     for key, of in LISTED.items():
         _change(whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone], list)
+    gone = left_out["encoders"]
+    _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
     for key in ("explainers", "controls.explainers", "exchange.explainers"):
         _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})

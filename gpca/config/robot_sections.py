@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from gpca.config.explainer_section import EXPLAINERS
 from gpca.config.json_schema import Keys, Named
 from gpca.config.sections import SurfacePoints
 from gpca.config.source_section import NAME, Checksums, Place, Unit, Urls
@@ -17,6 +18,9 @@ from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.settings import LoopSettings
 from gpca.settings import Bounds, Count, NotNegative, OpenShare, Share
 
+Training = Annotated[EncoderSettings, Keys(without=("backbone", "options", "reading", "draw_points", "draws"))]
+Conditions = Annotated[dict[str, InitialPoseSettings], Bounds(propertyNames=NAME)]
+
 
 @dataclass(frozen=True)
 class FrameDataset:
@@ -27,7 +31,9 @@ class FrameDataset:
     sha256: Checksums = None
     unit: Unit = "mm"
     split: Annotated[str, Bounds(minLength=1)] = "test"
-    results: Place | None = None
+    optional: bool = False
+    results: Place | list[Place] | None = None
+    errors: Place | None = None
     most_frames: Count = 1
 
 
@@ -39,13 +45,18 @@ class RealWorld:
     scenes: SceneSettings
     datasets: Annotated[dict[str, FrameDataset], Bounds(propertyNames=NAME)] | None
     initial_pose: InitialPoseSettings
-    gap: Annotated[int, Bounds(minimum=0)]
+    conditions: Conditions | None
+    condition_backbones: Annotated[list[str], Bounds(minItems=0)]
     train: TrainSamples
     test: TestSamples
     test_share: OpenShare
     occluders: Share
     backbones: tuple[str, ...]
     reductions: tuple[Literal["none", "pca", "umap", "autoencoder"], ...]
+    pretraining: Training | None
+    training: dict[str, Training] | None
+    explainers: Annotated[dict[str, dict | None], Named(EXPLAINERS)]
+    one_encoder: bool
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.rigid import inverse, scale_translation, transform
+from gpca.alignment.icp import ICPSettings
 from gpca.controls.settings import WRONG_LABELS, ControlSettings
-from gpca.descriptors.distances import LocalPlanes
 from gpca.encoders.settings import OF_ANY_SIZE
 from gpca.objects.views import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.reading import registered_backwards
 from gpca.seeds import generator
 
 FEWEST_OBJECTS = 5  # instances; of fewer, the objects that are left to learn from are no sample of anything
@@ -83,29 +82,6 @@ def of_unseen_objects(registrations: Registrations, folds: int, source: str, see
     split = np.repeat(["train", "test"], [len(train), len(test)])
     sample = np.concatenate([chosen.sample[: len(train)], np.arange(len(test))])
     return replace(chosen, split=split, sample=sample)
-
-
-def registered_backwards(registrations: Registrations, settings: ICPSettings) -> Registrations:
-    """Return the same pairs aligned by ICP from the model to what was observed.
-
-    What is seen is the observed cloud as before, moved by the inverse of ICP's result into the frame of the model.
-    """
-    clouds, targets, poses, fits = [], [], [], []
-    for row in range(len(registrations)):
-        target = registrations.target(row).astype(np.float64)
-        T_init = registrations.T_target_source("init", row)
-        T_source_aligned = inverse(registrations.T_target_source("icp", row))
-        observed = transform(T_source_aligned, registrations.cloud(row).astype(np.float64))
-        normals = None if settings.method == "point_to_point" else LocalPlanes.of(observed).normals
-        found = ICP(observed, normals, settings).register(target, inverse(T_init))
-        T_target_source = inverse(found.T_target_source)  # ICP's target was the source
-        clouds.append(transform(T_target_source, observed).astype(np.float32))
-        targets.append(registrations.target(row))
-        poses.append(scale_translation(T_target_source, float(registrations.diameter_m[row])))
-        fits.append((found.fitness, found.inlier_rmse))
-    fitness, inlier_rmse = np.array(fits).T
-    changed: dict[str, Any] = {"T_target_source_icp": np.array(poses), "fitness": fitness, "inlier_rmse": inlier_rmse}
-    return replace(registrations, **ragged(clouds, targets), **changed, attached={})
 
 
 def relabelled(control: str, train: Registrations, *axes: object) -> Registrations:

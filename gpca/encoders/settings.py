@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, PositiveShare, Share
+from gpca.pairs.reading import Reading
+from gpca.settings import Bounds, Count, PositiveShare, Share, check_settings
 
 OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of unlike sizes together
 
@@ -21,7 +24,10 @@ class EncoderSettings:
         fewest_points: each draw from a cloud has a random number of points from this one to `draw_points`, so that
             the density tells nothing; always `draw_points` where it is None. Only DGCNN takes such draws.
         draws: an embedding is the mean over so many draws of N points from the cloud.
-        epochs, batch_size: length of the training.
+        reading: which cloud the encoder sees (:mod:`gpca.pairs.reading`).
+        epochs, batch_size: length of the training, at most.
+        validation_share: share of the training data, by groups, that is held out to find the best epoch by its loss.
+        patience: epochs without a smaller validation loss after which training ends; None goes on.
         learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
         weight_decay: of AdamW.
         options: further arguments of the backbone.
@@ -38,8 +44,13 @@ class EncoderSettings:
     options: dict = field(default_factory=dict)
     fewest_points: Annotated[int, Bounds(minimum=32)] | None = None
     head: Literal["linear", "two_layer"] = "linear"
+    reading: Reading = "aligned"
+    validation_share: Annotated[float, Bounds(minimum=0, maximum=0.5)] = 0.0
+    patience: Count | None = None
 
     def __post_init__(self) -> None:
+        if self.patience and not self.validation_share:
+            raise InputError("encoder setting 'patience'", "needs samples held out", "set validation_share above 0")
         if self.fewest_points is None:
             return
         if self.backbone not in OF_ANY_SIZE:
@@ -48,6 +59,19 @@ class EncoderSettings:
         if self.fewest_points > self.draw_points:
             fault = f"{self.fewest_points} is above draw_points, {self.draw_points}"
             raise InputError("encoder setting 'fewest_points'", fault, "lower it")
+
+
+def encoder_settings(settings: Mapping[str, Any]) -> tuple[EncoderSettings, ICPSettings]:
+    """Return what ``--settings`` say of an encoder and, under ``icp``, of the ICP before it.
+
+    Raises:
+        InputError: what :func:`gpca.settings.check_settings` refuses.
+    """
+    given = dict(settings)
+    icp = given.pop("icp", {})
+    check_settings(given, "encoders", "*")
+    check_settings(icp, "registrations", "icp")
+    return EncoderSettings(**given), ICPSettings(**icp)
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ would erase the pose concept, jitter the noise concept, crops the overlap concep
 
 from __future__ import annotations
 
-import hashlib
 from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from copy import deepcopy
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,11 +16,11 @@ import numpy as np
 import torch
 from torch import nn
 
+from gpca.encoders.checkpoint import fingerprint, fingerprint_of, keep, resume
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, require_like
 from gpca.errors import InputError
-from gpca.files import whole_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
@@ -62,43 +63,55 @@ def train_encoder(
     checkpoint: Path | None = None,
     classes: tuple[str, ...] = CONCEPTS,
     targets_S_C: np.ndarray | None = None,
+    start: Mapping[str, torch.Tensor] | None = None,
+    group_S: np.ndarray | None = None,
 ) -> tuple[Classifier, list[dict[str, float]]]:
-    """Train on the rows of split ``train``.
+    """Train on the rows of split ``train``, of which a share of the groups can be held out for validation.
+
+    With validation, the weights are those of the epoch with the smallest validation loss, and training may end early.
 
     Args:
         classes: what ``concept`` names.
         targets_S_C: numbers that the head learns to predict, by least squares, in the place of the concepts; `classes`
             then names its columns, and the curve has no accuracy.
+        start: the weights to start from; random ones where None.
+        group_S: (S,) of each row; rows of one group are held out together. By default rows of one object that were
+            made one after the other.
         checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
             continues from it and ends with the same weights as an unbroken run.
 
     Returns:
-        the model (``model.encoder``, ``model.head``), and the training curve: epoch, learning_rate, loss, accuracy.
+        the model (``model.encoder``, ``model.head``), and the training curve: epoch, learning_rate, loss, accuracy,
+        and validation_loss and validation_accuracy where samples are held out.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     device = best_device()
     model = make_model(settings, classes).to(device)
+    if start is not None:
+        model.load_state_dict(start)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
-    rows = registrations.rows("train")
+    rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
     if len(rows) < 2:
         raise InputError(f"registrations of {source}, seed {seed}", "hold no training samples", "raise their number")
     if targets_S_C is None:
         wanted_S = torch.from_numpy(np.array([classes.index(concept) for concept in registrations.concept]))
     else:
         wanted_S = torch.from_numpy(targets_S_C.astype(np.float32))
-    loss_of = nn.functional.cross_entropy if targets_S_C is None else nn.functional.mse_loss
     batches = -(-len(rows) // settings.batch_size)
     # At least 5 steps long: of a length of 4, a quarter of which rises, torch divides by zero.
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, settings.learning_rate, total_steps=max(5, settings.epochs * batches), pct_start=0.25
     )
-    state = {"model": model, "optimiser": optimiser, "schedule": schedule}
-    identity = repr((source, seed, asdict(settings), _fingerprint(registrations, targets_S_C)))
-    curve = _resume(checkpoint, identity, state)
+    best = deepcopy(model) if len(held_out) else model
+    state = {"model": model, "optimiser": optimiser, "schedule": schedule} | ({"best": best} if len(held_out) else {})
+    identity = repr((source, seed, asdict(settings), fingerprint(registrations, targets_S_C), fingerprint_of(start)))
+    curve = resume(checkpoint, identity, state)
 
-    model.train()
     title = f"{settings.backbone} on {source}, seed {seed}"
     for epoch in progress(range(len(curve), settings.epochs), title, initial=len(curve), total=settings.epochs):
+        if _is_settled(curve, settings.patience):
+            break
+        model.train()
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
@@ -108,13 +121,13 @@ def train_encoder(
             )
             logits_B_C = model(_on(device, clouds))
             wanted_B = wanted_S[batch_rows].to(device)
-            loss = loss_of(logits_B_C, wanted_B)
+            loss = _loss_of(wanted_B)(logits_B_C, wanted_B)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
             schedule.step()
             loss_sum += loss.item() * len(batch_rows)
-            correct += float((logits_B_C.argmax(dim=1) == wanted_B).sum()) if targets_S_C is None else np.nan
+            correct += _hits(logits_B_C, wanted_B)
         curve.append(
             {
                 "epoch": epoch + 1,
@@ -125,8 +138,68 @@ def train_encoder(
         )
         if not np.isfinite(loss_sum):
             raise InputError(title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
-        _keep(checkpoint, identity, state, curve)
-    return model.cpu().eval(), curve
+        if len(held_out):
+            curve[-1] |= _validate(model, registrations, held_out, wanted_S, source, seed, settings)
+            if curve[-1]["validation_loss"] == min(record["validation_loss"] for record in curve):
+                best.load_state_dict(model.state_dict())
+        keep(checkpoint, identity, state, curve)
+    return best.cpu().eval(), curve
+
+
+def _held_out(
+    registrations: Registrations, source: str, seed: int, share: float, group_S: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows to train on and those to validate on, whole groups of the split ``train``."""
+    rows = registrations.rows("train")
+    if not share:
+        return rows, rows[:0]
+    # Samples 3t, 3t + 1 and 3t + 2 show one object under the concepts in turn.
+    group_R = (registrations.sample // len(CONCEPTS) if group_S is None else group_S)[rows]
+    groups = generator(source, seed, "validation").permutation(np.unique(group_R))
+    is_held_out = np.isin(group_R, groups[: max(1, round(share * len(groups)))])
+    return rows[~is_held_out], rows[is_held_out]
+
+
+@torch.inference_mode()
+def _validate(
+    model: Classifier,
+    registrations: Registrations,
+    rows: np.ndarray,
+    wanted_S: torch.Tensor,
+    source: str,
+    seed: int,
+    settings: EncoderSettings,
+) -> dict[str, float]:
+    """Return loss and accuracy on rows, of one draw from each cloud that is the same in every epoch.
+
+    Args:
+        wanted_S: each row's class, or the numbers that are to be predicted, which have no accuracy.
+    """
+    model.eval()
+    parts = []
+    for batch_rows in np.array_split(rows, -(-len(rows) // settings.batch_size)):
+        clouds = draw_points(
+            registrations, batch_rows, settings.draw_points, source, seed, "validation", fewest=settings.fewest_points
+        )
+        parts.append(model(_on(next(model.parameters()).device, clouds)).cpu())
+    logits_R_C, wanted_R = torch.cat(parts), wanted_S[rows]
+    loss = _loss_of(wanted_R)(logits_R_C, wanted_R).item()
+    return {"validation_loss": loss, "validation_accuracy": _hits(logits_R_C, wanted_R) / len(rows)}
+
+
+def _loss_of(wanted: torch.Tensor) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
+    return nn.functional.mse_loss if wanted.is_floating_point() else nn.functional.cross_entropy
+
+
+def _hits(logits_B_C: torch.Tensor, wanted_B: torch.Tensor) -> float:
+    """Return how many classes are right; NaN of numbers."""
+    return np.nan if wanted_B.is_floating_point() else float((logits_B_C.argmax(dim=1) == wanted_B).sum())
+
+
+def _is_settled(curve: list[dict[str, float]], patience: int | None) -> bool:
+    """Return whether the validation loss has had no new minimum for so many epochs."""
+    losses = [record["validation_loss"] for record in curve if "validation_loss" in record]
+    return bool(patience and losses and len(losses) - 1 - int(np.argmin(losses)) >= patience)
 
 
 def best_device() -> torch.device:
@@ -203,35 +276,3 @@ def _two_layers(embedding_size: int, classes: int) -> nn.Module:
 
 
 _HEADS = {"linear": nn.Linear, "two_layer": _two_layers}
-
-
-def _fingerprint(registrations: Registrations, targets_S_C: np.ndarray | None) -> str:
-    """Hash what training sees: the clouds, their labels or targets, and their splits."""
-    digest = hashlib.sha256(registrations.points.tobytes())
-    digest.update(b"" if targets_S_C is None else targets_S_C.tobytes())
-    for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
-        digest.update(repr(column.tolist()).encode())
-    return digest.hexdigest()
-
-
-def _keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]) -> None:
-    if checkpoint is None:
-        return
-    content = {name: part.state_dict() for name, part in state.items()}
-    with whole_file(checkpoint) as partial:
-        torch.save(content | {"identity": identity, "curve": curve}, partial)
-
-
-def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
-    """Load the checkpoint into `state`; an unreadable one or one of other settings or data is left aside."""
-    if checkpoint is None or not checkpoint.is_file():
-        return []
-    try:
-        content = read_tensors(checkpoint)
-    except Exception:  # whatever a damaged file makes torch raise, training from the start is right
-        return []
-    if not isinstance(content, dict) or content.get("identity") != identity:
-        return []
-    for name, part in state.items():
-        part.load_state_dict(content[name])
-    return content["curve"]

@@ -23,10 +23,10 @@ class Instances:
 
     Attributes:
         dataset, scene, image: (I,) where the instance was seen.
-        group: (I,) frames that show nearly the same have the same number; no group is in both training and test.
         object_index: (I,) of the objects npz beside this file.
         symmetric: (I,) a rotation exists that changes nothing about the object's shape.
         T_camera_object_true, T_camera_object_init: (I, 4, 4), metres.
+        init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
         camera_3_3: (I, 3, 3) K in pixels.
         colour: (I,) path of the colour image.
         points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
@@ -37,11 +37,11 @@ class Instances:
     dataset: np.ndarray
     scene: np.ndarray
     image: np.ndarray
-    group: np.ndarray
     object_index: np.ndarray
     symmetric: np.ndarray
     T_camera_object_true: np.ndarray
     T_camera_object_init: np.ndarray
+    init_from: np.ndarray
     camera_3_3: np.ndarray
     colour: np.ndarray
     points_m: np.ndarray
@@ -60,17 +60,21 @@ class Instances:
         return self.pixels[self.offsets[i] : self.offsets[i + 1]]
 
     def split(self, source: str, seed: int, test_share: float) -> dict[str, np.ndarray]:
-        """Return the rows of ``train`` and ``test``: whole groups, in an order of the seed's, until the share is met.
+        """Return the rows of ``train`` and ``test``: whole scenes, in an order of the seed's, until the share is met.
+
+        Frames of one scene show the same objects in the same places, so that one in training would give another away.
 
         Raises:
-            InputError: all frames are of one group.
+            InputError: all frames are of one scene.
         """
-        groups = generator(source, seed, "split").permutation(np.unique(self.group))
-        if len(groups) < 2:
-            raise InputError(f"instances of {source}", "all are of one group of frames", "give frames of two scenes")
-        sizes_G = np.array([np.sum(self.group == group) for group in groups])
+        names = [f"{of} {number}" for of, number in zip(self.dataset, self.scene, strict=True)]
+        _, scene_I = np.unique(names, return_inverse=True)
+        scenes = generator(source, seed, "split").permutation(scene_I.max() + 1)
+        if len(scenes) < 2:
+            raise InputError(f"instances of {source}", "all are of one scene", "give frames of two scenes")
+        sizes_G = np.bincount(scene_I)[scenes]
         n_test = 1 + int(np.sum(np.cumsum(sizes_G)[:-1] < test_share * len(self)))
-        is_test = np.isin(self.group, groups[: min(n_test, len(groups) - 1)])
+        is_test = np.isin(scene_I, scenes[: min(n_test, len(scenes) - 1)])
         return {"train": np.flatnonzero(~is_test), "test": np.flatnonzero(is_test)}
 
     def save(self, path: str | Path) -> None:
@@ -87,7 +91,7 @@ class Instances:
         remedy = f"make it anew with '{MADE_BY}'"
         kinds = dict.fromkeys(shapes, "iu") | dict.fromkeys(("camera_3_3", "points_m"), "f")
         kinds |= {name: "f" for name in shapes if name.startswith("T_")}
-        kinds |= {"dataset": "U", "colour": "U", "symmetric": "b"}
+        kinds |= dict.fromkeys(("dataset", "colour", "init_from"), "U") | {"symmetric": "b"}
         for name, kind in kinds.items():
             if arrays[name].dtype.kind not in kind:
                 raise InputError(path, f"array '{name}' is of type {arrays[name].dtype}", remedy)
@@ -103,16 +107,3 @@ class Instances:
                 require_rigid(arrays[name][i], f"{path}: instance {i}, {name}")
             require_camera(arrays["camera_3_3"][i], f"{path}: instance {i}, camera_3_3")
         return cls(**{name: arrays[name] for name in shapes})
-
-
-def groups_of_frames(scene_F: np.ndarray, image_F: np.ndarray, gap: int) -> np.ndarray:
-    """Return a number for each frame: the same for images of a scene that follow each other within `gap`.
-
-    Images are numbered in the order of recording, so that neighbours show nearly the same.
-    """
-    order = np.lexsort((image_F, scene_F))
-    new_F = np.ones(len(order), bool)
-    new_F[1:] = (np.diff(scene_F[order]) != 0) | (np.diff(image_F[order]) > gap)
-    group_F = np.empty(len(order), int)
-    group_F[order] = np.cumsum(new_F) - 1
-    return group_F

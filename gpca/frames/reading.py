@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ from scipy.spatial import cKDTree
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, without_background
+from gpca.frames.estimates import Estimators, PoseErrors, error_of, read_pose_errors
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
-from gpca.frames.instances import Instances, groups_of_frames
+from gpca.frames.instances import Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_usual_form
-from gpca.frames.results_file import Estimates, nearest_to, read_bop_results
+from gpca.frames.results_file import read_bop_results
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_centre
 from gpca.objects.surface import Surface
@@ -34,7 +36,8 @@ class Dataset:
         folders: the dataset's, or those that its archives were unpacked in.
         unit: the unit of the models' vertices.
         split: the split whose frames are read.
-        results: a BOP results file with initial poses, or None.
+        results: BOP results files with initial poses, one of each estimator.
+        errors: CSV of errors that estimators made elsewhere on its objects, or None.
         most_frames: where there are more frames, so many are drawn.
     """
 
@@ -42,7 +45,8 @@ class Dataset:
     folders: tuple[Path, ...]
     unit: str = "mm"
     split: str = "test"
-    results: Path | None = None
+    results: tuple[Path, ...] = ()
+    errors: Path | None = None
     most_frames: int = 200
 
     def frames(self) -> list[Frame]:
@@ -97,57 +101,71 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CentredM
     return models
 
 
+def with_shared_models(models_of: Mapping[str, dict[int, CentredModel]]) -> dict[str, dict[int, CentredModel]]:
+    """Return the models of all datasets, where one that an earlier dataset has too bears the name that it has there.
+
+    LINEMOD-Occlusion shows objects of LINEMOD: an object that training saw in one is not unseen in the other.
+    """
+    first: dict[bytes, str] = {}
+    shared: dict[str, dict[int, CentredModel]] = {}
+    for name, models in models_of.items():
+        shared[name] = {}
+        for number, model in models.items():
+            known = first.setdefault(_shape(model), model.surface.name)
+            shared[name][number] = replace(model, surface=replace(model.surface, name=known))
+    return shared
+
+
+def distinct_surfaces(models_of: Mapping[str, dict[int, CentredModel]]) -> list[Surface]:
+    """Return the surfaces of all datasets' models, those that datasets share once."""
+    of = {(model.surface.name, _shape(model)): model.surface for each in models_of.values() for model in each.values()}
+    return list(of.values())
+
+
+def _shape(model: CentredModel) -> bytes:
+    return np.asarray(model.surface.vertices_m).tobytes()
+
+
 def read_instances(
     datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, CentredModel]]],
     objects: ObjectClouds,
     settings: InitialPoseSettings,
-    gap: int,
 ) -> Instances:
     """Return every object of the frames of which enough was measured, with its true and its initial pose.
 
-    An object with too few points, or without an estimate among the results, is left out and named on stderr.
+    An object with too few points is left out and named on stderr.
 
     Args:
         datasets: name -> dataset, its frames, the models of their objects.
         objects: the canonical clouds of all these models, by their surfaces' names.
         settings: how initial poses are found.
-        gap: images of a scene that follow each other within it are one group.
 
     Raises:
         InputError: what the files hold is faulty, an object was measured elsewhere than its pose says, or nothing is
             left.
     """
-    with_results = settings.form == "results"
-    if bare := [name for name, (dataset, _, _) in datasets.items() if with_results and dataset.results is None]:
-        raise InputError(f"dataset {bare[0]}", "has no results file", "set results, or another initial pose")
-    rows: list[dict] = []
+    if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
+        raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results, or another pose")
     left_out: list[str] = []
-    first_group = 0
+    seen: list[tuple[_Objects, Frame, int, dict]] = []
     for dataset, frames, models in datasets.values():
-        scene_F, image_F = np.array([frame.place for frame in frames]).T
-        groups_F = first_group + groups_of_frames(scene_F, image_F, gap)
-        first_group = groups_F.max() + 1
         found = _Objects(dataset, objects, models, settings)
-        seen = []
-        for frame, group in progress(list(zip(frames, groups_F, strict=True)), f"frames of {dataset.name}"):
-            shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image, "group": group}
+        of_dataset: list[tuple[_Objects, Frame, int, dict]] = []
+        for frame in progress(frames, f"frames of {dataset.name}"):
+            shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
             shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.colour)}
-            seen += [(frame, shown, n, row) for n, row in found.in_frame(frame, left_out)]
-        require_usual_form([found.observation(frame, n, row["points_m"]) for frame, _, n, row in seen])
-        # Results last: they are measured against poses that fit what was seen.
-        estimates = _estimates(dataset) if with_results else None
-        for frame, shown, n, row in progress(seen, f"initial poses of {dataset.name}"):
-            T_init = found.initial_pose(frame, n, row, estimates)
-            if T_init is None:
-                number = frame.annotations[n].object_id
-                left_out.append(f"{frame.colour}: the results hold no pose of object {number}")
-                continue
-            rows.append(shown | row | {"T_camera_object_init": T_init})
-    if not rows:
+            of_dataset += [(found, frame, n, shown | row) for n, row in found.in_frame(frame, left_out)]
+        require_usual_form([found.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset])
+        seen += of_dataset
+    if not seen:
         reasons = f"; the first: {left_out[0]}" if left_out else ""
-        raise InputError(
-            ", ".join(datasets), f"no object of any frame is left{reasons}", "check masks, depth and results"
-        )
+        raise InputError(", ".join(datasets), f"no object of any frame is left{reasons}", "check masks and depth")
+    # Results last: they are measured against poses that fit what was seen.
+    find = _from_results(datasets, seen) if settings.form == "results" else None
+    rows = []
+    for found, frame, n, row in progress(seen, "initial poses"):
+        init_from, T_init = find(found, frame, n, row) if find else (settings.form, found.initial_pose(frame, n, row))
+        rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
     for fault in left_out:
         print(f"left out: {fault}", file=sys.stderr)
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")}
@@ -156,13 +174,43 @@ def read_instances(
     return Instances(**columns, **ragged, offsets=offsets)
 
 
+def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:
+    """Return what finds an initial pose: an estimator's where one spoke of the object, else the truth with an error."""
+    estimators = {name: _estimators(dataset) for name, (dataset, _, _) in datasets.items()}
+    said: dict[int, tuple[str, np.ndarray]] = {}
+    errors = PoseErrors({(found.name, number) for found, _, _, _ in seen for number in found.symmetric_ids()})
+    for name, (dataset, _, models) in datasets.items():
+        for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
+            errors.add((name, number), T_error)
+    for place, (found, frame, n, row) in enumerate(seen):
+        annotation = frame.annotations[n]
+        number = annotation.object_id
+        alone = Counter(of.object_id for of in frame.annotations)[number] == 1
+        random = generator(found.name, *frame.place, n, "estimator")
+        shown = row | {"diameter_m": found.diameter_m(number)}
+        if chosen := estimators[found.name].choose((*frame.place, number), alone, shown, random):
+            said[place] = chosen
+            errors.add((found.name, number), error_of(annotation.T_camera_model, chosen[1]))
+    places = {(found.name, *frame.place, n): place for place, (found, frame, n, _) in enumerate(seen)}
+
+    def find(found: _Objects, frame: Frame, n: int, row: dict) -> tuple[str, np.ndarray]:
+        number = frame.annotations[n].object_id
+        axes = (found.name, *frame.place, n)
+        if chosen := said.get(places[axes]):
+            return chosen[0], chosen[1] @ found.T_model_object(number)
+        T_error = errors.draw((found.name, number), generator(*axes, "error"))
+        return "errors", frame.annotations[n].T_camera_model @ T_error @ found.T_model_object(number)
+
+    return find
+
+
 class _Objects:
     """The objects of one dataset, ready to be found in frames."""
 
     def __init__(
         self, dataset: Dataset, objects: ObjectClouds, models: dict[int, CentredModel], settings: InitialPoseSettings
     ):
-        self._name = dataset.name
+        self.name = dataset.name
         self._objects = objects
         self._models = models
         self._settings = settings
@@ -180,7 +228,7 @@ class _Objects:
             try:
                 points_m, pixels = measured_points(frame, annotation, depth_m)
                 require_plausible(self.observation(frame, n, points_m))
-                points_m, pixels = without_background(points_m, pixels, annotation, self._diameter_m(number))
+                points_m, pixels = without_background(points_m, pixels, annotation, self.diameter_m(number))
             except TooFewPoints as fault:
                 left_out.append(str(fault))
                 continue
@@ -196,25 +244,31 @@ class _Objects:
         number = annotation.object_id
         T_model_object, tree = self._models[number].T_model_object, self._trees[number]
         return Observation(
-            annotation.subject, annotation.T_camera_model, T_model_object, tree, self._diameter_m(number), points_m
+            annotation.subject, annotation.T_camera_model, T_model_object, tree, self.diameter_m(number), points_m
         )
 
-    def initial_pose(self, frame: Frame, n: int, row: dict, estimates: Estimates | None) -> np.ndarray | None:
-        """Return ``T_camera_object`` that ICP starts from; None where an estimator found none."""
+    def T_model_object(self, number: int) -> np.ndarray:
+        """Return where the centred object lies in the frame of its model."""
+        return self._models[number].T_model_object
+
+    def symmetric_ids(self) -> list[int]:
+        """Return the ids of the objects that a rotation leaves as they are."""
+        return [number for number, symmetric in self._symmetric.items() if symmetric]
+
+    def initial_pose(self, frame: Frame, n: int, row: dict) -> np.ndarray:
+        """Return ``T_camera_object`` that ICP starts from where no estimator is asked."""
         number = frame.annotations[n].object_id
-        if estimates is not None:
-            poses = [T @ self._models[number].T_model_object for T in estimates.get((*frame.place, number), [])]
-            return nearest_to(poses, row["pixels"], frame.camera_3_3) if poses else None
-        axes = (self._name, frame.scene, frame.image, n, "initial pose")
+        axes = (self.name, frame.scene, frame.image, n, "initial pose")
         if self._settings.form == "true_pose":
-            return displace(row["T_camera_object_true"], self._diameter_m(number), self._settings, generator(*axes))
+            return displace(row["T_camera_object_true"], self.diameter_m(number), self._settings, generator(*axes))
         if number not in self._registration:
             i = self._index[number]
             points_m, normals = self._objects.points(i), self._objects.normals(i)
-            self._registration[number] = GlobalRegistration(points_m, normals, self._diameter_m(number), self._settings)
+            self._registration[number] = GlobalRegistration(points_m, normals, self.diameter_m(number), self._settings)
         return self._registration[number].register(row["points_m"], seed_of(*axes))
 
-    def _diameter_m(self, number: int) -> float:
+    def diameter_m(self, number: int) -> float:
+        """Return an object's diameter in metres."""
         return float(self._objects.diameters_m[self._index[number]])
 
     def _is_symmetric(self, number: int) -> bool:
@@ -225,12 +279,13 @@ class _Objects:
         )
 
 
-def _estimates(dataset: Dataset) -> Estimates:
-    assert dataset.results is not None
+def _estimators(dataset: Dataset) -> Estimators:
+    if not dataset.results:
+        return Estimators({})
     # Against all images, not only the drawn ones: a results file covers the whole dataset.
     distances_m = {
         frame.place: [float(np.linalg.norm(annotation.T_camera_model[:3, 3])) for annotation in frame.annotations]
         for frame in read_frames(dataset.folders, dataset.split)
     }
     known = bop.read_models_info(dataset.models_folder() / "models_info.json").keys()
-    return read_bop_results(dataset.results, distances_m, known)
+    return Estimators({path.stem: read_bop_results(path, distances_m, known) for path in dataset.results})

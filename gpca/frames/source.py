@@ -9,15 +9,32 @@ from gpca.errors import InputError
 from gpca.objects.source import data_files, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
+ONE_ENCODER = f"{REAL_WORLD}_one_encoder"  # the same, where seeds are those of the classifier alone
 
 
 def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) -> dict[str, dict]:
     """Return the resolved entries of the config's section ``real_world.datasets``; reads no data.
 
+    Those that are ``optional`` and nowhere to be found are left out.
+
     Raises:
         InputError: as :func:`gpca.objects.source.resolve` raises it, and for a results file that is not there.
     """
-    return {name: _resolved(name, entry, data_dir) for name, entry in (datasets or {}).items()}
+    present = {name: entry for name, entry in (datasets or {}).items() if not _is_absent(entry, data_dir)}
+    return {name: _resolved(name, entry, data_dir) for name, entry in present.items()}
+
+
+def has_estimates(datasets: Mapping[str, dict]) -> bool:
+    """Return whether any of the resolved datasets says what pose estimators found, or how far off they were."""
+    return any(entry["results"] or entry["errors"] for entry in datasets.values())
+
+
+def conditions_of(config: Mapping) -> dict[str, dict]:
+    """Return the config's further initial poses, without those from results where no dataset has any."""
+    section = config["real_world"]
+    estimated = has_estimates(resolve_datasets(section["datasets"], config["data_dir"]))
+    conditions = (section["conditions"] or {}).items()
+    return {name: entry for name, entry in conditions if estimated or entry.get("form") != "results"}
 
 
 def patterns(split: str = "test") -> list[str]:
@@ -29,14 +46,32 @@ def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path
     """Return the files that local datasets are read from, sorted by dataset and name."""
     files = []
     for entry in resolve_datasets(datasets, data_dir).values():
-        files += data_files(entry) + ([Path(entry["results"])] if entry.get("results") else [])
+        files += data_files(entry) + [Path(path) for path in (*entry["results"], entry["errors"]) if path]
     return files
+
+
+def _is_absent(entry: dict, data_dir: str | None) -> bool:
+    """Return whether a dataset that a run can do without is not there."""
+    return bool(entry.get("optional")) and not entry.get("urls") and not _below(data_dir, entry["location"]).is_dir()
 
 
 def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
     found = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
-    if found.get("results"):
-        found["results"] = str(Path(data_dir or "", found["results"]).expanduser().absolute())
-        if not Path(found["results"]).is_file():
-            raise InputError(found["results"], "no such results file", f"correct results of dataset {name}")
+    given = found.get("results") or []
+    named = [_below(data_dir, path) for path in ([given] if isinstance(given, str) else given)]
+    found["results"] = [str(path) for pattern in named for path in _matching(pattern)]
+    errors = _matching(_below(data_dir, found["errors"])) if found.get("errors") else []
+    found["errors"] = str(errors[0]) if errors else None
+    for path in (*found["results"], found["errors"]):
+        if path and not Path(path).is_file():
+            raise InputError(path, "no such results file", f"correct results and errors of dataset {name}")
     return found
+
+
+def _below(data_dir: str | None, path: str) -> Path:
+    return Path(data_dir or "", path).expanduser().absolute()
+
+
+def _matching(path: Path) -> list[Path]:
+    """Return the files that a name with an asterisk matches, which may be none, or the one that is named in full."""
+    return sorted(path.parent.glob(path.name)) if "*" in path.name else [path]

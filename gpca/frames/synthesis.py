@@ -32,7 +32,7 @@ class FrameSettings:
     """How instances become registrations.
 
     Attributes:
-        test_share: the share of the instances that is in frames that training does not see.
+        test_share: the share of the instances that is in scenes that training does not see.
         occluders: share of the overlap samples whose points an occluder takes; a half-space takes the others'.
         registration: numbers of samples, points, severities, ICP.
     """
@@ -48,18 +48,21 @@ def make_frame_registrations(
     """Perturb the clouds of instances about their initial poses, align them by ICP and label them.
 
     Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; the instances
-    of the split take turns. The source frame is the object's at the initial pose, so that ICP starts at the identity.
-    What is wrong with the initial pose and with the depth itself is in every sample, whatever its label.
+    of the split take turns, so that objects are as unequally frequent as in the frames. The source frame is the
+    object's at the initial pose, so that ICP starts at the identity. What is wrong with the initial pose and with the
+    depth itself is in every sample, whatever its label.
 
     Returns:
-        the registrations, the seconds (S,) of ICP, and a row per sample: where it comes from, and how far the initial
-        and the aligned pose are off, ADD-S for symmetric objects and ADD elsewhere, relative to the diameter.
+        the registrations, the seconds (S,) of ICP, and a row per sample: where it comes from, whether any training
+        sample shows its object, and how far the initial and the aligned pose are off, ADD-S for symmetric objects and
+        ADD elsewhere, relative to the diameter.
     """
     import pandas as pd
 
     require_open3d()
     rows_of = instances.split(source, seed, settings.test_share)
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings.registration, split))]
+    trained = set(instances.object_index[rows_of["train"]].tolist())
     records, poses = [], []
     for split, n in progress(samples, f"registrations of {source}, seed {seed}"):
         deal, place = divmod(n, len(CONCEPTS))
@@ -70,7 +73,7 @@ def make_frame_registrations(
         record, lost_to = _register_one(instances, i, objects, concept, settings, random)
         record |= {"sample": n, "split": split, "concept": concept}
         records.append(record)
-        poses.append(_pose_row(instances, i, objects, record) | {"lost_to": lost_to})
+        poses.append(_pose_row(instances, i, objects, record, trained) | {"lost_to": lost_to})
     return *as_registrations(records), pd.DataFrame(poses)
 
 
@@ -99,7 +102,7 @@ def _register_one(
     return align_pair(replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, given.icp), lost_to
 
 
-def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict) -> dict:
+def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict, trained: set[int]) -> dict:
     model_m = objects.points(record["object_index"])[:JUDGED_POINTS]
     symmetric = bool(instances.symmetric[i])
     T_source_target = inverse(record["T_target_source_true"])
@@ -110,4 +113,6 @@ def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict)
     }
     shown = {name: record[name] for name in ("sample", "split", "concept")}
     seen = {name: getattr(instances, name)[i] for name in ("dataset", "scene", "image")}
-    return shown | {"instance": i, **seen, "object": record["object_name"], "symmetric": symmetric, **errors}
+    in_training = {"object": record["object_name"], "in_training": record["object_index"] in trained}
+    started = {"symmetric": symmetric, "init_from": instances.init_from[i]}
+    return shown | {"instance": i, **seen, **in_training, **started, **errors}

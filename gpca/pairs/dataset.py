@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -162,6 +162,18 @@ def _possible(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     samples = list(zip(arrays["split"].tolist(), arrays["sample"].tolist(), strict=True))
     possible["sample"] = possible["sample"] & (len(set(samples)) == len(samples))
     return possible
+
+
+def joined(parts: Sequence[Registrations]) -> Registrations:
+    """Return the registrations of several sources as one, their samples numbered anew within each split."""
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in REGISTRATION_COLUMNS}
+    for split in SPLITS:
+        rows = np.flatnonzero(columns["split"] == split)
+        columns["sample"][rows] = np.arange(len(rows))
+    clouds = [part.cloud(row) for part in parts for row in range(len(part))]
+    targets = [part.target(row) for part in parts for row in range(len(part))]
+    whole: dict[str, Any] = columns | ragged(clouds, targets)
+    return Registrations(**whole)
 
 
 def load_embeddings(

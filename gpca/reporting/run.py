@@ -15,7 +15,7 @@ from gpca.alignment.methods.registry import left_out, method_entry
 from gpca.controls.settings import TRANSFER
 from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.frames.source import REAL_WORLD
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.objects.title import stand_in_clause, title_of
 from gpca.readings.registry import GROUPS
 from gpca.recovery.policies import policy_entry
@@ -32,7 +32,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         sources: name -> its resolved entry.
     """
     frames, kernels = config["real_world"], config["kernel_grid"]
-    backbones = [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
+    backbones = names_of_backbones(frames)
     strategies = list(config["active_learning"]["strategies"])
     return {
         "source": list(sources),
@@ -68,6 +68,10 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "learning_policy": [name for name in config["recovery"]["policies"] if _learns(name, config["recovery"])],
         "first_backbone": backbones[0],
         "classic": [name for name in CLASSIC if name in config["explainers"]],
+        "frame_explainer": list(frames["explainers"]),
+        "condition": [f"{REAL_WORLD}_{name}" for name in conditions_of(config)],
+        "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
+        "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
     }
 
 
@@ -87,11 +91,17 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     }
     return {
         "sources": shown,
-        "compared_sources": {**shown, REAL_WORLD: of_frames, "model": of_model},
+        "compared_sources": {**shown, REAL_WORLD: of_frames, ONE_ENCODER: of_frames, "model": of_model},
         "compared_titles": learners | strategies | explainers,
         "source_titles": {name: title_of(entry) for name, entry in shown.items()},
         "shown_title": title_of(shown[config["figures"]["source"]]),
         "frames": of_frames,
+        "frame_conditions": {
+            REAL_WORLD: _title_of_pose(frames["initial_pose"]),
+            **{f"{REAL_WORLD}_{name}": _title_of_pose(entry) for name, entry in conditions_of(config).items()},
+        },
+        "frame_methods": names_of_backbones(frames),
+        "frame_explainers": {name: explainer_entry(name).title for name in frames["explainers"]},
         "frames_title": title_of(of_frames),
         "model": of_model,
         "model_title": title_of(of_model),
@@ -153,6 +163,24 @@ def installed_methods(names: Iterable[str]) -> list[str]:
     names = list(names)
     missing = left_out(names)
     return [name for name in names if name not in missing]
+
+
+def names_of_backbones(frames: Mapping) -> list[str]:
+    """Return the rows of Table VI that read embeddings: every encoder with every reduction."""
+    return [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
+
+
+def _title_of_pose(settings: Mapping) -> str:
+    """Return what a table calls the initial poses of frames."""
+    return {"results": "Pose estimators", "true_pose": "True pose, small error"}.get(
+        settings.get("form", ""), "Global registration"
+    )
+
+
+def installed_methods(config: Mapping) -> list[str]:
+    """Return the registration methods of a config, without those whose package is missing here."""
+    missing = left_out(config["methods"])
+    return [name for name in config["methods"] if name not in missing]
 
 
 def _title_of_all(sources: Mapping[str, Mapping]) -> str:

@@ -11,15 +11,15 @@ import torch
 from gpca.arguments import SEED
 from gpca.arrays import save_arrays
 from gpca.attribution.predictions import read_timings, write_timings
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.settings import encoder_settings
 from gpca.encoders.training import embed, load_model
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` is the encoder's section of the config."""
+    """Declare files and names; ``--settings`` is the encoder's section of the config, with ``icp``."""
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--registration-timings", required=True, type=Path)
     parser.add_argument("--encoder", required=True, type=Path, help="weights")
@@ -32,15 +32,15 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Embed every cloud."""
     torch.set_num_threads(options.threads)
-    check_settings(options.settings, "encoders", "*")
-    settings = EncoderSettings(**options.settings)
+    settings, icp = encoder_settings(options.settings)
     inputs = [options.registrations, options.encoder]
     with record_provenance([options.out, options.timings], inputs, options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         seconds_S, icp_seconds_S = read_timings(options.registration_timings, registrations)
         model = load_model(options.encoder, settings)
         started = perf_counter()
-        h_S_d, logits_S_C = embed(model, registrations, options.source, options.seed, settings)
+        seen = read_as(settings.reading, registrations, icp)
+        h_S_d, logits_S_C = embed(model, seen, options.source, options.seed, settings)
         seconds = (perf_counter() - started) / len(h_S_d)
         arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
         save_arrays(options.out, arrays)

@@ -10,7 +10,7 @@ from gpca.arguments import SURFACE_POINTS
 from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.plausibility import points_on_model
-from gpca.frames.reading import Dataset, read_instances, read_models
+from gpca.frames.reading import Dataset, distinct_surfaces, read_instances, read_models, with_shared_models
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import sample_objects
 from gpca.objects.source import folders
@@ -47,13 +47,11 @@ def run(options: Namespace) -> None:
         }
         if options.scenes:
             datasets = {"scenes": Dataset("scenes", (options.scenes,))}
-        read = {}
-        for name, dataset in datasets.items():
-            frames = dataset.frames()
-            read[name] = (dataset, frames, read_models(dataset, frames))
-        surfaces = (model.surface for _, _, models in read.values() for model in models.values())
-        objects = sample_objects(surfaces, options.source, options.surface_points)
-        instances = read_instances(read, objects, initial_pose, options.settings.get("gap", 10))
+        frames = {name: dataset.frames() for name, dataset in datasets.items()}
+        models = with_shared_models({name: read_models(datasets[name], shown) for name, shown in frames.items()})
+        objects = sample_objects(distinct_surfaces(models), options.source, options.surface_points)
+        read = {name: (dataset, frames[name], models[name]) for name, dataset in datasets.items()}
+        instances = read_instances(read, objects, initial_pose)
         objects.save(options.objects, options.source)
         instances.save(options.out)
     for name in datasets:
@@ -67,4 +65,5 @@ def run(options: Namespace) -> None:
 
 def _given(entry: dict) -> dict:
     given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
-    return given | ({"results": Path(entry["results"])} if entry.get("results") else {})
+    errors = Path(entry["errors"]) if entry["errors"] else None
+    return given | {"results": tuple(map(Path, entry["results"])), "errors": errors}

@@ -1,4 +1,7 @@
-"""Step ``train``: registrations -> ``encoders/{source}/{backbone}/seed{seed}.pt`` and its training curve."""
+"""Step ``train``: registrations -> ``encoders/{source}/{backbone}/seed{seed}.pt`` and its training curve.
+
+The encoder of depth frames starts from one that was trained on the registrations of all sources together.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +12,20 @@ import pandas as pd
 import torch
 
 from gpca.arguments import SEED
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import train_encoder
+from gpca.encoders.settings import encoder_settings
+from gpca.encoders.training import load_model, train_encoder
 from gpca.files import whole_file
-from gpca.pairs.dataset import Registrations
+from gpca.frames.sample_file import read_instances_of
+from gpca.pairs.dataset import Registrations, joined
+from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` is the encoder's section of the config."""
-    parser.add_argument("--registrations", required=True, type=Path)
+    """Declare files and names; ``--settings`` is the encoder's section of the config, with ``icp``."""
+    parser.add_argument("--registrations", required=True, type=Path, nargs="+", help="several are taken together")
+    parser.add_argument("--poses", type=Path, help="CSV of depth frames, whose instances are held out whole")
+    parser.add_argument("--start", type=Path, help="weights to start from")
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path, help="weights")
@@ -29,13 +35,18 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Train, keeping a checkpoint beside the weights until they are written."""
     torch.set_num_threads(options.threads)
-    check_settings(options.settings, "encoders", "*")
-    settings = EncoderSettings(**options.settings)
-    registrations = Registrations.load(options.registrations)
+    settings, icp = encoder_settings(options.settings)
+    registrations = joined([Registrations.load(path) for path in options.registrations])
+    instance_S = read_instances_of(options.poses, registrations) if options.poses else None
+    start = load_model(options.start, settings).state_dict() if options.start else None
     # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = options.out.with_suffix(".checkpoint")
-    with record_provenance([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
-        model, curve = train_encoder(registrations, options.source, options.seed, settings, checkpoint)
+    inputs = [*options.registrations, *(path for path in (options.poses, options.start) if path)]
+    with record_provenance([options.out, options.curve], inputs, options.settings, seed=options.seed):
+        seen = read_as(settings.reading, registrations, icp)
+        model, curve = train_encoder(
+            seen, options.source, options.seed, settings, checkpoint, start=start, group_S=instance_S
+        )
         # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
         with whole_file(options.out) as partial, partial.open("wb") as file:
             torch.save(model.state_dict(), file)

@@ -77,7 +77,11 @@ FAULTS = [
     ("real_world.datasets", {"lm": {"location": "lost"}}, "real_world.datasets: source 'lm': lost is not there"),
     ("real_world.datasets", {"lm": {}}, "real_world.datasets.lm: 'location' is a required property"),
     ("real_world.initial_pose.form", "guess", "real_world.initial_pose.form: 'guess' is not one of ['results', "),
-    ("real_world.initial_pose.form", "results", "real_world.datasets.scenes.results: is needed by initial_pose form"),
+    (
+        "real_world.initial_pose.form",
+        "results",
+        "real_world.initial_pose: form results needs a dataset with results or errors",
+    ),
     ("real_world.reductions", ["tsne"], "real_world.reductions.0: 'tsne' is not one of"),
     ("sources.real_rgbd", folder(), "sources.real_rgbd: is the name of real_world's frames"),
     ("methods.icp", {}, "methods.icp: registration method 'icp': unknown; known are fgr, "),

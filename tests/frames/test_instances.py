@@ -5,29 +5,29 @@ import pytest
 
 from gpca.arrays import save_arrays
 from gpca.errors import InputError
-from gpca.frames.instances import Instances, groups_of_frames
+from gpca.frames.instances import Instances
 
 
-def test_images_that_follow_each_other_are_one_group_and_scenes_never_are():
-    scene = np.array([1, 0, 0, 0, 0, 1])
-    image = np.array([3, 0, 20, 9, 31, 2])
-    groups = groups_of_frames(scene, image, gap=10)
-    assert groups[1] == groups[3]  # 0 and 9
-    assert groups[2] != groups[3]  # 9 and 20
-    assert groups[4] != groups[2]  # 20 and 31
-    assert groups[0] == groups[5]
-    assert len(set(groups)) == 4
-
-
-def test_no_group_is_in_training_and_test(tiny):
+def test_no_scene_is_in_training_and_test(tiny):
     instances, _ = tiny
     for seed in range(5):
         rows = instances.split("tiny", seed, test_share=0.4)
         assert sorted(np.concatenate([*rows.values()])) == list(range(len(instances)))
-        assert not set(instances.group[rows["train"]]) & set(instances.group[rows["test"]])
+        assert not set(instances.scene[rows["train"]]) & set(instances.scene[rows["test"]])
         assert len(rows["train"]) and len(rows["test"])
     splits = {tuple(instances.split("tiny", seed, 0.4)["test"]) for seed in range(5)}
     assert len(splits) > 1
+
+
+def test_scenes_of_one_number_in_two_datasets_are_two(tiny):
+    instances, _ = tiny
+    dataset = np.where(np.arange(len(instances)) % 2 == 0, "one", "other")
+    rows = changed_columns(instances, {"scene": np.zeros(len(instances), int), "dataset": dataset}).split("t", 0, 0.4)
+    assert {tuple(np.unique(dataset[rows[split]])) for split in ("train", "test")} == {("one",), ("other",)}
+
+
+def changed_columns(instances, changes):
+    return Instances(**{field.name: getattr(instances, field.name) for field in fields(instances)} | changes)
 
 
 @pytest.mark.parametrize("share", [0.01, 0.99])
@@ -36,11 +36,9 @@ def test_both_splits_have_frames_whatever_the_share(tiny, share):
     assert len(rows["train"]) and len(rows["test"])
 
 
-def test_frames_of_one_group_cannot_be_split(tiny):
-    instances, _ = tiny
-    columns = {field.name: getattr(instances, field.name) for field in fields(instances)}
-    alike = Instances(**columns | {"group": np.zeros(len(instances), int)})
-    with pytest.raises(InputError, match="all are of one group of frames"):
+def test_frames_of_one_scene_cannot_be_split(tiny):
+    alike = changed_columns(tiny[0], {"scene": np.zeros(len(tiny[0]), int)})
+    with pytest.raises(InputError, match="all are of one scene"):
         alike.split("tiny", 0, 0.4)
 
 

@@ -23,7 +23,7 @@ def test_no_real_frame_is_refused(name):
     frames = dataset.frames()
     models = read_models(dataset, frames)
     objects = sample_objects((model.surface for model in models.values()), name)
-    instances = read_instances({name: (dataset, frames, models)}, objects, InitialPoseSettings("true_pose"), gap=10)
+    instances = read_instances({name: (dataset, frames, models)}, objects, InitialPoseSettings("true_pose"))
     assert len(instances) == INSTANCES[name]
     distances = points_on_model(instances, objects) / objects.diameters_m[instances.object_index]
     assert distances.max() < FARTHEST / 5

@@ -18,14 +18,16 @@ def made(tiny):
     return make_frame_registrations(*tiny, "tiny", 0, SETTINGS)
 
 
-def test_concepts_are_balanced_and_no_frame_is_in_training_and_test(tiny, made):
+def test_concepts_are_balanced_and_no_scene_is_in_training_and_test(tiny, made):
     instances, _ = tiny
     registrations, seconds_S, poses = made
     for split, count in (("train", 24), ("test", 12)):
         rows = registrations.rows(split)
         assert [np.sum(registrations.concept[rows] == c) for c in CONCEPTS] == [count // 3] * 3
-    groups = [set(instances.group[poses.loc[poses["split"] == split, "instance"]]) for split in ("train", "test")]
-    assert not groups[0] & groups[1]
+    shown = [poses.loc[poses["split"] == split] for split in ("train", "test")]
+    scenes = [set(instances.scene[rows["instance"]]) for rows in shown]
+    assert not scenes[0] & scenes[1]
+    assert (poses["in_training"] == poses["object"].isin(shown[0]["object"])).all()
     assert len(seconds_S) == len(registrations) == len(poses)
     assert (poses["concept"].to_numpy() == registrations.concept).all()
 

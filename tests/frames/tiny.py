@@ -37,10 +37,10 @@ def scene_settings(noise=PERFECT, **changes):
 
 def read(folder, out, settings=None, results=None):
     """Return the instances and objects of a dataset's folder."""
-    dataset = Dataset("tiny", (Path(folder),), results=results)
+    dataset = Dataset("tiny", (Path(folder),), results=(results,) if results else ())
     frames = dataset.frames()
     models = read_models(dataset, frames)
     write_objects((model.surface for model in models.values()), "tiny", out, 2048)
     objects = ObjectClouds.load(out)
     settings = settings or InitialPoseSettings("true_pose")
-    return read_instances({"tiny": (dataset, frames, models)}, objects, settings, gap=10), objects
+    return read_instances({"tiny": (dataset, frames, models)}, objects, settings), objects

@@ -44,6 +44,6 @@ def test_every_instance_of_the_real_frames_lies_on_its_model(tmp_path):
     written = (model.surface for _, _, models in read.values() for model in models.values())
     write_objects(written, "real_rgbd", tmp_path / "objects.npz", n_points=16384)
     objects = ObjectClouds.load(tmp_path / "objects.npz")
-    instances = read_instances(read, objects, InitialPoseSettings("true_pose"), gap=10)
+    instances = read_instances(read, objects, InitialPoseSettings("true_pose"))
     assert len(instances) == sum(len(frame.annotations) for _, frames, _ in read.values() for frame in frames)
     assert points_on_model(instances, objects).max() < 5e-3

@@ -26,7 +26,7 @@ DIAGNOSED = jobs("diagnostics", "coverage_risk", "reliability", "uncertainty_vs_
 TABLES4 = jobs("table4_kernels", "table4_grid")
 KERNELS = jobs("fit_kernel_grid", "kernels", "kernel_learning_curves") + TABLES4
 METHOD = jobs("fig2_overview", "fig4_pipeline")
-FRAMES = jobs("real_world", "table6_backbones", "confusion_real_world")
+FRAMES = jobs("real_world", "table6_backbones", "table6_seen_unseen", "confusion_real_world")
 PICTURES = jobs("fig5_real_world_example", "real_world_failures")
 RUNTIME = jobs("time_stages", "table7_runtime", "runtime")
 MODEL = jobs("model") + RUNTIME
@@ -47,9 +47,10 @@ CONTROLS_SHOWN += jobs("table10_controls", "table10_transfer", "severity_curves"
 CONTROLS = jobs(explain_controls=2) + CONTROLS_SHOWN
 # With other methods and estimators beneath them: explainers of one source.
 EXCHANGED = jobs("explain_exchanged", "exchange_metrics", "table14_estimator_explanations", "table14_method_matrix")
-# Explainers times two sources: three with a GPC (classic features on the frames too), four on embeddings, 11 on
-# uncertainties.
-WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 1, 2 * 4, 2 * 11))
+# Explainers times two sources: three with a GPC (on the frames classic features and the pair too), four on embeddings,
+# 11 on uncertainties.
+WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 2, 2 * 4, 2 * 11))
+PRETRAINED = jobs("pretrain_encoder", "reduce_embeddings", train_on_frames=2)
 
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
@@ -93,10 +94,11 @@ def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
     }  # fmt: skip
 
 
-def test_table6_needs_the_frames_alone(planned):
+def test_table6_needs_the_frames_and_what_the_encoder_starts_from(planned):
     assert planned.before("results/smoke/tables/table6_backbones.md") == {
-        "render_scenes": 1, "instances": 1, "register_frames": 2, "train_encoder": 2, "embed": 2,
-        "reduce_embeddings": 1, "attribute": 3, "real_world": 1, "table6_backbones": 1,
+        "sample_objects": 2, "register": 2, "pretrain_encoder": 1, "render_scenes": 1, "instances": 1,
+        "register_frames": 2, "train_on_frames": 2, "embed": 2, "reduce_embeddings": 1, "attribute": 4, "real_world": 1,
+        "table6_backbones": 1,
     }  # fmt: skip
 
 
@@ -153,22 +155,23 @@ EDITS = {
     "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
     # Not the pictures: they show an encoder without reduction.
     "gpca/encoders/reduction.py": jobs("reduce_embeddings", "attribute") + FRAMES,
-    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_encoder=2, embed=2, attribute=1)
+    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_on_frames=2, embed=2, attribute=2)
     + BACKBONES + MODEL,
     "gpca/frames/bop.py":
-        jobs("reduce_embeddings", "instances", register_frames=2, train_encoder=2, embed=2, attribute=1)
+        jobs("reduce_embeddings", "instances", register_frames=2, train_on_frames=2, embed=2, attribute=2)
         + BACKBONES + MODEL + RECOVERY,
     "gpca/recovery/policy.py": MODEL + RECOVERY,
     "gpca/reporting/tables/explainers.py": TABLES1,
     "gpca/reporting/figures/confusions.py":
         jobs("fig_attribution_confusions", "confusion_real_world", "cause_confusions"),
-    "gpca/encoders/dgcnn.py": jobs("reduce_embeddings", train_encoder=6, embed=6, embed_without=4, learn_actively=4)
+    "gpca/encoders/dgcnn.py": PRETRAINED + jobs(train_encoder=4, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
     + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
     + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
-    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=2, run_icp=5)
+    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=4, run_icp=5)
+    + PRETRAINED + BACKBONES
     + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
     + jobs(sample_model_causes=1, describe_model_causes=1, train_control=1) + MODEL

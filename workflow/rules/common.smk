@@ -24,11 +24,13 @@ REDUCTIONS = [name for name in config["reductions"] if name != "none"]
 
 
 wildcard_constraints:
-    source="|".join([*SOURCES, FRAMES]),
+    source="|".join([*SOURCES, FRAMES, *NAMES["condition"]]),
     seed=r"\d+",
     backbone="|".join(config["encoders"]),
     reduction="|".join(REDUCTIONS),
-    explainer="|".join([*config["explainers"], *NAMES["backbone"]]),
+    explainer="|".join(
+        [*config["explainers"], *NAMES["frame_explainer"], *NAMES["backbone"]]
+    ),
     cause_explainer="|".join(config["diagnosis"]["explainers"]),
     design="|".join(config["uncertainty"]),
 

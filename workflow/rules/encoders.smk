@@ -1,4 +1,10 @@
 # Registrations -> encoders -> embeddings, and their reductions.
+def encoder_settings(wildcards, changes=None):
+    """Return an encoder's section of the config, with changes and the ICP that a reading repeats."""
+    icp = {"icp": config["registrations"]["icp"]}
+    return as_json(config["encoders"][wildcards.backbone] | (changes or {}) | icp)
+
+
 rule encoders:
     input:
         collect(
@@ -40,6 +46,8 @@ rule train_encoder:
         "<logs>/encoders/{source}/{backbone}/seed{seed}.log",
     benchmark:
         "<benchmarks>/encoders/{source}/{backbone}/seed{seed}.tsv"
+    wildcard_constraints:
+        source="|".join(SOURCES),
     # The longest jobs go first, so that none of them is left over while the other cores wait.
     priority: 10
     conda:
@@ -49,10 +57,81 @@ rule train_encoder:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=settings("encoders", "{backbone}"),
+        settings=encoder_settings,
     shell:
         "python -m gpca train --threads {threads} --registrations {input.registrations} "
         "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
+        "--out {output.weights} --curve {output.curve} 2> {log}"
+
+
+rule pretrain_encoder:
+    input:
+        registrations=collect(
+            f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SOURCES
+        ),
+        code=encoder_code("train"),
+    output:
+        weights="<results>/encoders/pretrained/{backbone}.pt",
+        curve="<results>/encoders/pretrained/{backbone}.csv",
+    log:
+        "<logs>/encoders/pretrained/{backbone}.log",
+    benchmark:
+        "<benchmarks>/encoders/pretrained/{backbone}.tsv"
+    priority: 11
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=60,
+    params:
+        settings=lambda wildcards: encoder_settings(
+            wildcards, REAL_WORLD["pretraining"]
+        ),
+        seed=SEEDS[0],
+    shell:
+        "python -m gpca train --threads {threads} --registrations {input.registrations} "
+        "--source pretraining --seed {params.seed} --settings {params.settings:q} "
+        "--out {output.weights} --curve {output.curve} 2> {log}"
+
+
+rule train_on_frames:
+    input:
+        unpack(
+            lambda wildcards: (
+                {"start": "<results>/encoders/pretrained/{backbone}.pt"}
+                if REAL_WORLD["pretraining"]
+                else {}
+            )
+        ),
+        registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
+        poses=f"<results>/poses/{FRAMES}/seed{{seed}}.csv",
+        code=encoder_code("train"),
+    output:
+        weights=f"<results>/encoders/{FRAMES}/{{backbone}}/seed{{seed}}.pt",
+        curve=f"<results>/encoders/{FRAMES}/{{backbone}}/seed{{seed}}.csv",
+    log:
+        f"<logs>/encoders/{FRAMES}/{{backbone}}/seed{{seed}}.log",
+    benchmark:
+        f"<benchmarks>/encoders/{FRAMES}/{{backbone}}/seed{{seed}}.tsv"
+    priority: 10
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        settings=lambda wildcards: encoder_settings(
+            wildcards, (REAL_WORLD["training"] or {}).get(wildcards.backbone)
+        ),
+        source=FRAMES,
+        start=lambda wildcards, input: (
+            ["--start", input.start] if input.get("start") else []
+        ),
+    shell:
+        "python -m gpca train --threads {threads} --registrations {input.registrations} --poses {input.poses} "
+        "{params.start:q} --source {params.source} --seed {wildcards.seed} --settings {params.settings:q} "
         "--out {output.weights} --curve {output.curve} 2> {log}"
 
 
@@ -77,12 +156,23 @@ rule embed:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=settings("encoders", "{backbone}"),
+        settings=encoder_settings,
     shell:
         "python -m gpca embed --threads {threads} --registrations {input.registrations} "
         "--registration-timings {input.timings} --encoder {input.weights} "
         "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
         "--out {output.embeddings} --timings {output.timings} 2> {log}"
+
+
+# Under other initial poses the encoder is that of the frames, and the classifier learns anew.
+use rule embed as embed_condition with:
+    input:
+        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/icp/seed{seed}.csv",
+        weights=f"<results>/encoders/{FRAMES}/{{backbone}}/seed{{seed}}.pt",
+        code=encoder_code("embed"),
+    wildcard_constraints:
+        source="|".join(NAMES["condition"]) or "none",
 
 
 rule reduce_embeddings:

@@ -2,6 +2,12 @@
 from gpca.reporting.run import explainer_of, files_behind
 
 
+def explainer_settings(wildcards):
+    """Return the settings of an explainer in the config, or of one that is asked about frames alone."""
+    name = explainer_of(wildcards.explainer, NAMES)
+    return config["explainers"].get(name) or REAL_WORLD["explainers"].get(name) or {}
+
+
 rule predictions:
     input:
         collect(
@@ -10,11 +16,7 @@ rule predictions:
             explainer=config["explainers"],
             seed=SEEDS,
         ),
-        collect(
-            f"<results>/predictions/{FRAMES}/{{explainer}}/seed{{seed}}.csv",
-            explainer=[*NAMES["backbone"], *NAMES["classic"]],
-            seed=SEEDS,
-        ),
+        FRAME_PREDICTIONS,
 
 
 rule attribute:
@@ -53,9 +55,7 @@ rule attribute:
         runtime=60,
     params:
         explainer=lambda wildcards: explainer_of(wildcards.explainer, NAMES),
-        settings=lambda wildcards: as_json(
-            config["explainers"].get(explainer_of(wildcards.explainer, NAMES)) or {}
-        ),
+        settings=lambda wildcards: as_json(explainer_settings(wildcards)),
         seeds=SEEDS,
         attached=lambda wildcards, input: [
             word
@@ -67,6 +67,26 @@ rule attribute:
         "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
         "--registrations {input.registrations} {params.attached} "
         "--predictions {output.predictions} --timings {output.timings} 2> {log}"
+
+
+# Classifiers of several seeds on what the first seed's encoder makes of the first seed's frames.
+use rule attribute as attribute_one_encoder with:
+    input:
+        unpack(
+            lambda wildcards: {
+                option: [
+                    f"<results>/{pattern.format(source=FRAMES, seed=SEEDS[0])}"
+                    for _ in SEEDS
+                ]
+                for option, pattern in files_behind(wildcards.explainer, NAMES).items()
+            }
+        ),
+        registrations=[
+            f"<results>/registrations/{FRAMES}/seed{SEEDS[0]}.npz" for _ in SEEDS
+        ],
+        code=code_files("gpca.steps.attribute", explainer_module("gpca")),
+    wildcard_constraints:
+        source=ONE_ENCODER,
 
 
 rule metrics:

@@ -1,12 +1,33 @@
 # Depth frames, of datasets or rendered in their place -> partial clouds -> registrations.
-from gpca.frames.source import frame_files
+from gpca.frames.source import ONE_ENCODER, conditions_of, frame_files
 from gpca.objects.source import folder_options
 
 REAL_WORLD = config["real_world"]
+CONDITIONS = {FRAMES: REAL_WORLD["initial_pose"]} | {
+    f"{FRAMES}_{name}": entry for name, entry in conditions_of(config).items()
+}
 if REAL_WORLD["datasets"]:
     FRAMES_FROM = {"data": frame_files(REAL_WORLD["datasets"], config["data_dir"])}
 else:
     FRAMES_FROM = {"scenes": f"<results>/scenes/{FRAMES}"}
+# What is asked about frames: source -> methods.
+ASKED = {
+    FRAMES: [*NAMES["backbone"], *NAMES["classic"], *NAMES["frame_explainer"]],
+    **{
+        condition: [*NAMES["condition_backbone"], *NAMES["frame_explainer"]]
+        for condition in NAMES["condition"]
+    },
+}
+FRAME_PREDICTIONS = [
+    f"<results>/predictions/{source}/{method}/seed{seed}.csv"
+    for source, methods in ASKED.items()
+    for method in methods
+    for seed in SEEDS
+]
+
+
+wildcard_constraints:
+    frames="|".join(CONDITIONS),
 
 
 rule render_scenes:
@@ -41,12 +62,12 @@ rule instances:
         **FRAMES_FROM,
         code=code_files("gpca.steps.instances"),
     output:
-        instances=f"<results>/instances/{FRAMES}.npz",
-        objects=f"<results>/objects/{FRAMES}.npz",
+        instances="<results>/instances/{frames}.npz",
+        objects="<results>/objects/{frames}.npz",
     log:
-        "<logs>/instances.log",
+        "<logs>/instances/{frames}.log",
     benchmark:
-        "<benchmarks>/instances.tsv"
+        "<benchmarks>/instances/{frames}.tsv"
     priority: 12
     conda:
         "../envs/gpca.yaml"
@@ -55,8 +76,11 @@ rule instances:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=as_json(
-            {name: REAL_WORLD[name] for name in ("datasets", "initial_pose", "gap")}
+        settings=lambda wildcards: as_json(
+            {
+                "datasets": REAL_WORLD["datasets"],
+                "initial_pose": CONDITIONS[wildcards.frames],
+            }
         ),
         source=FRAMES,
         frames=lambda wildcards, input: (
@@ -72,17 +96,17 @@ rule instances:
 
 rule register_frames:
     input:
-        instances=f"<results>/instances/{FRAMES}.npz",
-        objects=f"<results>/objects/{FRAMES}.npz",
+        instances="<results>/instances/{frames}.npz",
+        objects="<results>/objects/{frames}.npz",
         code=code_files("gpca.steps.frame_registrations"),
     output:
-        registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
-        poses=f"<results>/poses/{FRAMES}/seed{{seed}}.csv",
-        timings=f"<results>/timings/{FRAMES}/icp/seed{{seed}}.csv",
+        registrations="<results>/registrations/{frames}/seed{seed}.npz",
+        poses="<results>/poses/{frames}/seed{seed}.csv",
+        timings="<results>/timings/{frames}/icp/seed{seed}.csv",
     log:
-        f"<logs>/registrations/{FRAMES}/seed{{seed}}.log",
+        "<logs>/registrations/{frames}/seed{seed}.log",
     benchmark:
-        f"<benchmarks>/registrations/{FRAMES}/seed{{seed}}.tsv"
+        "<benchmarks>/registrations/{frames}/seed{seed}.tsv"
     priority: 11
     conda:
         "../envs/gpca.yaml"
@@ -98,7 +122,7 @@ rule register_frames:
                 for name in ("train", "test", "test_share", "occluders")
             }
         ),
-        source=FRAMES,
+        source=FRAMES,  # conditions have its splits and draws
     shell:
         "python -m gpca frame_registrations --threads {threads} --instances {input.instances} "
         "--objects {input.objects} --source {params.source} --seed {wildcards.seed} --settings {params.settings:q} "
@@ -107,12 +131,16 @@ rule register_frames:
 
 rule real_world:
     input:
-        prediction_files=collect(
-            f"<results>/predictions/{FRAMES}/{{method}}/seed{{seed}}.csv",
-            method=[*NAMES["backbone"], *NAMES["classic"]],
+        prediction_files=FRAME_PREDICTIONS,
+        one_encoder_files=collect(
+            f"<results>/predictions/{ONE_ENCODER}/{{method}}/seed{{seed}}.csv",
+            method=NAMES["backbone"] if REAL_WORLD["one_encoder"] else [],
             seed=SEEDS,
         ),
-        code=collector_code("gpca.attribution.metrics:collect"),
+        pose_files=collect(
+            "<results>/poses/{source}/seed{seed}.csv", source=CONDITIONS, seed=SEEDS
+        ),
+        code=collector_code("gpca.frames.metrics:collect"),
     output:
         "<results>/real_world.csv",
     log:
@@ -127,6 +155,6 @@ rule real_world:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.attribution.metrics:collect",
+        collector="gpca.frames.metrics:collect",
     script:
         "../scripts/collect.py"

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Set
 
+from baselines.registry import require_settings
 from gpca.config.checks.named import require_names, with_key
+from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.frames.rgbd_scene import SceneSettings
-from gpca.frames.source import REAL_WORLD, resolve_datasets
+from gpca.frames.source import REAL_WORLD, has_estimates, resolve_datasets
 from gpca.objects import procedural
 
 
@@ -21,8 +23,22 @@ def check_real_world(config: dict, encoders_left_out: Set[str]) -> None:
     for family in section["scenes"].get("families", ()):
         with_key("real_world.scenes.families", procedural.require_family, family)
     with_key("real_world.datasets", resolve_datasets, section["datasets"], config["data_dir"])
-    if section["initial_pose"].get("form") == "results":
-        for name, entry in (section["datasets"] or {"scenes": {}}).items():
-            if not entry.get("results"):
-                key = f"config key real_world.datasets.{name}.results"
-                raise InputError(key, "is needed by initial_pose form results", "name the file, or take another form")
+    datasets = resolve_datasets(section["datasets"], config["data_dir"])
+    if section["initial_pose"].get("form") == "results" and not has_estimates(datasets):
+        fault = "form results needs a dataset with results or errors"
+        raise InputError("config key real_world.initial_pose", fault, "name the files, or take another form")
+    _check_training(config)
+    names = ("condition_backbones", section["condition_backbones"])
+    require_names(f"real_world.{names[0]}", names[1], section["backbones"], "backbone", encoders_left_out)
+    for name, settings in (section["explainers"] or {}).items():
+        with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
+
+
+def _check_training(config: dict) -> None:
+    """Check that the encoders take what they are trained with on frames."""
+    section, encoders = config["real_world"], config["encoders"]
+    require_names("real_world.training", list(section["training"] or {}), encoders, "encoder", set())
+    for name in section["backbones"]:
+        for part in ("pretraining", "training"):
+            given = (section[part] or {}) if part == "pretraining" else (section[part] or {}).get(name, {})
+            with_key(f"real_world.{part}", lambda given=given, name=name: EncoderSettings(**encoders[name] | given))

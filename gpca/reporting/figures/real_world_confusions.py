@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.attribution.metrics import read_metrics
 from gpca.errors import InputError
+from gpca.frames.metrics import read_together
 from gpca.reporting.figures.confusions import counts_and_shares, pooled_confusions
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
 from gpca.reporting.tables.backbones import encoder_title
@@ -22,7 +22,7 @@ def draw_real_world_confusions(
     Raises:
         InputError: an unusable file, or one without metrics of these methods.
     """
-    pooled = {method: counts for (_, method), counts in pooled_confusions(read_metrics(metrics_csv)).items()}
+    pooled = {method: counts for (_, method), counts in pooled_confusions(read_together(metrics_csv)).items()}
     shown = {method: pooled[method] for method in methods if method in pooled}
     if not shown:
         raise InputError(metrics_csv, "holds no confusion of these backbones", "make it anew")

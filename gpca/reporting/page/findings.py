@@ -13,6 +13,7 @@ from gpca.attribution.metrics import ALL, read_metrics
 from gpca.diagnosis.intervals import read_intervals
 from gpca.diagnosis.judged import CEILING, POOLED
 from gpca.explainers.gpca import GPCA_FORMS
+from gpca.frames.metrics import read_together
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.words import plural
 
@@ -54,7 +55,7 @@ def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Fi
     readers: dict[str, tuple[Callable, list[Callable]]] = {
         "metrics.csv": (read_metrics, [_protocol, _rival, _uncertain]),
         "cause_intervals.csv": (read_intervals, [_causes]),
-        "real_world.csv": (read_metrics, [_frames]),
+        "real_world.csv": (read_together, [_frames]),
         "active_learning.csv": (read_metrics, [_labels]),
         "recovery.csv": (read_metrics, [_recovery]),
     }

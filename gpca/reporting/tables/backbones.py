@@ -10,6 +10,8 @@ import numpy as np
 
 from gpca.attribution.metrics import ALL
 from gpca.encoders.registry import make_encoder, parameter_count
+from gpca.frames.metrics import TOGETHER
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import INTERVAL, TableBuilder, cell_of_repeats, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
@@ -52,7 +54,7 @@ def table6_backbones(
     """Return the accuracy on depth frames by backbones × reductions, and of the classic features.
 
     Args:
-        metrics: The tidy metrics (:func:`gpca.attribution.metrics.collect`) of methods ``{backbone}-{reduction}``.
+        metrics: The tidy metrics (:func:`gpca.frames.metrics.collect`) of methods ``{backbone}-{reduction}``.
         title: The title of the frames.
         backbones: The number of parameters of each name, in order. The table shows differences to the first backbone
             with the first reduction.
@@ -61,13 +63,17 @@ def table6_backbones(
     Raises:
         InputError: The metrics hold none of these.
     """
+    together = rows_where(metrics, table=TOGETHER)
+    metrics, one_encoder = (rows_where(together, source=source) for source in (REAL_WORLD, ONE_ENCODER))
     first = next(iter(backbones))
     reference_R = _values(metrics, f"{first}-{reductions[0]}")
     table = TableBuilder("table6_backbones", {"backbone": "Backbone", "reduction": "Reduction"})
     for backbone, parameters in backbones.items():
         for reduction in reductions:
             labels = [(backbone, BACKBONES.get(backbone, backbone)), (reduction, REDUCTIONS[reduction])]
-            table.add_row(labels, _cells(metrics, f"{backbone}-{reduction}", reference_R, not table.rows, parameters))
+            method = f"{backbone}-{reduction}"
+            cells = _cells(metrics, method, reference_R, not table.rows, parameters)
+            table.add_row(labels, cells | {"classifiers": _deviation(one_encoder, method)} if cells else {})
     for method, name in CLASSIC.items():
         labels = [(method, name), ("none", REDUCTIONS["none"])]
         table.add_row(labels, _cells(metrics, method, reference_R, not table.rows))
@@ -81,15 +87,18 @@ def table6_backbones(
         column_head="metric",
         columns={
             "accuracy": Column("Mean acc. (%)"),
-            "deviation": Column("Std. dev. (%)", decimals=2, interval=False, limits=(0, inf)),
+            "classifiers": Column("Std. dev. (%)", decimals=2, interval=False, limits=(0, inf)),
+            "deviation": Column("Of all (%)", decimals=2, interval=False, limits=(0, inf)),
             "difference": Column(f"{rival} (points)", limits=(-100, 100)),
             **{concept: Column(f"{concept.capitalize()} (%)", interval=False) for concept in CONCEPTS},
             "parameters": Column("Parameters (k)", decimals=0, interval=False, limits=(0, inf)),
         },
         footnotes=(
             f"Mean over {plural(shown.seeds, 'seed')}, {shown.test_samples // shown.seeds} test samples each, in "
-            f"frames that training does not see; {INTERVAL}. Each seed has its own split of the frames, "
-            "perturbations, encoders and GPCs.",
+            f"scenes that training does not see; {INTERVAL}. Each seed has its own split of the scenes, "
+            "perturbations, encoder that goes on from one pretrained on whole objects, and GPC.",
+            "Std. dev.: as the paper says, of classifiers on one encoder's embeddings, the first seed's. Of all: of "
+            "the seeds of the mean.",
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
             "Parameters: of the encoder.",
         ),
@@ -115,6 +124,11 @@ def _cells(
     if parameters is not None:
         cells["parameters"] = plain_cell(parameters / 1000, seeds, samples)
     return cells
+
+
+def _deviation(one_encoder: pd.DataFrame, method: str) -> Cell | None:
+    accuracy_R = _values(one_encoder, method)
+    return plain_cell(float(accuracy_R.std(ddof=1)), len(accuracy_R), 0) if len(accuracy_R) > 1 else None
 
 
 def _values(

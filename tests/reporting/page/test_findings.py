@@ -42,7 +42,9 @@ def folder(tmp_path):
     rows += [(source, "gpca_paper", "test_samples", 50) for source in "ab"]
     rows += [("a", "gpca_paper", "causal_samples", 8), ("b", "gpca_paper", "causal_samples", 4)]
     write_metrics(tmp_path / "metrics.csv", rows)
-    frames = [("frames", method, "accuracy", value) for method, value in (("x-none", 0.5), ("y-pca", 0.8), ("z", 0.1))]
+    frames = [
+        ("real_rgbd", method, "accuracy", value) for method, value in (("x-none", 0.5), ("y-pca", 0.8), ("z", 0.1))
+    ]
     write_metrics(tmp_path / "real_world.csv", frames)
     recovered = [("recovery", name, "recovered_within_3", v) for name, v in (("gpca", 0.7), ("random", 0.4))]
     write_metrics(tmp_path / "recovery.csv", recovered, "recovery")

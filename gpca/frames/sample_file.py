@@ -1,0 +1,41 @@
+"""The CSV beside registrations of depth frames: which instance each sample shows, and how far off its poses are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gpca.csv_file import numbers, read_csv
+from gpca.errors import InputError
+from gpca.pairs.dataset import Registrations
+
+COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
+_TRUTH = {"True": True, "False": False}
+
+
+def read_samples_of_frames(path: str | Path):
+    """Read the columns that tell samples apart, as text but for `in_training`.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, `in_training` that is neither True nor False.
+    """
+    rows = read_csv(path, COLUMNS)
+    rows["in_training"] = rows["in_training"].map(_TRUTH)
+    if rows["in_training"].isna().any():
+        raise InputError(path, "column 'in_training' holds something other than True and False", "make it anew")
+    rows["in_training"] = rows["in_training"].astype(bool)
+    return rows
+
+
+def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndarray:
+    """Return the instance (S,) that each registration shows.
+
+    Raises:
+        InputError: as :func:`read_samples_of_frames` raises it, and for a file of other samples.
+    """
+    rows = read_samples_of_frames(path)
+    for name in ("sample", "split"):
+        if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
+            raise InputError(path, "holds other samples than the registrations", "make both anew from one config")
+    return numbers(path, rows, "instance", least=0).to_numpy(int)

@@ -1,0 +1,83 @@
+"""Makes Table VI once more: GP-CA on depth frames, objects that training saw apart from those that it did not see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.metrics import ALL
+from gpca.frames.metrics import DATASET, SEEN, TOGETHER, UNSEEN
+from gpca.reporting.tables.backbones import CLASSIC, encoder_title
+from gpca.reporting.tables.builder import INTERVAL, TableBuilder, cell_of_repeats, rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
+
+
+def table6_seen_unseen(
+    metrics: pd.DataFrame,
+    title: str,
+    conditions: Mapping[str, str],
+    backbones: Sequence[str],
+    explainers: Mapping[str, str],
+) -> Table:
+    """Return the accuracy on depth frames by what was seen in training and by dataset, under every condition.
+
+    Args:
+        metrics: The tidy metrics (:func:`gpca.frames.metrics.collect`).
+        title: The title of the frames.
+        conditions: Source of each condition -> its title, in order.
+        backbones: The names of the methods ``{backbone}-{reduction}``, in order.
+        explainers: The titles of the other methods, in order.
+
+    Raises:
+        InputError: The metrics hold none of these.
+    """
+    titles = {name: encoder_title(*name.split("-")) for name in backbones} | CLASSIC | dict(explainers)
+    datasets = sorted({name for name in metrics["table"] if name.startswith(DATASET)})
+    table = TableBuilder("table6_seen_unseen", {"condition": "Initial poses", "method": "Method"})
+    for source, words in conditions.items():
+        of_source = rows_where(metrics, source=source)
+        for method, name in titles.items():
+            table.add_row([(source, words), (method, name)], _cells(rows_where(of_source, method=method), datasets))
+    table.require_rows("metrics", "hold no accuracy", "run its explainers first")
+    table.compare_down(EVERYTHING_SEEN, same=1)
+    columns = {name: Column(head) for name, head in EVERYTHING_SEEN.items()}
+    columns |= {name: Column(f"{name.removeprefix(DATASET)} (%)", interval=False) for name in datasets}
+    columns |= {"ece": Column("ECE, all", decimals=2, interval=False, limits=(0.0, 1.0))}
+    first = rows_where(metrics, source=next(iter(conditions)), metric="test_samples", concept=ALL)
+    shares = [_share(first, name) for name in (SEEN, UNSEEN)]
+    return table.build(
+        caption=f"Accuracy (%) on {title}: objects that training saw and did not see",
+        column_head="samples",
+        columns=columns,
+        footnotes=(
+            f"Mean over {plural(table.most_seeds(), 'seed')}; {INTERVAL}. No scene is in both training and test. Seen "
+            f"objects ({shares[0]} of the test samples) are shown in a scene of the training too, unseen ones "
+            f"({shares[1]}) are not. Instances take turns, so that objects and datasets are as unequally frequent as "
+            "in the frames.",
+            "A dataset has a value where at least one seed tests its frames. ECE: expected calibration error of all.",
+        ),
+    )
+
+
+def _cells(of_method: pd.DataFrame, datasets: Sequence[str]) -> dict[str, Cell | None]:
+    cells = {name: _cell(rows_where(of_method, table=name), "accuracy") for name in (*EVERYTHING_SEEN, *datasets)}
+    return cells | {"ece": _cell(rows_where(of_method, table=TOGETHER), "ece", scale=1)}
+
+
+def _cell(rows: pd.DataFrame, metric: str, scale: float = 100) -> Cell | None:
+    value_R = rows_where(rows, metric=metric, concept=ALL).sort_values("seed")["value"].to_numpy() * scale
+    samples = int(rows_where(rows, metric="test_samples", concept=ALL)["value"].sum())
+    return cell_of_repeats(value_R, samples) if len(value_R) else None
+
+
+def _share(samples: pd.DataFrame, name: str) -> str:
+    of_part, of_all = (rows_where(samples, table=table)["value"].to_numpy(float) for table in (name, TOGETHER))
+    return f"{100 * np.sum(of_part) / np.sum(of_all):.0f} %" if len(of_all) else "0 %"

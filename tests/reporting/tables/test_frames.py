@@ -1,0 +1,48 @@
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import ALL, TIDY_COLUMNS
+from gpca.errors import InputError
+from gpca.reporting.tables.frames import table6_seen_unseen
+
+CONDITIONS = {"real_rgbd": "True pose", "real_rgbd_estimated": "Pose estimators"}
+
+
+def metrics(values):
+    rows = []
+    for (source, table, method), of_seeds in values.items():
+        for seed, (accuracy, samples) in enumerate(of_seeds):
+            rows += [(table, source, method, "accuracy", ALL, seed, accuracy)]
+            rows += [(table, source, method, "test_samples", ALL, seed, samples)]
+            rows += [(table, source, method, "ece", ALL, seed, 0.1)]
+    return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+
+
+def make(values):
+    return table6_seen_unseen(metrics(values), "frames", CONDITIONS, ["dgcnn-none"], {"gpca_pair": "GP-CA on the pair"})
+
+
+def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
+    table = make(
+        {
+            ("real_rgbd", "attribution", "dgcnn-none"): [(0.7, 100), (0.8, 100)],
+            ("real_rgbd", "seen", "dgcnn-none"): [(0.9, 60), (0.8, 20)],
+            ("real_rgbd", "unseen", "dgcnn-none"): [(0.4, 40), (0.8, 80)],
+            ("real_rgbd", "dataset/lm", "dgcnn-none"): [(0.6, 30)],
+            ("real_rgbd_estimated", "attribution", "gpca_pair"): [(0.5, 100), (0.7, 100)],
+        }
+    )
+    assert [tuple(key for key, _ in row) for row in table.rows] == [
+        ("real_rgbd", "dgcnn-none"), ("real_rgbd_estimated", "gpca_pair"),
+    ]  # fmt: skip
+    assert table.cells[0, "seen"].mean == pytest.approx(85)
+    assert table.cells[0, "unseen"].mean == pytest.approx(60)
+    assert table.cells[0, "dataset/lm"].mean == pytest.approx(60)
+    assert table.cells[1, "attribution"].mean == pytest.approx(60)
+    assert (1, "seen") not in table.cells
+    assert "40 % of the test samples" in " ".join(table.footnotes)
+
+
+def test_nothing_to_show_is_refused():
+    with pytest.raises(InputError, match="hold no accuracy for table6_seen_unseen"):
+        make({("real_rgbd", "attribution", "other"): [(0.7, 100)]})
