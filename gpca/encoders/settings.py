@@ -25,6 +25,7 @@ class EncoderSettings:
         learning_rate: peak of the one-cycle schedule (Smith & Topin 2019) of AdamW.
         weight_decay: of AdamW.
         options: further arguments of the backbone.
+        head_layers: linear layers of the head that the encoder is trained with.
     """
 
     backbone: str = "dgcnn"
@@ -36,6 +37,7 @@ class EncoderSettings:
     weight_decay: Share = 1e-2
     options: dict = field(default_factory=dict)
     fewest_points: Annotated[int, Bounds(minimum=32)] | None = None
+    head_layers: Annotated[int, Bounds(minimum=1, maximum=2)] = 1
 
     def __post_init__(self) -> None:
         if self.fewest_points is None:

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import hashlib
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 from torch import nn
 
+from gpca.encoders.edge_conv import NEGATIVE_SLOPE
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, require_like
@@ -24,6 +27,8 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
+
+Draw = Callable[..., Any]  # as :func:`draw_points`, what an encoder sees of some rows
 
 
 def draw_points(
@@ -48,7 +53,7 @@ def draw_points(
     return torch.from_numpy(np.stack(clouds).astype(np.float32))
 
 
-def _on(device: torch.device, clouds: torch.Tensor | list[torch.Tensor]) -> torch.Tensor | list[torch.Tensor]:
+def _on(device: torch.device, clouds: Any) -> Any:
     return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
 
 
@@ -59,11 +64,15 @@ def train_encoder(
     settings: EncoderSettings,
     checkpoint: Path | None = None,
     classes: tuple[str, ...] = CONCEPTS,
+    make: Callable[[], nn.Module] | None = None,
+    draw: Draw = draw_points,
 ) -> tuple[Classifier, list[dict[str, float]]]:
     """Train on the rows of split ``train``.
 
     Args:
         classes: what ``concept`` names.
+        make: makes the encoder, where it is none of the registry.
+        draw: what the encoder sees of a row, anew in every epoch.
         checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
             continues from it and ends with the same weights as an unbroken run.
 
@@ -72,7 +81,7 @@ def train_encoder(
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     device = best_device()
-    model = make_model(settings, classes).to(device)
+    model = (with_head(make(), settings, classes) if make else make_model(settings, classes)).to(device)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
     rows = registrations.rows("train")
     if len(rows) < 2:
@@ -93,7 +102,7 @@ def train_encoder(
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
-            clouds = draw_points(
+            clouds = draw(
                 *(registrations, batch_rows, settings.draw_points, source, seed, "epoch", epoch),
                 fewest=settings.fewest_points,
             )
@@ -127,13 +136,18 @@ def best_device() -> torch.device:
 
 @torch.inference_mode()
 def embed(
-    model: Classifier, registrations: Registrations, source: str, seed: int, settings: EncoderSettings
+    model: Classifier,
+    registrations: Registrations,
+    source: str,
+    seed: int,
+    settings: EncoderSettings,
+    draw: Draw = draw_points,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return embeddings h (S, d) of all rows, in their order, and the head's logits (S, C) at them; float32.
 
     h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
-    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. As the head is
-    linear, its logits at h are the mean over the draws too.
+    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. The logits of a
+    linear head at h are the mean over the draws too.
     """
     device, n_points = best_device(), settings.draw_points
     model.to(device).eval()
@@ -141,8 +155,8 @@ def embed(
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            draw_points(registrations, rows, n_points, source, seed, "embedding", draw, fewest=settings.fewest_points)
-            for draw in range(settings.draws)
+            draw(registrations, rows, n_points, source, seed, "embedding", number, fewest=settings.fewest_points)
+            for number in range(settings.draws)
         ]
         parts.append(torch.stack([model.encoder(_on(device, clouds)) for clouds in draws]).mean(dim=0))
     h_S_d = torch.cat(parts)
@@ -172,19 +186,28 @@ def load_model(weights: Path, settings: EncoderSettings, classes: tuple[str, ...
 
 
 class Classifier(nn.Sequential):
-    """An encoder and a linear head over the classes."""
+    """An encoder and a head over the classes: one linear layer, or two with half the width between them."""
 
     encoder: nn.Module
-    head: nn.Linear
+    head: nn.Module
 
-    def __init__(self, encoder: nn.Module, embedding_size: int, classes: int) -> None:
-        super().__init__(OrderedDict(encoder=encoder, head=nn.Linear(embedding_size, classes)))
+    def __init__(self, encoder: nn.Module, embedding_size: int, classes: int, head_layers: int = 1) -> None:
+        head: nn.Module = nn.Linear(embedding_size, classes)
+        if head_layers == 2:
+            hidden = embedding_size // 2
+            layers = nn.Linear(embedding_size, hidden), nn.LeakyReLU(NEGATIVE_SLOPE), nn.Linear(hidden, classes)
+            head = nn.Sequential(*layers)
+        super().__init__(OrderedDict(encoder=encoder, head=head))
 
 
 def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
     """Return a new encoder with a head over the classes."""
-    encoder = make_encoder(settings.backbone, settings.options)
-    return Classifier(encoder, encoder.embedding_size, len(classes))
+    return with_head(make_encoder(settings.backbone, settings.options), settings, classes)
+
+
+def with_head(encoder: Any, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
+    """Return an encoder with a new head over the classes."""
+    return Classifier(encoder, encoder.embedding_size, len(classes), settings.head_layers)
 
 
 def _fingerprint(registrations: Registrations) -> str:

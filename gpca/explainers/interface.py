@@ -36,6 +36,17 @@ class Describing(Protocol):
         """Attach what it measures, by :func:`measured`; ``fit`` and ``explain`` then measure nothing again."""
 
 
+@runtime_checkable
+class Encoding(Protocol):
+    """An explainer with an encoder of its own, learnt once for all labels on its embeddings."""
+
+    def learn(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
+        """Train the encoder on labelled registrations, and return what attaches its embeddings.
+
+        Where they are attached, ``fit`` and ``explain`` read them.
+        """
+
+
 def measured(
     registrations: Registrations, prefix: str, measure: Callable[[], Mapping[str, np.ndarray]]
 ) -> Registrations:

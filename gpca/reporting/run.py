@@ -41,6 +41,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "cause_explainer": list(config["diagnosis"]["explainers"]),
         "control_seed": controlled_seeds(config),
         "control": list(config["controls"]["controls"]),
+        "control_encoder": list(config["controls"]["encoders"]),
         "transfer_source": list(sources) if transfers(config, sources) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),

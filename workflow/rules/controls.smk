@@ -1,10 +1,11 @@
 # Registrations -> encoders trained under a control -> what every explainer says under all of them.
-from gpca.controls.settings import RETRAINED
+from gpca.controls.settings import RETRAINED, TRAININGS, UNSEEN
 
 CONTROLS = config["controls"]
 CONTROL_SEEDS = NAMES["control_seed"]
 CONTROL_ENCODER = config["embedding"]["encoder"]
 RETRAINED_CONTROLS = [name for name in CONTROLS["controls"] if name in RETRAINED]
+TRAINED_OTHERWISE = CONTROLS["encoders"] if UNSEEN in RETRAINED_CONTROLS else []
 CONTROL_EXPLAINERS = {
     name: (config["explainers"].get(name) or {}) | (own or {})
     for name, own in CONTROLS["explainers"].items()
@@ -13,6 +14,12 @@ CONTROL_SETTINGS = {
     "controls": {name: CONTROLS[name] for name in CONTROLS if name != "explainers"},
     "encoder": config["encoders"][CONTROL_ENCODER],
 }
+
+
+def retrained(wildcards):
+    """Return the controls and ways of training for which a seed has encoders of their own."""
+    compared = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    return RETRAINED_CONTROLS + (TRAINED_OTHERWISE if compared else [])
 
 
 rule controls:
@@ -36,7 +43,7 @@ rule train_control:
     benchmark:
         "<benchmarks>/control_embeddings/{control}/{source}/seed{seed}.tsv"
     wildcard_constraints:
-        control="|".join(RETRAINED),
+        control="|".join([*RETRAINED, *TRAININGS]),
     priority: 10
     conda:
         "../envs/gpca.yaml"
@@ -62,9 +69,9 @@ rule explain_controls:
         ),
         encoder=f"<results>/encoders/{{source}}/{CONTROL_ENCODER}/seed{{seed}}.pt",
         embeddings=f"<results>/embeddings/{{source}}/{CONTROL_ENCODER}/none/seed{{seed}}.npz",
-        retrained=collect(
-            "<results>/control_embeddings/{control}/{{source}}/seed{{seed}}.npz",
-            control=RETRAINED_CONTROLS,
+        retrained=lambda wildcards: collect(
+            f"<results>/control_embeddings/{{control}}/{wildcards.source}/seed{wildcards.seed}.npz",
+            control=retrained(wildcards),
         ),
         code=code_files(
             "gpca.steps.controls",
@@ -74,6 +81,7 @@ rule explain_controls:
     output:
         predictions="<results>/controls/{source}/seed{seed}.csv",
         samples="<results>/control_samples/{source}/seed{seed}.csv",
+        timings="<results>/timings/{source}/controls/seed{seed}.csv",
     log:
         "<logs>/controls/{source}/seed{seed}.log",
     benchmark:
@@ -94,14 +102,14 @@ rule explain_controls:
                 "icp": config["registrations"]["icp"],
             }
         ),
-        retrained=RETRAINED_CONTROLS,
+        retrained=retrained,
         others=other_sources,
     shell:
         "python -m gpca controls --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
         "--objects {input.objects} --registrations {input.registrations} --encoder {input.encoder} "
         "--embeddings {input.embeddings} --retrained {params.retrained} --retrained-embeddings {input.retrained} "
         "--others {params.others} --other-registrations {input.others} --settings {params.settings:q} "
-        "--out {output.predictions} --samples {output.samples} 2> {log}"
+        "--out {output.predictions} --samples {output.samples} --timings {output.timings} 2> {log}"
 
 
 rule control_metrics:
