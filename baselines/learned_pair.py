@@ -31,8 +31,8 @@ class LearnedPairGPCA(DescribedPairs):
         source: str,
         seed: int,
         points: int = 512,
-        draw_points: int = 128,
-        epochs: int = 12,
+        draw_points: int = 96,
+        epochs: int = 8,
         encoder_learning_rate: float = 4e-3,
         **settings,
     ) -> None:

@@ -75,8 +75,8 @@ class PairClassifier(GPCSettings):
 class LearnedPair(PairClassifier):
     """Besides, how the encoder of the pair is trained."""
 
-    draw_points: DescribedPoints = 128
-    epochs: Count = 12
+    draw_points: DescribedPoints = 96
+    epochs: Count = 8
     encoder_learning_rate: PositiveShare = 4e-3
 
 

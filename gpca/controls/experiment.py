@@ -24,7 +24,7 @@ from gpca.controls.settings import (
 )
 from gpca.controls.variants import left_out, relabelled, shows_known_object, variant
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.explainers.interface import ConceptExplainer, Describing, Encoding
+from gpca.explainers.interface import BARE, ConceptExplainer, Describing, Encoding
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.evaluation import evaluate_design
@@ -149,7 +149,7 @@ class Experiment:
         """Measure what has to be known of a registration before an explainer that reads nothing else is asked."""
         test = plain.subset(plain.rows("test")[:ASKED])
         for name, rival in self.rivals.items():
-            if rival.reads == "registrations":
+            if rival.reads == BARE:
                 bare, explainer = replace(test, attached={}), rival.make()
                 with self.costs.asking(name, len(test)):
                     described = explainer.describe(bare) if isinstance(explainer, Describing) else bare

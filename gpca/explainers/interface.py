@@ -60,6 +60,9 @@ def measured(
     return replace(registrations, attached={**registrations.attached, **own})
 
 
+BARE = "registrations"  # what an explainer reads to which nothing is attached
+
+
 @dataclass(frozen=True)
 class ExplainerEntry:
     """An explainer by name.
@@ -75,7 +78,7 @@ class ExplainerEntry:
 
     title: str
     make: Callable[..., ConceptExplainer]
-    reads: str = "registrations"
+    reads: str = BARE
     oracle: bool = False
     observed_only: bool = False
 

@@ -11,8 +11,9 @@ from typing import Any
 from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.alignment.methods.registry import left_out, method_entry
-from gpca.controls.settings import TRANSFER
+from gpca.controls.settings import TRANSFER, UNSEEN
 from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.interface import BARE
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import stand_in_clause, title_of
 from gpca.recovery.policies import policy_entry
@@ -41,7 +42,8 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "cause_explainer": list(config["diagnosis"]["explainers"]),
         "control_seed": controlled_seeds(config),
         "control": list(config["controls"]["controls"]),
-        "control_encoder": list(config["controls"]["encoders"]),
+        "control_encoder": _compared_encoders(config["controls"]),
+        "timed_control": [name for name in config["controls"]["explainers"] if explainer_entry(name).reads == BARE],
         "transfer_source": list(sources) if transfers(config, sources) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
@@ -137,6 +139,12 @@ def controlled_seeds(config: Mapping) -> list[int]:
 def transfers(config: Mapping, sources: Mapping) -> bool:
     """Return whether explainers are asked about sources that they did not learn from; one alone admits no transfer."""
     return TRANSFER in config["controls"]["controls"] and len(sources) > 1
+
+
+def _compared_encoders(controls: Mapping) -> list[str]:
+    """Return the ways to train GP-CA's encoder that are compared, on the samples that the unseen objects need."""
+    of_gpca = any(name in GPCA_FORMS for name in controls["explainers"])
+    return list(controls["encoders"]) if of_gpca and UNSEEN in controls["controls"] else []
 
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:

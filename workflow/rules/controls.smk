@@ -1,11 +1,10 @@
 # Registrations -> encoders trained under a control -> what every explainer says under all of them.
-from gpca.controls.settings import RETRAINED, TRAININGS, UNSEEN
+from gpca.controls.settings import RETRAINED, TRAININGS
 
 CONTROLS = config["controls"]
 CONTROL_SEEDS = NAMES["control_seed"]
 CONTROL_ENCODER = config["embedding"]["encoder"]
 RETRAINED_CONTROLS = [name for name in CONTROLS["controls"] if name in RETRAINED]
-TRAINED_OTHERWISE = CONTROLS["encoders"] if UNSEEN in RETRAINED_CONTROLS else []
 CONTROL_EXPLAINERS = {
     name: (config["explainers"].get(name) or {}) | (own or {})
     for name, own in CONTROLS["explainers"].items()
@@ -19,7 +18,7 @@ CONTROL_SETTINGS = {
 def retrained(wildcards):
     """Return the controls and ways of training for which a seed has encoders of their own."""
     compared = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
-    return RETRAINED_CONTROLS + (TRAINED_OTHERWISE if compared else [])
+    return RETRAINED_CONTROLS + (NAMES["control_encoder"] if compared else [])
 
 
 rule controls:
