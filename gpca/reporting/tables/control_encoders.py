@@ -56,8 +56,8 @@ def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
         },
         footnotes=(
             "Apart from the paper's protocol, all learn from the same training samples of some of the objects, and are "
-            "asked about new samples of these and about the others. In brackets: points gained or lost by the training, "
-            "on the same test samples, for the seeds that have such an encoder. " + INTERVAL,
+            "asked about new samples of these and about the others. In brackets: points gained or lost by the "
+            "training, on the same test samples, for the seeds that have such an encoder. " + INTERVAL,
         ),
     )
 
