@@ -48,7 +48,7 @@ class ControlSettings:
     """
 
     controls: tuple[Control, ...] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
-    encoders: tuple[Training, ...] = ()
+    encoders: Annotated[tuple[Training, ...], Bounds(minItems=0)] = ()
     encoder_seeds: Count = 1
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)
