@@ -6,7 +6,7 @@ for all explainers and controls of a source, so that differences are paired, als
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,8 +34,9 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     """Return accuracy and auroc_error of every control and explainer over all seeds, with 95 % intervals.
 
     By the source tested, and pooled over all. Of transfer there is a row for each source trained on, and one for all
-    others together, whose ``trained_on`` is pooled. The change is the value minus the paper's protocol's; of an
-    explainer whose encoder is trained otherwise, minus its own with the paper's training, on the same samples.
+    others together, whose ``trained_on`` is pooled. The change is the value minus the paper's protocol's, for the
+    same seeds; of an explainer whose encoder is trained otherwise, minus its own with the paper's training, on the same
+    samples.
     """
     import pandas as pd
 
@@ -45,13 +46,19 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     for source in (*sources, POOLED) if len(sources) > 1 else sources:
         of_source = judged if source == POOLED else judged[judged["source"] == source]
         for explainer, rows in of_source.groupby("explainer", sort=False):
-            measured = _measured(source, rows)
-            against = dict.fromkeys(measured, measured.get((PAPER, source)))
+            weights_B_N = _weights(source, rows)
+            groups = _groups(rows, source)
+            compared, weights_of_compared = rows, weights_B_N
             if plain := plain_of(str(explainer)):
-                same = of_source["seed"].isin(rows["seed"]) & of_source["control"].isin(rows["control"])
-                against = _measured(source, of_source[same & (of_source["explainer"] == plain)])
-            for group in measured:
-                records += _records(source, str(explainer), group, measured[group], against[group])
+                compared = of_source[(of_source["explainer"] == plain) & of_source["seed"].isin(rows["seed"])]
+                weights_of_compared = _weights(source, compared)
+            for (control, trained_on), mask in groups.items():
+                own = _measures(rows[mask], weights_B_N[:, mask])
+                other = (compared["control"] == (control if plain else PAPER)) & compared["seed"].isin(
+                    rows["seed"][mask]
+                )
+                against, _ = _measures(compared[other], weights_of_compared[:, other.to_numpy()])
+                records += _records(source, str(explainer), (control, trained_on), own, against)
     return pd.DataFrame(records, columns=list(COLUMNS))
 
 
@@ -72,19 +79,20 @@ Measured = tuple[dict[str, np.ndarray], tuple[int, int]]  # values by metric; nu
 Group = tuple[str, str]  # control, trained on
 
 
-def _measured(source: str, rows: pd.DataFrame) -> dict[Group, Measured]:
-    """Return the values of the samples as they are, and then of every draw."""
+def _weights(source: str, rows: pd.DataFrame) -> np.ndarray:
+    """Return the weights (B, N) of the samples as they are, and then of every draw."""
     factors = (rows["seed"].to_numpy(), rows["instance"].to_numpy(str))
     drawn_B_N = pigeonhole_weights(generator("control intervals", source), *factors)
-    weights_B_N = np.vstack([np.ones(len(rows)), drawn_B_N])
-    return {group: _measures(rows[mask], weights_B_N[:, mask]) for group, mask in _groups(rows, source).items()}
+    return np.vstack([np.ones(len(rows)), drawn_B_N])
 
 
-def _records(source: str, explainer: str, group: Group, measured: Measured, against: Measured) -> Iterator[tuple]:
+def _records(
+    source: str, explainer: str, group: Group, measured: Measured, against: Mapping[str, np.ndarray]
+) -> Iterator[tuple]:
     (control, trained_on), (values, counts) = group, measured
     for metric, value_B in values.items():
         if np.isfinite(value_B[0]):
-            change_B = value_B - against[0][metric]
+            change_B = value_B - against[metric]
             own = (control, source, trained_on, explainer, metric, *counts)
             yield (*own, value_B[0], *bounds(value_B[1:]), change_B[0], *bounds(change_B[1:]))
 

@@ -39,7 +39,7 @@ class ControlSettings:
     Attributes:
         controls: their names.
         encoders: other ways to train GP-CA's encoder, compared on known and on unseen objects.
-        encoder_seeds: the first so many of `seeds`, for which they are.
+        encoder_seeds: the first so many of `seeds`, for which further encoders than that of unseen objects are trained.
         seeds: the first so many of the run's.
         draw_points: range of the random number of points of a cloud where density is matched.
         folds: a source's objects are dealt into so many; one of them is unseen.

@@ -84,6 +84,14 @@ def test_a_change_is_that_of_the_same_draws_of_objects_and_seeds(files, tmp_path
     assert rows.loc["paper", POOLED, POOLED, "gpca", "accuracy"]["samples"] == 120
 
 
+def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_protocol(files):
+    parts = [said("a", "a", "paper", "gpca", 27)]
+    write_csv(files[1], pd.concat(parts))  # another seed, in which all goes wrong
+    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
+    density = rows.loc["density", "a", "gpca", "accuracy"]
+    assert (density["seeds"], density["value"], density["change"]) == pytest.approx((1, 0.7, -0.2))
+
+
 def test_the_change_of_an_encoder_trained_otherwise_is_against_the_papers_training_on_the_same_samples(files):
     frame = pd.read_csv(files[0], keep_default_na=False)  # of one seed alone
     added = [("seen_objects", "gpca", 3), ("seen_objects", "gpca_two_layer_head", 6)]

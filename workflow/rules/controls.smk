@@ -1,24 +1,35 @@
 # Registrations -> encoders trained under a control -> what every explainer says under all of them.
-from gpca.controls.settings import RETRAINED, TRAININGS
+from gpca.controls.settings import RETRAINED, TRAININGS, UNSEEN
 
 CONTROLS = config["controls"]
 CONTROL_SEEDS = NAMES["control_seed"]
 CONTROL_ENCODER = config["embedding"]["encoder"]
-RETRAINED_CONTROLS = [name for name in CONTROLS["controls"] if name in RETRAINED]
 CONTROL_EXPLAINERS = {
     name: (config["explainers"].get(name) or {}) | (own or {})
     for name, own in CONTROLS["explainers"].items()
 }
-CONTROL_SETTINGS = {
-    "controls": {name: CONTROLS[name] for name in CONTROLS if name != "explainers"},
-    "encoder": config["encoders"][CONTROL_ENCODER],
-}
+
+
+def controls_of(seed):
+    """Return the controls of a seed: all, but those that need a further encoder for the first seeds alone."""
+    further = int(seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    return [
+        n for n in CONTROLS["controls"] if further or n == UNSEEN or n not in RETRAINED
+    ]
 
 
 def retrained(wildcards):
     """Return the controls and ways of training for which a seed has encoders of their own."""
-    compared = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
-    return RETRAINED_CONTROLS + (NAMES["control_encoder"] if compared else [])
+    further = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    own = [name for name in controls_of(wildcards.seed) if name in RETRAINED]
+    return own + (NAMES["control_encoder"] if further else [])
+
+
+def control_settings(wildcards, **further):
+    own = {name: CONTROLS[name] for name in CONTROLS if name != "explainers"}
+    own["controls"] = controls_of(wildcards.seed)
+    encoder = config["encoders"][CONTROL_ENCODER]
+    return as_json({"controls": own, "encoder": encoder, **further})
 
 
 rule controls:
@@ -51,7 +62,7 @@ rule train_control:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=as_json(CONTROL_SETTINGS),
+        settings=control_settings,
     shell:
         "python -m gpca train_control --threads {threads} --control {wildcards.control} "
         "--registrations {input.registrations} --source {wildcards.source} --seed {wildcards.seed} "
@@ -93,13 +104,11 @@ rule explain_controls:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=as_json(
-            CONTROL_SETTINGS
-            | {
-                "explainers": CONTROL_EXPLAINERS,
-                "uncertainty": config["uncertainty"].get("removal", {}),
-                "icp": config["registrations"]["icp"],
-            }
+        settings=lambda wildcards: control_settings(
+            wildcards,
+            explainers=CONTROL_EXPLAINERS,
+            uncertainty=config["uncertainty"].get("removal", {}),
+            icp=config["registrations"]["icp"],
         ),
         retrained=retrained,
         others=other_sources,
