@@ -32,7 +32,7 @@ class LearnedPairGPCA(DescribedPairs):
         seed: int,
         points: int = 512,
         draw_points: int = 96,
-        epochs: int = 8,
+        epochs: int = 6,
         encoder_learning_rate: float = 4e-3,
         **settings,
     ) -> None:

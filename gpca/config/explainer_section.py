@@ -76,7 +76,7 @@ class LearnedPair(PairClassifier):
     """Besides, how the encoder of the pair is trained."""
 
     draw_points: DescribedPoints = 96
-    epochs: Count = 8
+    epochs: Count = 6
     encoder_learning_rate: PositiveShare = 4e-3
 
 
