@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from gpca.classifier.settings import GPCSettings, LearningRate
-from gpca.settings import Bounds, Count, Positive
+from gpca.settings import Bounds, Count, Positive, PositiveShare
 
 DescribedPoints = Annotated[int, Bounds(minimum=16, maximum=65536)]
 
@@ -81,6 +81,15 @@ class PairClassifier(GPCSettings):
 
 
 @dataclass(frozen=True)
+class LearnedPair(PairClassifier):
+    """Besides, how the encoder of the pair is trained."""
+
+    draw_points: DescribedPoints = 96
+    epochs: Count = 6
+    encoder_learning_rate: PositiveShare = 4e-3
+
+
+@dataclass(frozen=True)
 class ForestOfPairs:
     """A forest on distances, and how many points of each cloud these are between."""
 
@@ -122,6 +131,8 @@ EXPLAINERS = {
     "residuals_forest": ForestOfResiduals | None,
     "residuals_rules": RulesOfResiduals | None,
     "gpca_pair": PairClassifier | None,
+    "gpca_pair_dgcnn": LearnedPair | None,
+    "gpca_pair_attention": LearnedPair | None,
     "pair_forest": ForestOfPairs | None,
     "density": DensityOfPairs | None,
 }

@@ -26,15 +26,18 @@ def encode(
     """Train an encoder as the paper's is trained, but for the control, and embed the samples of its variant.
 
     With matched density every draw from a cloud has a random number of points; the clouds are whole, as each epoch
-    draws anew. Of unseen objects it sees neither training nor test samples.
+    draws anew. Of unseen objects it sees neither training nor test samples; so do those that are trained otherwise, by
+    such draws or with a head of two layers.
 
     Returns:
         the arrays of a file of embeddings, and the training curve.
     """
-    if control == "density":
+    if control in ("density", "random_draws"):
         fewest, most = settings.draw_points
         encoder = replace(encoder, fewest_points=fewest, draw_points=most)
-    else:
+    if control == "two_layer_head":
+        encoder = replace(encoder, head="two_layer")
+    if control != "density":
         registrations = of_unseen_objects(registrations, settings.folds, source, seed)
     name = f"{source} under {control}"
     model, curve = train_encoder(registrations, name, seed, encoder, checkpoint)

@@ -3,16 +3,29 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.attribution.predictions import prediction_frame
+from gpca.controls.costs import ASKED, Costs
 from gpca.controls.rivals import Embed, Rival, described_for
-from gpca.controls.settings import PAPER, RELABELLED, RETRAINED, TRANSFER, ControlSettings
-from gpca.controls.variants import left_out, relabelled, variant
+from gpca.controls.settings import (
+    PAPER,
+    RELABELLED,
+    RETRAINED,
+    SEEN,
+    TRANSFER,
+    UNSEEN,
+    ControlSettings,
+    trained_otherwise,
+)
+from gpca.controls.variants import left_out, relabelled, shows_known_object, variant
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.interface import BARE, Describing, Encoding
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.evaluation import evaluate_design
@@ -23,6 +36,7 @@ if TYPE_CHECKING:
 
 PARTS, FEWEST_OF_PART = 5, 60  # of the training samples whose labels are shuffled
 LABELS = ("control", "tested", "explainer")  # columns before those of a prediction file
+Attach = Callable[[Registrations], Registrations]
 
 
 @dataclass(frozen=True)
@@ -36,7 +50,9 @@ class Experiment:
         uncertainty: of Monte-Carlo ICP, for explainers that read a covariance; its ICP is that of the registrations.
         rivals: by name.
         embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
-        embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one.
+        embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one,
+            and by those that are trained otherwise, of the samples of unseen objects.
+        costs: what the explainers took, of the last run.
     """
 
     source: str
@@ -47,6 +63,7 @@ class Experiment:
     rivals: Mapping[str, Rival]
     embed: Embed
     embeddings: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    costs: Costs = field(default_factory=Costs)
 
     def run(self, registrations: Registrations, others: Mapping[str, Registrations]) -> pd.DataFrame:
         """Return a row for each control, explainer and test sample.
@@ -62,15 +79,22 @@ class Experiment:
         import pandas as pd
 
         plain = self._described(replace(registrations, attached=dict(self.embeddings[PAPER])), self.source)
-        tests = {self.source: plain.subset(plain.rows("test"))}
+        embeds = self._learnt(PAPER, plain)
+        plain = _attached(embeds, plain)
+        tests = self._tests(PAPER, plain)
         admitted = [control for control in self.settings.controls if self._admits(control, registrations, others)]
         if TRANSFER in admitted:
-            tests |= {name: self._asked(name, of_other) for name, of_other in others.items()}
-        frames = list(self._explained(PAPER, plain, tests))
+            tests |= {
+                (TRANSFER, name): _attached(embeds, self._asked(name, of_other)) for name, of_other in others.items()
+            }
+        frames = list(self._explained(PAPER, plain, tests, self.rivals))
+        self._time_asking(plain, embeds)
         for control in admitted:
             if control != TRANSFER:
-                changed = self._changed(control, plain)
-                frames += self._explained(control, changed, {self.source: changed.subset(changed.rows("test"))})
+                changed = self._changed(control, plain, embeds)
+                frames += self._explained(control, changed, self._tests(control, changed), self.rivals)
+                if control == UNSEEN:
+                    frames += self._trained_otherwise(changed)
         return pd.concat(frames, ignore_index=True)
 
     def _admits(self, control: str, registrations: Registrations, others: Mapping) -> bool:
@@ -86,14 +110,54 @@ class Experiment:
         test = registrations.subset(registrations.rows("test"))
         return self._described(self._embedded(test, source), source)
 
-    def _changed(self, control: str, plain: Registrations) -> Registrations:
+    def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
         """Return the registrations under a control, with all that explainers read attached."""
         changed = variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
-        if control == "unseen_objects":  # what was measured of each stays
-            return replace(changed, attached={**changed.attached, **self.embeddings[control]})
-        if control in RETRAINED:
-            return self._described(replace(changed, attached=dict(self.embeddings[control])), self.source)
-        return self._described(self._embedded(changed, self.source), self.source) if control == "reversed" else changed
+        if control == UNSEEN:  # what was measured of each stays
+            changed = replace(changed, attached={**changed.attached, **self.embeddings[control]})
+        elif control in RETRAINED:
+            changed = self._described(replace(changed, attached=dict(self.embeddings[control])), self.source)
+        elif control == "reversed":
+            return _attached(embeds, self._described(self._embedded(changed, self.source), self.source))
+        return _attached(self._learnt(control, changed), changed) if control in RETRAINED else changed
+
+    def _learnt(self, control: str, registrations: Registrations) -> dict[str, Attach]:
+        """Return what attaches the embeddings by the rivals' own encoders, learnt from the training samples."""
+        train = registrations.subset(registrations.rows("train"))
+        embeds = {}
+        for name, rival in self.rivals.items():
+            explainer = rival.make()
+            if isinstance(explainer, Encoding):
+                with self.costs.learning(control, name):
+                    embeds[name] = explainer.learn(train)
+        return embeds
+
+    def _time_asking(self, plain: Registrations, embeds: Mapping[str, Attach]) -> None:
+        """Measure what has to be known of a registration before an explainer that reads nothing else is asked."""
+        test = plain.subset(plain.rows("test")[:ASKED])
+        for name, rival in self.rivals.items():
+            if rival.reads == BARE:
+                bare, explainer = replace(test, attached={}), rival.make()
+                with self.costs.asking(name, len(test)):
+                    described = explainer.describe(bare) if isinstance(explainer, Describing) else bare
+                    _attached({name: embeds[name]} if name in embeds else {}, described)
+
+    def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
+        """Return the test samples by what they are tests of and their source; those of known objects apart."""
+        test = changed.subset(changed.rows("test"))
+        if control != UNSEEN:
+            return {(control, self.source): test}
+        known = shows_known_object(changed)[changed.split == "test"]
+        of_rows = {UNSEEN: np.flatnonzero(~known), SEEN: np.flatnonzero(known)}
+        return {(name, self.source): test.subset(rows) for name, rows in of_rows.items() if len(rows)}
+
+    def _trained_otherwise(self, changed: Registrations) -> Iterator[pd.DataFrame]:
+        """Yield what GP-CA says of known and of unseen objects on encoders that are trained otherwise."""
+        for way in self.settings.encoders:
+            if way in self.embeddings:
+                own = replace(changed, attached={**changed.attached, **self.embeddings[way]})
+                forms = {trained_otherwise(n, way): rival for n, rival in self.rivals.items() if n in GPCA_FORMS}
+                yield from self._explained(UNSEEN, own, self._tests(UNSEEN, own), forms)
 
     def _embedded(self, registrations: Registrations, source: str) -> Registrations:
         h_S_d, logits_S_C = self.embed(registrations, source)
@@ -108,25 +172,31 @@ class Experiment:
         return described_for(self.rivals, described)
 
     def _explained(
-        self, control: str, learnt: Registrations, tests: Mapping[str, Registrations]
+        self,
+        control: str,
+        learnt: Registrations,
+        tests: Mapping[tuple[str, str], Registrations],
+        rivals: Mapping[str, Rival],
     ) -> Iterator[pd.DataFrame]:
         """Yield what each explainer says of the test samples after learning from the training samples."""
         for train, asked in self._lessons(control, learnt.subset(learnt.rows("train")), tests):
-            for name, rival in self.rivals.items():
+            for name, rival in rivals.items():
                 explainer = rival.make()
                 if control in RELABELLED and getattr(explainer, "trained_with_encoder", False):
                     continue
-                explainer.fit(train)
-                for tested, test in asked.items():
-                    frame = prediction_frame(test, explainer.explain(test.without_labels()))
-                    of_test = control if tested == self.source else TRANSFER
-                    for place, entry in enumerate(zip(LABELS, (of_test, tested, name), strict=True)):
+                with self.costs.learning(control, name):
+                    explainer.fit(train)
+                for of_test, test in asked.items():
+                    attribution = explainer.explain(test.without_labels())
+                    self.costs.explained(of_test[0], name, attribution.seconds_N)
+                    frame = prediction_frame(test, attribution)
+                    for place, entry in enumerate(zip(LABELS, (*of_test, name), strict=True)):
                         frame.insert(place, *entry)
                     yield frame
 
     def _lessons(
-        self, control: str, train: Registrations, tests: Mapping[str, Registrations]
-    ) -> Iterator[tuple[Registrations, Mapping[str, Registrations]]]:
+        self, control: str, train: Registrations, tests: Mapping[tuple[str, str], Registrations]
+    ) -> Iterator[tuple[Registrations, Mapping[tuple[str, str], Registrations]]]:
         """Yield training samples, and the test samples that are asked of what has learnt from them.
 
         Labels that say nothing make an explainer name a whole cluster of samples by chance. So they are shuffled in
@@ -141,6 +211,10 @@ class Experiment:
             for part in range(parts):
                 of_part = relabelled(control, _dealt(train, part, parts), self.source, self.seed, part)
                 yield of_part, {name: _dealt(test, part, parts) for name, test in tests.items()}
+
+
+def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Registrations:
+    return reduce(lambda found, embed: embed(found), embeds.values(), registrations)
 
 
 def _dealt(registrations: Registrations, part: int, parts: int) -> Registrations:

@@ -6,7 +6,7 @@ for all explainers and controls of a source, so that differences are paired, als
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ import numpy as np
 from gpca.attribution.bootstrap import bounds, pigeonhole_weights
 from gpca.controls.judged import read_controls
 from gpca.controls.metrics import auroc_error
-from gpca.controls.settings import PAPER, TRANSFER
+from gpca.controls.settings import PAPER, TRANSFER, plain_of
 from gpca.csv_file import numbers, read_csv
 from gpca.diagnosis.judged import POOLED
 from gpca.seeds import generator
@@ -34,7 +34,9 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     """Return accuracy and auroc_error of every control and explainer over all seeds, with 95 % intervals.
 
     By the source tested, and pooled over all. Of transfer there is a row for each source trained on, and one for all
-    others together, whose ``trained_on`` is pooled. The change is the value minus the paper's protocol's.
+    others together, whose ``trained_on`` is pooled. The change is the value minus the paper's protocol's, for the
+    same seeds; of an explainer whose encoder is trained otherwise, minus its own with the paper's training, on the same
+    samples.
     """
     import pandas as pd
 
@@ -44,11 +46,19 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     for source in (*sources, POOLED) if len(sources) > 1 else sources:
         of_source = judged if source == POOLED else judged[judged["source"] == source]
         for explainer, rows in of_source.groupby("explainer", sort=False):
-            factors = (rows["seed"].to_numpy(), rows["instance"].to_numpy(str))
-            drawn_B_N = pigeonhole_weights(generator("control intervals", source), *factors)
-            weights_B_N = np.vstack([np.ones(len(rows)), drawn_B_N])
-            for of_group in _of_explainer(source, rows, weights_B_N):
-                records.append((*of_group[:3], explainer, *of_group[3:]))
+            weights_B_N = _weights(source, rows)
+            groups = _groups(rows, source)
+            compared, weights_of_compared = rows, weights_B_N
+            if plain := plain_of(str(explainer)):
+                compared = of_source[(of_source["explainer"] == plain) & of_source["seed"].isin(rows["seed"])]
+                weights_of_compared = _weights(source, compared)
+            for (control, trained_on), mask in groups.items():
+                own = _measures(rows[mask], weights_B_N[:, mask])
+                other = (compared["control"] == (control if plain else PAPER)) & compared["seed"].isin(
+                    rows["seed"][mask]
+                )
+                against, _ = _measures(compared[other], weights_of_compared[:, other.to_numpy()])
+                records += _records(source, str(explainer), (control, trained_on), own, against)
     return pd.DataFrame(records, columns=list(COLUMNS))
 
 
@@ -65,18 +75,29 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
     return rows
 
 
-def _of_explainer(source: str, rows: pd.DataFrame, weights_B_N: np.ndarray) -> Iterator[tuple]:
-    measured = {group: _measures(rows[mask], weights_B_N[:, mask]) for group, mask in _groups(rows, source).items()}
-    for (control, trained_on), (of_group, counts) in measured.items():
-        for metric, value_B in of_group.items():
-            if not np.isfinite(value_B[0]):
-                continue
-            change_B = value_B - measured[PAPER, source][0][metric]
-            own = (control, source, trained_on, metric, *counts)
+Measured = tuple[dict[str, np.ndarray], tuple[int, int]]  # values by metric; numbers of samples and seeds
+Group = tuple[str, str]  # control, trained on
+
+
+def _weights(source: str, rows: pd.DataFrame) -> np.ndarray:
+    """Return the weights (B, N) of the samples as they are, and then of every draw."""
+    factors = (rows["seed"].to_numpy(), rows["instance"].to_numpy(str))
+    drawn_B_N = pigeonhole_weights(generator("control intervals", source), *factors)
+    return np.vstack([np.ones(len(rows)), drawn_B_N])
+
+
+def _records(
+    source: str, explainer: str, group: Group, measured: Measured, against: Mapping[str, np.ndarray]
+) -> Iterator[tuple]:
+    (control, trained_on), (values, counts) = group, measured
+    for metric, value_B in values.items():
+        if np.isfinite(value_B[0]):
+            change_B = value_B - against[metric]
+            own = (control, source, trained_on, explainer, metric, *counts)
             yield (*own, value_B[0], *bounds(value_B[1:]), change_B[0], *bounds(change_B[1:]))
 
 
-def _groups(rows: pd.DataFrame, source: str) -> dict[tuple[str, str], np.ndarray]:
+def _groups(rows: pd.DataFrame, source: str) -> dict[Group, np.ndarray]:
     """Return (control, trained on) -> which rows are of it."""
     control, trained_on = rows["control"].to_numpy(str), rows["trained_on"].to_numpy(str)
     groups = {}
@@ -89,7 +110,7 @@ def _groups(rows: pd.DataFrame, source: str) -> dict[tuple[str, str], np.ndarray
     return groups
 
 
-def _measures(rows: pd.DataFrame, weights_B_N: np.ndarray) -> tuple[dict[str, np.ndarray], tuple[int, int]]:
+def _measures(rows: pd.DataFrame, weights_B_N: np.ndarray) -> Measured:
     right_N = rows["right"].to_numpy()
     with np.errstate(divide="ignore", invalid="ignore"):
         accuracy_B = (weights_B_N * right_N).sum(axis=1) / weights_B_N.sum(axis=1)

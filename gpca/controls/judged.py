@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gpca.attribution.metrics import source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.controls.experiment import LABELS
-from gpca.controls.settings import CONTROLS, PAPER
+from gpca.controls.settings import CONTROLS, PAPER, SEEN
 from gpca.csv_file import numbers
 from gpca.errors import InputError
 from gpca.objects.views import instance_of
@@ -38,7 +38,7 @@ def read_controls(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     for path in prediction_files:
         _, trained_on, seed = source_method_seed(path)
         rows = read_predictions(path, LABELS)
-        if unknown := sorted(set(rows["control"]) - {PAPER, *CONTROLS}):
+        if unknown := sorted(set(rows["control"]) - {PAPER, SEEN, *CONTROLS}):
             raise InputError(path, f"unknown control '{unknown[0]}'", f"known are {', '.join(CONTROLS)}")
         instances = rows["tested"] + "/" + rows["object"].map(instance_of)
         frames.append(

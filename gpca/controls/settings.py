@@ -21,7 +21,11 @@ Control = Literal[
     "transfer",
 ]
 CONTROLS: tuple[str, ...] = get_args(Control)
-RETRAINED = ("density", "unseen_objects")  # need an encoder of their own
+UNSEEN = "unseen_objects"
+SEEN = "seen_objects"  # tests of what was learnt for unseen objects, on new samples of the objects that it learnt from
+RETRAINED = ("density", UNSEEN)  # need an encoder of their own
+Training = Literal["random_draws", "two_layer_head"]
+TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
 WRONG_LABELS = {f"label_noise_{percent}": percent / 100 for percent in (5, 10, 20, 30)}  # share of the training labels
 RELABELLED = (*WRONG_LABELS, "shuffled")
 TRANSFER = "transfer"
@@ -34,6 +38,8 @@ class ControlSettings:
 
     Attributes:
         controls: their names.
+        encoders: other ways to train GP-CA's encoder, compared on known and on unseen objects.
+        encoder_seeds: the first so many of `seeds`, for which further encoders than that of unseen objects are trained.
         seeds: the first so many of the run's.
         draw_points: range of the random number of points of a cloud where density is matched.
         folds: a source's objects are dealt into so many; one of them is unseen.
@@ -42,6 +48,8 @@ class ControlSettings:
     """
 
     controls: tuple[Control, ...] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
+    encoders: Annotated[tuple[Training, ...], Bounds(minItems=0)] = ()
+    encoder_seeds: Count = 1
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)
     folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3
@@ -57,6 +65,16 @@ class ControlSettings:
     def from_dict(cls, settings: dict) -> ControlSettings:
         """Build from the config's section ``controls``; its explainers are not among the settings."""
         given: dict[str, Any] = {name: value for name, value in settings.items() if name != "explainers"}
-        for name in {"controls", "draw_points"} & set(given):
+        for name in {"controls", "encoders", "draw_points"} & set(given):
             given[name] = tuple(given[name])
         return cls(**given)
+
+
+def trained_otherwise(explainer: str, way: str) -> str:
+    """Return the name of an explainer whose encoder is trained in another way."""
+    return f"{explainer}_{way}"
+
+
+def plain_of(explainer: str) -> str | None:
+    """Return the explainer that :func:`trained_otherwise` named so; None of one with the paper's training."""
+    return next((explainer.removesuffix(f"_{way}") for way in TRAININGS if explainer.endswith(f"_{way}")), None)

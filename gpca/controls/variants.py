@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.controls.settings import WRONG_LABELS, ControlSettings
+from gpca.controls.settings import TRAININGS, UNSEEN, WRONG_LABELS, ControlSettings
 from gpca.encoders.settings import OF_ANY_SIZE
 from gpca.objects.views import instance_of
 from gpca.pairs.dataset import Registrations, ragged
@@ -21,11 +21,11 @@ FEWEST_OBJECTS = 5  # instances; of fewer, the objects that are left to learn fr
 
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:
     """Return why these registrations, or the backbone of their encoder, do not admit a control; None where they do."""
-    if control == "unseen_objects":
+    if control in (UNSEEN, *TRAININGS):
         found = len(set(instances(registrations)))
         if found < FEWEST_OBJECTS:
             return f"it needs {FEWEST_OBJECTS} objects or more, there are {found}"
-    if control == "density":
+    if control in ("density", "random_draws"):
         fewest, least = int(np.diff(registrations.offsets).min()), settings.draw_points[0]
         if fewest < least:
             return f"its smallest draw has {least} points, and a cloud has {fewest}"
@@ -43,7 +43,7 @@ def variant(
     """
     if control == "density":
         return thinned(registrations, settings.draw_points, source, seed)
-    if control == "unseen_objects":
+    if control in (UNSEEN, *TRAININGS):
         return of_unseen_objects(registrations, settings.folds, source, seed)
     if control == "reversed":
         return registered_backwards(registrations, icp)
@@ -68,7 +68,7 @@ def thinned(registrations: Registrations, points: tuple[int, int], *axes: object
 
 
 def of_unseen_objects(registrations: Registrations, folds: int, source: str, seed: int) -> Registrations:
-    """Return training samples of most objects, and all samples of the others as test samples.
+    """Return training samples of most objects; test samples are those of the same objects, and all of the others.
 
     The objects of a source are dealt into folds once for all seeds, and a seed leaves out the fold of its number: so
     many seeds as there are folds test every object once. Views of one instance are in the same fold.
@@ -76,12 +76,19 @@ def of_unseen_objects(registrations: Registrations, folds: int, source: str, see
     of_row = instances(registrations)
     names = generator(source, "folds").permutation(np.unique(of_row))
     unseen = np.isin(of_row, names[seed % folds :: folds])
-    train, test = np.flatnonzero(~unseen & (registrations.split == "train")), np.flatnonzero(unseen)
+    train = np.flatnonzero(~unseen & (registrations.split == "train"))
+    test = np.concatenate([np.flatnonzero(~unseen & (registrations.split == "test")), np.flatnonzero(unseen)])
     chosen = registrations.subset(np.concatenate([train, test]))
     # Numbered anew, since the test samples come from both splits.
     split = np.repeat(["train", "test"], [len(train), len(test)])
     sample = np.concatenate([chosen.sample[: len(train)], np.arange(len(test))])
     return replace(chosen, split=split, sample=sample)
+
+
+def shows_known_object(registrations: Registrations) -> np.ndarray:
+    """Return which samples (S,) show an object of the training samples."""
+    of_row = instances(registrations)
+    return np.isin(of_row, of_row[registrations.split == "train"])
 
 
 def relabelled(control: str, train: Registrations, *axes: object) -> Registrations:

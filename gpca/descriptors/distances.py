@@ -26,11 +26,13 @@ class LocalPlanes:
 
     Attributes:
         tree: of the points.
+        spacing: (N,) distance to the nearest other point.
         normals: (N, 3), without a sign.
         thickness, extent: (N,) root mean square distance of the neighbours from the plane, and along its longest axis.
     """
 
     tree: cKDTree
+    spacing: np.ndarray
     normals: np.ndarray
     thickness: np.ndarray
     extent: np.ndarray
@@ -40,12 +42,12 @@ class LocalPlanes:
         """Return the planes of least squares through the nearest points of each point (N, 3)."""
         tree = cKDTree(points)
         neighbours = min(NEIGHBOURS, len(points))
-        _, rows_N_k = tree.query(points, neighbours)
+        distances_N_k, rows_N_k = tree.query(points, neighbours)
         around_N_k_3 = points[rows_N_k]
         offsets_N_k_3 = around_N_k_3 - around_N_k_3.mean(axis=1, keepdims=True)
         squares_N_3, axes_N_3_3 = np.linalg.eigh(_second_moments(offsets_N_k_3))
         spread_N_3 = np.sqrt(np.maximum(squares_N_3, 0) / neighbours)
-        return cls(tree, axes_N_3_3[:, :, 0], spread_N_3[:, 0], spread_N_3[:, 2])
+        return cls(tree, distances_N_k[:, 1], axes_N_3_3[:, :, 0], spread_N_3[:, 0], spread_N_3[:, 2])
 
 
 def _second_moments(offsets_N_k_3: np.ndarray) -> np.ndarray:
@@ -59,24 +61,61 @@ def _dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
     return a_N_3[:, 0] * b_N_3[:, 0] + a_N_3[:, 1] * b_N_3[:, 1] + a_N_3[:, 2] * b_N_3[:, 2]
 
 
-def describe_distances(pair: ObservedPair) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class MatchedPair:
+    """A pair whose points know their partners: the nearest points of the other cloud.
+
+    Attributes:
+        observed, model: the local planes of either cloud.
+        partner_N, partner_M: row of each point's partner in the other cloud.
+        to_model_N, to_observed_M: the distance there.
+        plane_N, plane_M: the distance from the partner's plane.
+        cosine_N: |cosine| between the normals of an observed point and its partner.
+    """
+
+    observed: LocalPlanes
+    model: LocalPlanes
+    partner_N: np.ndarray
+    partner_M: np.ndarray
+    to_model_N: np.ndarray
+    to_observed_M: np.ndarray
+    plane_N: np.ndarray
+    plane_M: np.ndarray
+    cosine_N: np.ndarray
+
+    @classmethod
+    def of(cls, pair: ObservedPair) -> MatchedPair:
+        """Find planes and partners of a pair."""
+        observed, model = LocalPlanes.of(pair.observed), LocalPlanes.of(pair.model)
+        to_model_N, partner_N = model.tree.query(pair.observed)
+        to_observed_M, partner_M = observed.tree.query(pair.model)
+        return cls(
+            *(observed, model, partner_N, partner_M, to_model_N, to_observed_M),
+            plane_N=np.abs(_dots(pair.observed - pair.model[partner_N], model.normals[partner_N])),
+            plane_M=np.abs(_dots(pair.model - pair.observed[partner_M], observed.normals[partner_M])),
+            cosine_N=np.abs(_dots(observed.normals, model.normals[partner_N])),
+        )
+
+    @property
+    def cosine_M(self) -> np.ndarray:
+        """|cosine| (M,) between the normals of a point of the model and its partner."""
+        return np.abs(_dots(self.model.normals, self.observed.normals[self.partner_M]))
+
+
+def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the 52 distances of the pair, and what else its local planes tell (45 numbers).
 
     The second are quantiles of the model's distance from the observed cloud's planes, of |cosine| between the normals
     of partners, and of the model's thickness; the median spacings and extents of both; and the logarithms of their
     numbers of points.
     """
-    observed, model = LocalPlanes.of(pair.observed), LocalPlanes.of(pair.model)
-    to_model_N, partner_N = model.tree.query(pair.observed)
-    to_observed_M, partner_M = observed.tree.query(pair.model)
-    plane_N = np.abs(_dots(pair.observed - pair.model[partner_N], model.normals[partner_N]))
-    plane_M = np.abs(_dots(pair.model - pair.observed[partner_M], observed.normals[partner_M]))
-    cosine_N = np.abs(_dots(observed.normals, model.normals[partner_N]))
-    spacings = [np.median(planes.tree.query(planes.tree.data, 2)[0][:, 1]) for planes in (observed, model)]
+    matched = matched or MatchedPair.of(pair)
+    observed, model = matched.observed, matched.model
+    spacings = [np.median(planes.spacing) for planes in (observed, model)]
     extents = [np.median(planes.extent) for planes in (observed, model)]
     counts = [np.log(len(cloud)) for cloud in (pair.observed, pair.model)]
-    distances = [to_model_N, to_observed_M, plane_N, observed.thickness]
-    shapes = [plane_M, cosine_N, model.thickness]
+    distances = [matched.to_model_N, matched.to_observed_M, matched.plane_N, observed.thickness]
+    shapes = [matched.plane_M, matched.cosine_N, model.thickness]
     return (
         np.concatenate([np.quantile(values, QUANTILES) for values in distances]),
         np.concatenate([*(np.quantile(values, QUANTILES) for values in shapes), spacings, extents, counts]),

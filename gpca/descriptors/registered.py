@@ -6,25 +6,28 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse
 from gpca.alignment.twist import log
-from gpca.descriptors.distances import describe_distances
+from gpca.descriptors.distances import MatchedPair, describe_distances
 from gpca.descriptors.groups import QUANTILES
 from gpca.descriptors.pair import ObservedPair, displacements
+from gpca.descriptors.points import CHANNELS, describe_points, log_of_ratio
 from gpca.pairs.dataset import Registrations
 from gpca.progress import progress
 from gpca.seeds import generator
 
 SMALLEST = 1e-5  # diameters; nothing is nearer that could be told from zero
-LEAST = 0.02  # of the model's spacing, to which lengths are raised: a flat face is not infinitely thin
 COARSE = slice(0, QUANTILES, 3)  # five of the thirteen quantiles say as much of a relation
 WIDTHS = {"distances": 4 * QUANTILES, "relations": 35, "densities": 2}
+POINTS = "points"
+MOTION = 5  # of the relations, the last: what ICP did
 
 
 def describe_registrations(registrations: Registrations, *axes: object, points: int) -> dict[str, np.ndarray]:
-    """Return the groups of `WIDTHS`, each (N, F), of N registrations.
+    """Return the groups of `WIDTHS`, each (N, F), of N registrations, and what their points are told.
 
     - distances: the 52 of :func:`gpca.descriptors.distances.describe_distances`, in diameters.
     - relations: what of a pair does not depend on which object it is (:func:`relations`).
     - densities: logarithms of spacing and extent of the observed cloud relative to the model's.
+    - points: (N, 2, points, 7) of :func:`gpca.descriptors.points.describe_points`.
 
     Args:
         registrations: N of them.
@@ -34,8 +37,10 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
     rows = []
     for row in progress(range(len(registrations)), "descriptions of pairs"):
         random = generator(*axes, "pair", registrations.split[row], registrations.sample[row])
-        rows.append(_describe(observed_once(registrations, row, points, random)))
-    return {name: np.array([row[name] for row in rows]).reshape(len(rows), width) for name, width in WIDTHS.items()}
+        rows.append(_describe(observed_once(registrations, row, points, random), points))
+    groups = {name: np.array([row[name] for row in rows]).reshape(len(rows), width) for name, width in WIDTHS.items()}
+    of_points = [row[POINTS] for row in rows]
+    return groups | {POINTS: np.array(of_points, np.float32).reshape(len(rows), 2, points, CHANNELS)}
 
 
 def observed_once(registrations: Registrations, row: int, points: int, random: np.random.Generator) -> ObservedPair:
@@ -55,13 +60,15 @@ def observed_once(registrations: Registrations, row: int, points: int, random: n
     )
 
 
-def _describe(pair: ObservedPair) -> dict[str, np.ndarray]:
-    distances, planes = describe_distances(pair)
+def _describe(pair: ObservedPair, points: int) -> dict[str, np.ndarray]:
+    matched = MatchedPair.of(pair)
+    distances, planes = describe_distances(pair, matched)
     spacing, model_spacing, extent, model_extent = np.log(np.maximum(planes[3 * QUANTILES :][:4], SMALLEST))
     return {
         "distances": distances,
         "relations": relations(pair, distances, planes),
         "densities": np.array([spacing - model_spacing, extent - model_extent]),
+        POINTS: describe_points(pair, matched, points),
     }
 
 
@@ -83,7 +90,7 @@ def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> 
     spacing, usual_thickness = planes[3 * QUANTILES + 1], np.median(model_thickness)
 
     def log_ratio(lengths: np.ndarray, to: np.ndarray | float) -> np.ndarray:
-        return np.log(np.maximum(lengths, LEAST * spacing)) - np.log(np.maximum(to, LEAST * spacing))
+        return log_of_ratio(lengths, to, spacing)
 
     moved = log(inverse(pair.T_init)[None])[0]
     return np.concatenate(

@@ -21,16 +21,19 @@ class DGCNN(nn.Module):
     Args:
         k: neighbours per point, the point itself included.
         point_features: width of the point-wise layer.
+        widths: of the EdgeConvs.
+        inputs: numbers of a point; its coordinates, unless there are more.
 
     Attributes:
         embedding_size: d = 2 · point_features.
     """
 
-    def __init__(self, k: int = 20, point_features: int = 256) -> None:
+    def __init__(
+        self, k: int = 20, point_features: int = 256, widths: Sequence[int] = (64, 64, 128, 256), inputs: int = 3
+    ) -> None:
         super().__init__()
-        widths = (64, 64, 128, 256)
         self.edge_convs = nn.ModuleList(
-            EdgeConv(inputs, outputs, k) for inputs, outputs in zip((3, *widths[:-1]), widths, strict=True)
+            EdgeConv(before, after, k) for before, after in zip((inputs, *widths[:-1]), widths, strict=True)
         )
         self.point_layer = PointLinear(sum(widths), point_features, bias=False)
         self.point_norm = nn.BatchNorm1d(point_features)

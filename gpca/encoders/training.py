@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -27,6 +28,7 @@ from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 
 HIDDEN = 256  # units of a head of two layers
+Draw = Callable[..., Any]  # as :func:`draw_points`, what an encoder sees of some rows
 
 
 def draw_points(
@@ -51,7 +53,7 @@ def draw_points(
     return torch.from_numpy(np.stack(clouds).astype(np.float32))
 
 
-def _on(device: torch.device, clouds: torch.Tensor | list[torch.Tensor]) -> torch.Tensor | list[torch.Tensor]:
+def _on(device: torch.device, clouds: Any) -> Any:
     return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
 
 
@@ -65,6 +67,8 @@ def train_encoder(
     targets_S_C: np.ndarray | None = None,
     start: Mapping[str, torch.Tensor] | None = None,
     group_S: np.ndarray | None = None,
+    make: Callable[[], nn.Module] | None = None,
+    draw: Draw = draw_points,
 ) -> tuple[Classifier, list[dict[str, float]]]:
     """Train on the rows of split ``train``, of which a share of the groups can be held out for validation.
 
@@ -77,6 +81,8 @@ def train_encoder(
         start: the weights to start from; random ones where None.
         group_S: (S,) of each row; rows of one group are held out together. By default rows of one object that were
             made one after the other.
+        make: makes the encoder, where it is none of the registry.
+        draw: what the encoder sees of a row, anew in every epoch.
         checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
             continues from it and ends with the same weights as an unbroken run.
 
@@ -86,7 +92,7 @@ def train_encoder(
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     device = best_device()
-    model = make_model(settings, classes).to(device)
+    model = (with_head(make(), settings, classes) if make else make_model(settings, classes)).to(device)
     if start is not None:
         model.load_state_dict(start)
     optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
@@ -115,7 +121,7 @@ def train_encoder(
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
-            clouds = draw_points(
+            clouds = draw(
                 *(registrations, batch_rows, settings.draw_points, source, seed, "epoch", epoch),
                 fewest=settings.fewest_points,
             )
@@ -209,7 +215,12 @@ def best_device() -> torch.device:
 
 @torch.inference_mode()
 def embed(
-    model: Classifier, registrations: Registrations, source: str, seed: int, settings: EncoderSettings
+    model: Classifier,
+    registrations: Registrations,
+    source: str,
+    seed: int,
+    settings: EncoderSettings,
+    draw: Draw = draw_points,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return embeddings h (S, d) of all rows, in their order, and the head's logits (S, C) at them; float32.
 
@@ -223,8 +234,8 @@ def embed(
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            draw_points(registrations, rows, n_points, source, seed, "embedding", draw, fewest=settings.fewest_points)
-            for draw in range(settings.draws)
+            draw(registrations, rows, n_points, source, seed, "embedding", number, fewest=settings.fewest_points)
+            for number in range(settings.draws)
         ]
         parts.append(torch.stack([model.encoder(_on(device, clouds)) for clouds in draws]).mean(dim=0))
     h_S_d = torch.cat(parts)
@@ -265,7 +276,11 @@ class Classifier(nn.Sequential):
 
 def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
     """Return a new encoder with a head over the classes."""
-    encoder = make_encoder(settings.backbone, settings.options)
+    return with_head(make_encoder(settings.backbone, settings.options), settings, classes)
+
+
+def with_head(encoder: Any, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
+    """Return an encoder with a new head over the classes."""
     return Classifier(encoder, _HEADS[settings.head](encoder.embedding_size, len(classes)))
 
 

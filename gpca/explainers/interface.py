@@ -36,6 +36,17 @@ class Describing(Protocol):
         """Attach what it measures, by :func:`measured`; ``fit`` and ``explain`` then measure nothing again."""
 
 
+@runtime_checkable
+class Encoding(Protocol):
+    """An explainer with an encoder of its own, learnt once for all labels on its embeddings."""
+
+    def learn(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
+        """Train the encoder on labelled registrations, and return what attaches its embeddings.
+
+        Where they are attached, ``fit`` and ``explain`` read them.
+        """
+
+
 def measured(
     registrations: Registrations, prefix: str, measure: Callable[[], Mapping[str, np.ndarray]]
 ) -> Registrations:
@@ -47,6 +58,9 @@ def measured(
         return registrations
     own = {prefix + name: array for name, array in measure().items()}
     return replace(registrations, attached={**registrations.attached, **own})
+
+
+BARE = "registrations"  # what an explainer reads to which nothing is attached
 
 
 @dataclass(frozen=True)
@@ -64,7 +78,7 @@ class ExplainerEntry:
 
     title: str
     make: Callable[..., ConceptExplainer]
-    reads: str = "registrations"
+    reads: str = BARE
     oracle: bool = False
     observed_only: bool = False
 

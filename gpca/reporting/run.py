@@ -12,9 +12,10 @@ from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.alignment.methods.registry import left_out, method_entry
-from gpca.controls.settings import TRANSFER
+from gpca.controls.settings import TRANSFER, UNSEEN
 from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.interface import BARE
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.objects.title import stand_in_clause, title_of
 from gpca.readings.registry import GROUPS
@@ -49,6 +50,8 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "exchange_method": installed_methods(config["exchange"]["methods"]),
         "control_seed": controlled_seeds(config),
         "control": list(config["controls"]["controls"]),
+        "control_encoder": _compared_encoders(config["controls"]),
+        "timed_control": [name for name in config["controls"]["explainers"] if explainer_entry(name).reads == BARE],
         "transfer_source": list(sources) if transfers(config, sources) else [],
         "gradient_source": list(sources) if has_gradients(config) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
@@ -177,12 +180,6 @@ def _title_of_pose(settings: Mapping) -> str:
     )
 
 
-def installed_methods(config: Mapping) -> list[str]:
-    """Return the registration methods of a config, without those whose package is missing here."""
-    missing = left_out(config["methods"])
-    return [name for name in config["methods"] if name not in missing]
-
-
 def _title_of_all(sources: Mapping[str, Mapping]) -> str:
     """Return the titles of all sources, and whether there are stand-ins among them."""
     titles = ", ".join(entry["title"] for entry in sources.values())
@@ -207,6 +204,12 @@ def transfers(config: Mapping, sources: Mapping) -> bool:
 def has_gradients(config: Mapping) -> bool:
     """Return whether the encoder that GP-CA reads has a gradient in the points, once it is trained."""
     return config["encoders"][config["embedding"]["encoder"]]["backbone"] in DIFFERENTIABLE
+
+
+def _compared_encoders(controls: Mapping) -> list[str]:
+    """Return the ways to train GP-CA's encoder that are compared, on the samples that the unseen objects need."""
+    of_gpca = any(name in GPCA_FORMS for name in controls["explainers"])
+    return list(controls["encoders"]) if of_gpca and UNSEEN in controls["controls"] else []
 
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:

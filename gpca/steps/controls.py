@@ -12,7 +12,7 @@ from gpca.arguments import SEED
 from gpca.controls.experiment import Experiment
 from gpca.controls.rivals import make_rivals
 from gpca.controls.samples import sample_table
-from gpca.controls.settings import PAPER, RETRAINED, ControlSettings
+from gpca.controls.settings import PAPER, RETRAINED, TRAININGS, ControlSettings
 from gpca.controls.variants import left_out, variant
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
@@ -40,12 +40,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--encoder", required=True, type=Path, help="weights of the paper's protocol")
     parser.add_argument("--embeddings", required=True, type=Path, help="by that encoder")
-    parser.add_argument("--retrained", nargs="*", default=[], choices=RETRAINED, help="controls with own embeddings")
+    retrained = (*RETRAINED, *TRAININGS)
+    parser.add_argument("--retrained", nargs="*", default=[], choices=retrained, help="controls with own embeddings")
     parser.add_argument("--retrained-embeddings", nargs="*", default=[], type=Path, help="theirs, in the same order")
     parser.add_argument("--others", nargs="*", default=[], help="names of the other sources")
     parser.add_argument("--other-registrations", nargs="*", default=[], type=Path, help="theirs, in the same order")
     parser.add_argument("--out", required=True, type=Path, help="predictions")
     parser.add_argument("--samples", required=True, type=Path, help="CSV of the test samples' severities and errors")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds that explainers take")
 
 
 def run(options: Namespace) -> None:
@@ -63,7 +65,9 @@ def run(options: Namespace) -> None:
         raise InputError("--retrained", f"lacks control '{sorted(missing)[0]}'", "give its embeddings")
     inputs = [options.objects, options.registrations, options.encoder, options.embeddings]
     inputs += [*retrained.values(), *others.values()]
-    with record_provenance([options.out, options.samples], inputs, options.settings, seed=options.seed):
+    with record_provenance(
+        [options.out, options.samples, options.timings], inputs, options.settings, seed=options.seed
+    ):
         registrations = Registrations.load(options.registrations)
         model = load_model(options.encoder, encoder)
         embeddings = {PAPER: _embeddings(options.embeddings, registrations, "embed")}
@@ -86,6 +90,7 @@ def run(options: Namespace) -> None:
         samples = sample_table(registrations, ObjectClouds.load(options.objects))
         write_csv(options.out, rows)
         write_csv(options.samples, samples)
+        write_csv(options.timings, experiment.costs.rows())
 
 
 def _pairs(options: Namespace, names: str, files: str) -> dict[str, Path]:

@@ -12,7 +12,7 @@ import torch
 from gpca.arguments import SEED
 from gpca.arrays import save_arrays
 from gpca.controls.encoding import encode, nothing
-from gpca.controls.settings import RETRAINED, ControlSettings
+from gpca.controls.settings import RETRAINED, TRAININGS, ControlSettings
 from gpca.controls.variants import left_out
 from gpca.encoders.settings import EncoderSettings
 from gpca.files import whole_file
@@ -26,7 +26,7 @@ CURVE = ("epoch", "learning_rate", "loss", "accuracy")
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config."""
-    parser.add_argument("--control", required=True, choices=RETRAINED)
+    parser.add_argument("--control", required=True, choices=(*RETRAINED, *TRAININGS))
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.metrics import write_metrics
+from gpca.controls.costs import collect_costs
 from gpca.controls.experiment import LABELS
 from gpca.controls.intervals import collect as collect_intervals
 from gpca.controls.intervals import read_intervals
@@ -81,6 +82,39 @@ def test_a_change_is_that_of_the_same_draws_of_objects_and_seeds(files, tmp_path
     assert rows.loc["transfer", POOLED, POOLED, "gpca", "accuracy"]["value"] == pytest.approx(0.5)
     assert rows.loc["transfer", "b", "a", "gpca", "accuracy"]["samples"] == 60
     assert rows.loc["paper", POOLED, POOLED, "gpca", "accuracy"]["samples"] == 120
+
+
+def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_protocol(files):
+    parts = [said("a", "a", "paper", "gpca", 27)]
+    write_csv(files[1], pd.concat(parts))  # another seed, in which all goes wrong
+    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
+    density = rows.loc["density", "a", "gpca", "accuracy"]
+    assert (density["seeds"], density["value"], density["change"]) == pytest.approx((1, 0.7, -0.2))
+
+
+def test_the_change_of_an_encoder_trained_otherwise_is_against_the_papers_training_on_the_same_samples(files):
+    frame = pd.read_csv(files[0], keep_default_na=False)  # of one seed alone
+    added = [("seen_objects", "gpca", 3), ("seen_objects", "gpca_two_layer_head", 6)]
+    write_csv(files[0], pd.concat([frame, *(said("a", "a", *of[:2], of[2]) for of in added)]))
+    second = pd.read_csv(files[1], keep_default_na=False)
+    write_csv(files[1], pd.concat([second, said("a", "a", "seen_objects", "gpca", 30)]))
+    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
+    otherwise = rows.loc["seen_objects", "a", "gpca_two_layer_head", "accuracy"]
+    assert (otherwise["value"], otherwise["change"]) == pytest.approx((0.8, -0.1))
+    assert rows.loc["seen_objects", "a", "gpca", "accuracy"]["value"] == pytest.approx(0.45)
+
+
+def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
+    path = tmp_path / "timings" / "a" / "controls" / "seed100.csv"
+    write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [2.5], "seconds": [0.01]}))
+    rows = collect_costs([path]).set_index(["source", "method", "metric", "seed"])["value"]
+    assert rows.to_dict() == {
+        ("a", "gpca_pair", "learning_seconds", 100): 2.5,
+        ("a", "gpca_pair", "seconds", 100): 0.01,
+    }
+    write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [-1], "seconds": [0.01]}))
+    with pytest.raises(InputError, match="'learning_seconds' holds numbers below 0"):
+        collect_costs([path])
 
 
 def test_views_of_one_instance_are_one_object(files):

@@ -6,7 +6,14 @@ import pytest
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.controls.settings import RELABELLED, ControlSettings
-from gpca.controls.variants import left_out, of_unseen_objects, registered_backwards, relabelled, thinned
+from gpca.controls.variants import (
+    left_out,
+    of_unseen_objects,
+    registered_backwards,
+    relabelled,
+    shows_known_object,
+    thinned,
+)
 from gpca.errors import InputError
 from gpca.objects.views import instance_of
 from gpca.pairs.perturbation import CONCEPTS
@@ -28,15 +35,17 @@ def test_every_object_is_unseen_once_with_all_its_views(six):
     tested = []
     for seed in range(3):
         changed = of_unseen_objects(six, 3, "tiny", seed)
-        train, test = (
-            {instance_of(name) for name in changed.object_name[changed.split == s]} for s in ("train", "test")
-        )
+        asked = changed.split == "test"
+        unseen = asked & ~shows_known_object(changed)
+        train, test = ({instance_of(name) for name in changed.object_name[rows]} for rows in (~asked, unseen))
         assert not train & test
-        assert len(set(changed.sample[changed.split == "test"])) == (changed.split == "test").sum()
+        assert len(set(changed.sample[asked])) == asked.sum()
         shown = {instance_of(name) for name in six.object_name}
         assert train | test == shown
         of_both = np.isin([instance_of(name) for name in six.object_name], sorted(test)).sum()
-        assert (changed.split == "test").sum() == of_both  # of both splits
+        assert unseen.sum() == of_both  # of both splits
+        known = np.isin([instance_of(name) for name in six.object_name], sorted(train)) & (six.split == "test")
+        assert (asked & ~unseen).sum() == known.sum()  # new samples of what it learns from
         tested += sorted(test)
     assert sorted(tested) == sorted(shown)
 
@@ -82,6 +91,8 @@ def test_what_a_source_does_not_admit_is_said(six, registrations):
     assert left_out("density", six, settings, "dgcnn") is None
     assert left_out("density", six, settings, "pointnet") == "backbone 'pointnet' takes clouds of one size only"
     fewest = np.diff(six.offsets).min()
+    assert left_out("random_draws", six, settings, "pointnet") == "backbone 'pointnet' takes clouds of one size only"
+    assert left_out("two_layer_head", six, settings, "pointnet") is None
     words = f"its smallest draw has 200 points, and a cloud has {fewest}"
     assert left_out("density", six, replace(settings, draw_points=(200, 512)), "dgcnn") == words
 

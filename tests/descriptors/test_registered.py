@@ -17,7 +17,8 @@ def described(registrations, **changes):
 
 def test_every_group_has_its_width_and_is_finite(few):
     groups = described(few)
-    assert {name: array.shape for name, array in groups.items()} == {name: (12, w) for name, w in WIDTHS.items()}
+    shapes = {name: (12, width) for name, width in WIDTHS.items()} | {"points": (12, 2, 128, 7)}
+    assert {name: array.shape for name, array in groups.items()} == shapes
     assert all(np.isfinite(array).all() for array in groups.values())
 
 

@@ -96,7 +96,7 @@ STEP_OPTIONS = {
         "--seed": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoder": "weights.pt",
         "--embeddings": "embeddings.npz", "--retrained": "density", "--retrained-embeddings": "control.npz",
         "--others": "other", "--other-registrations": "registrations.npz", "--out": "controls.csv",
-        "--samples": "control_samples.csv",
+        "--samples": "control_samples.csv", "--timings": "control_seconds.csv",
     },
     "exchange": COMMON | {
         "--settings": {

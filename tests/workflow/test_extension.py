@@ -28,7 +28,7 @@ TABLES |= dict.fromkeys(("nominal_reliability", "model", "time_stages", "table7_
 TABLES |= dict.fromkeys(("registration_methods", "table11_registration", "table11_severity"), 1)
 TABLES |= dict.fromkeys(("estimator_metrics", "table12_uncertainty", "estimators"), 1)
 TABLES |= dict.fromkeys(("control_metrics", "control_intervals", "control_severities"), 1)
-TABLES |= dict.fromkeys(("table10_controls", "table10_transfer", "severity_curves", "transfer"), 1)
+TABLES |= dict.fromkeys(("table10_controls", "table10_transfer", "table10_costs", "severity_curves", "transfer"), 1)
 TABLES |= dict.fromkeys(("coverage_risk", "reliability", "uncertainty_vs_distance"), 1)
 
 

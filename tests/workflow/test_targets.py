@@ -43,7 +43,7 @@ MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
 CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
 # Explainers of the first seed of two sources under the controls, and what is made of what they say.
 CONTROLS_SHOWN = jobs("control_metrics", "control_intervals", "control_severities")
-CONTROLS_SHOWN += jobs("table10_controls", "table10_transfer", "severity_curves", "transfer")
+CONTROLS_SHOWN += jobs("table10_controls", "table10_transfer", "table10_costs", "severity_curves", "transfer")
 CONTROLS = jobs(explain_controls=2) + CONTROLS_SHOWN
 # With other methods and estimators beneath them: explainers of one source.
 EXCHANGED = jobs("explain_exchanged", "exchange_metrics", "table14_estimator_explanations", "table14_method_matrix")

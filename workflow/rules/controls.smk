@@ -1,18 +1,35 @@
 # Registrations -> encoders trained under a control -> what every explainer says under all of them.
-from gpca.controls.settings import RETRAINED
+from gpca.controls.settings import RETRAINED, TRAININGS, UNSEEN
 
 CONTROLS = config["controls"]
 CONTROL_SEEDS = NAMES["control_seed"]
 CONTROL_ENCODER = config["embedding"]["encoder"]
-RETRAINED_CONTROLS = [name for name in CONTROLS["controls"] if name in RETRAINED]
 CONTROL_EXPLAINERS = {
     name: (config["explainers"].get(name) or {}) | (own or {})
     for name, own in CONTROLS["explainers"].items()
 }
-CONTROL_SETTINGS = {
-    "controls": {name: CONTROLS[name] for name in CONTROLS if name != "explainers"},
-    "encoder": config["encoders"][CONTROL_ENCODER],
-}
+
+
+def controls_of(seed):
+    """Return the controls of a seed: all, but those that need a further encoder for the first seeds alone."""
+    further = int(seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    return [
+        n for n in CONTROLS["controls"] if further or n == UNSEEN or n not in RETRAINED
+    ]
+
+
+def retrained(wildcards):
+    """Return the controls and ways of training for which a seed has encoders of their own."""
+    further = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    own = [name for name in controls_of(wildcards.seed) if name in RETRAINED]
+    return own + (NAMES["control_encoder"] if further else [])
+
+
+def control_settings(wildcards, **further):
+    own = {name: CONTROLS[name] for name in CONTROLS if name != "explainers"}
+    own["controls"] = controls_of(wildcards.seed)
+    encoder = config["encoders"][CONTROL_ENCODER]
+    return as_json({"controls": own, "encoder": encoder, **further})
 
 
 rule controls:
@@ -36,7 +53,7 @@ rule train_control:
     benchmark:
         "<benchmarks>/control_embeddings/{control}/{source}/seed{seed}.tsv"
     wildcard_constraints:
-        control="|".join(RETRAINED),
+        control="|".join([*RETRAINED, *TRAININGS]),
     priority: 10
     conda:
         "../envs/gpca.yaml"
@@ -45,7 +62,7 @@ rule train_control:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=as_json(CONTROL_SETTINGS),
+        settings=control_settings,
     shell:
         "python -m gpca train_control --threads {threads} --control {wildcards.control} "
         "--registrations {input.registrations} --source {wildcards.source} --seed {wildcards.seed} "
@@ -62,9 +79,9 @@ rule explain_controls:
         ),
         encoder=f"<results>/encoders/{{source}}/{CONTROL_ENCODER}/seed{{seed}}.pt",
         embeddings=f"<results>/embeddings/{{source}}/{CONTROL_ENCODER}/none/seed{{seed}}.npz",
-        retrained=collect(
-            "<results>/control_embeddings/{control}/{{source}}/seed{{seed}}.npz",
-            control=RETRAINED_CONTROLS,
+        retrained=lambda wildcards: collect(
+            f"<results>/control_embeddings/{{control}}/{wildcards.source}/seed{wildcards.seed}.npz",
+            control=retrained(wildcards),
         ),
         code=code_files(
             "gpca.steps.controls",
@@ -74,6 +91,7 @@ rule explain_controls:
     output:
         predictions="<results>/controls/{source}/seed{seed}.csv",
         samples="<results>/control_samples/{source}/seed{seed}.csv",
+        timings="<results>/timings/{source}/controls/seed{seed}.csv",
     log:
         "<logs>/controls/{source}/seed{seed}.log",
     benchmark:
@@ -86,22 +104,20 @@ rule explain_controls:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=as_json(
-            CONTROL_SETTINGS
-            | {
-                "explainers": CONTROL_EXPLAINERS,
-                "uncertainty": config["uncertainty"].get("removal", {}),
-                "icp": config["registrations"]["icp"],
-            }
+        settings=lambda wildcards: control_settings(
+            wildcards,
+            explainers=CONTROL_EXPLAINERS,
+            uncertainty=config["uncertainty"].get("removal", {}),
+            icp=config["registrations"]["icp"],
         ),
-        retrained=RETRAINED_CONTROLS,
+        retrained=retrained,
         others=other_sources,
     shell:
         "python -m gpca controls --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
         "--objects {input.objects} --registrations {input.registrations} --encoder {input.encoder} "
         "--embeddings {input.embeddings} --retrained {params.retrained} --retrained-embeddings {input.retrained} "
         "--others {params.others} --other-registrations {input.others} --settings {params.settings:q} "
-        "--out {output.predictions} --samples {output.samples} 2> {log}"
+        "--out {output.predictions} --samples {output.samples} --timings {output.timings} 2> {log}"
 
 
 rule control_metrics:

@@ -7,7 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from gpca.attribution.bootstrap import REPEATS
-from gpca.controls.settings import PAPER, TRANSFER, WRONG_LABELS
+from gpca.controls.settings import PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.diagnosis.judged import POOLED
 from gpca.objects.title import stand_in_clause, title_of
 from gpca.reporting.tables.builder import TableBuilder, rows_where
@@ -20,14 +20,13 @@ if TYPE_CHECKING:
 TITLES = {
     PAPER: "Paper's protocol (%)",
     "density": "Matched density",
-    "unseen_objects": "Unseen objects",
+    UNSEEN: "Unseen objects",
     TRANSFER: "Other sources",
     "reversed": "ICP reversed",
     **{name: f"{100 * share:g} % wrong labels" for name, share in WRONG_LABELS.items()},
     "shuffled": "Shuffled labels",
 }
 CHANGE = "_change"  # behind a control's name: the key of the column of its differences
-UNSEEN = "unseen_objects"
 INTERVAL = (
     f"± is half the width of the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws), whose bounds "
     "the CSV holds."

@@ -1,0 +1,94 @@
+"""GP-CA on the pair with embeddings that are learnt: what a network gains over measured relations, at what cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from time import perf_counter
+
+from baselines.pair import DescribedPairs
+from gpca.attribution.scores import Attribution
+from gpca.explainers.gpca import GPCA
+from gpca.explainers.interface import ExplainerEntry
+from gpca.pairs.dataset import Registrations
+
+
+class LearnedPairGPCA(DescribedPairs):
+    """GP-CA's classifier on the embedding of an encoder that sees both clouds after ICP, and the motion that ICP made.
+
+    Args:
+        encoder: one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
+        source, seed: name what is random.
+        points: of each cloud, on which every point is told how it lies to the other cloud.
+        draw_points, epochs, encoder_learning_rate: of the encoder's training, each epoch on other ones of the points.
+        settings: those of the GPC, as for GP-CA.
+    """
+
+    def __init__(
+        self,
+        encoder: str,
+        source: str,
+        seed: int,
+        points: int = 512,
+        draw_points: int = 96,
+        epochs: int = 6,
+        encoder_learning_rate: float = 4e-3,
+        **settings,
+    ) -> None:
+        super().__init__(source, seed, "relations", points)
+        self._encoder = encoder
+        self._training = {"draw_points": min(draw_points, points), "epochs": epochs}
+        self._training["learning_rate"] = encoder_learning_rate
+        self._embedding = f"{self._prefix}embedding_by_{encoder}"
+        self._gpca = GPCA(source, seed, **settings)
+        self._embed: Callable[[Registrations], Registrations] | None = None
+
+    def learn(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
+        """Train the encoder on the labelled pairs, and return what attaches its embeddings."""
+        from gpca.descriptors.registered import MOTION
+        from gpca.encoders.settings import EncoderSettings
+        from gpca.explainers.pair_encoder import PairDraw, PairEncoder
+
+        draw = PairDraw(self._prefix + "points", self._prefix + "motion")
+
+        def seen(asked: Registrations) -> Registrations:
+            described = self.describe(asked)
+            motion = self.features(described)[:, -MOTION:]
+            return replace(described, attached={**described.attached, draw.motion: motion})
+
+        settings = EncoderSettings(backbone=self._encoder, draws=2, **self._training)
+        encoder = PairEncoder(settings, draw, *self._axes).fit(seen(registrations))
+
+        def embed(asked: Registrations) -> Registrations:
+            described = self.describe(asked)
+            return replace(described, attached={**described.attached, self._embedding: encoder(seen(described))})
+
+        return embed
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit the GPC to the labelled pairs, after the encoder, unless its embeddings are attached."""
+        if self._embedding not in registrations.attached:
+            self._embed = self.learn(registrations)
+        self._gpca.fit(self._embedded(registrations))
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Draw from the posterior at every pair and summarise, as GP-CA does."""
+        started = perf_counter()
+        embedded = self._embedded(registrations)
+        seconds = (perf_counter() - started) / len(registrations)
+        attribution = self._gpca.explain(embedded)
+        return replace(attribution, seconds_N=attribution.seconds_N + seconds)
+
+    def _embedded(self, registrations: Registrations) -> Registrations:
+        if self._embed is not None:
+            registrations = self._embed(registrations)
+        return replace(registrations, attached={"embedding": registrations.attached[self._embedding]})
+
+
+EXPLAINERS = {
+    "gpca_pair_dgcnn": ExplainerEntry("GP-CA on the pair (DGCNN)", partial(LearnedPairGPCA, "pair_dgcnn")),
+    "gpca_pair_attention": ExplainerEntry(
+        "GP-CA on the pair (cross-attention)", partial(LearnedPairGPCA, "pair_attention")
+    ),
+}

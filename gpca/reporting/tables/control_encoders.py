@@ -1,0 +1,105 @@
+"""Makes the parts of Table X on encoders: those that are trained otherwise, and what those of the pair cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+from typing import TYPE_CHECKING
+
+from gpca.controls.settings import PAPER, SEEN, TRAININGS, TRANSFER, UNSEEN, trained_otherwise
+from gpca.diagnosis.judged import POOLED
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.objects.title import stand_in_clause, title_of
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, rows_where
+from gpca.reporting.tables.controls import ALL_TOGETHER, CHANGE, INTERVAL, TITLES, cell_of
+from gpca.reporting.tables.table import Cell, Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TRAINED = {"random_draws": "draws of random size", "two_layer_head": "head of two layers"}
+KNOWN = {PAPER: TITLES[PAPER], SEEN: "Objects that it learnt from (%)", UNSEEN: "Unseen objects (%)"}
+
+
+def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
+    """Return the accuracy of GP-CA on encoders that are trained otherwise, on known and on unseen objects.
+
+    Args:
+        intervals, sources, explainers: As of :func:`gpca.reporting.tables.controls.table10_controls`.
+
+    Raises:
+        InputError: The intervals hold none of these.
+    """
+    table = TableBuilder("table10_encoders", {"source": "Dataset", "training": "Encoder"})
+    for source, title in (ALL_TOGETHER, *((name, title_of(entry)) for name, entry in sources.items())):
+        for explainer, words in explainers.items():
+            if explainer not in GPCA_FORMS:
+                continue
+            ways = {way: trained_otherwise(explainer, way) for way in TRAININGS}
+            for way, name in {PAPER: explainer, **ways}.items():
+                of_name = rows_where(intervals, source=source, method=name, metric="accuracy").set_index("control")
+                found = {control: of_name.loc[control] for control in KNOWN if control in of_name.index}
+                cells = {control: cell_of(row) for control, row in found.items()}
+                if way != PAPER:
+                    cells |= {control + CHANGE: cell_of(row, "change") for control, row in found.items()}
+                label = words if way == PAPER else f"{words}, {TRAINED[way]}"
+                table.add_row([(source, title), (way, label)], cells)
+    table.require_rows("intervals", "hold no GP-CA", "run the controls first")
+    return table.build(
+        caption="Accuracy (%) on encoders that are trained otherwise" + stand_in_clause(sources.values()),
+        column_head="objects",
+        columns={name: Column(words, interval=False) for name, words in KNOWN.items()}
+        | {
+            name + CHANGE: Column(f"{words}: change", limits=(-100.0, 100.0), beside=name)
+            for name, words in KNOWN.items()
+            if name != PAPER
+        },
+        footnotes=(
+            "Apart from the paper's protocol, all learn from the same training samples of some of the objects, and are "
+            "asked about new samples of these and about the others. In brackets: points gained or lost by the "
+            "training, on the same test samples, for the seeds that have such an encoder. " + INTERVAL,
+        ),
+    )
+
+
+def table10_costs(
+    intervals: pd.DataFrame, costs: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]
+) -> Table:
+    """Return what explainers that see the registrations themselves cost, beside what they gain.
+
+    Args:
+        intervals, sources, explainers: As of :func:`gpca.reporting.tables.controls.table10_controls`.
+        costs: What :func:`gpca.controls.costs.collect_costs` returned.
+
+    Raises:
+        InputError: The costs hold none of these.
+    """
+    table = TableBuilder("table10_costs", {"explainer": "Explainer"})
+    gains = {name: TITLES[name] for name in (PAPER, UNSEEN, TRANSFER)}
+    pooled = POOLED if len(sources) > 1 else next(iter(sources))
+    for explainer, words in explainers.items():
+        cells: dict[str, Cell | None] = {}
+        for metric, factor in (("learning_seconds", 1), ("seconds", 1e3)):
+            of_metric = rows_where(costs, method=explainer, metric=metric)
+            cells[metric] = cell_of_repeats((of_metric.groupby("seed")["value"].mean() * factor).to_numpy(), 0)
+        if cells["seconds"] is None:
+            continue
+        accuracy = rows_where(intervals, source=pooled, method=explainer, metric="accuracy").set_index("control")
+        cells |= {name: cell_of(accuracy.loc[name]) for name in gains if name in accuracy.index}
+        table.add_row([(explainer, words)], cells)
+    table.require_rows("costs", "hold no explainer", "run the controls first")
+    return table.build(
+        caption="What explainers of the pair cost and gain" + stand_in_clause(sources.values()),
+        column_head="metric",
+        columns={
+            "learning_seconds": Column("Learning (s)", interval=False, limits=(0, inf)),
+            "seconds": Column("One registration (ms)", interval=False, limits=(0, inf)),
+            **{name: Column(words) for name, words in gains.items()},
+        },
+        footnotes=(
+            "Learning: encoder, if it has one of its own, and classifier, from the training samples of a source, when "
+            "these are measured. One registration: measured, embedded and explained. Means over sources and seeds, on "
+            "one core; they differ from run to run.",
+            INTERVAL,
+        ),
+    )

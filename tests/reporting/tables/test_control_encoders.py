@@ -1,0 +1,50 @@
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import TIDY_COLUMNS
+from gpca.controls.intervals import COLUMNS
+from gpca.diagnosis.judged import POOLED
+from gpca.errors import InputError
+from gpca.reporting.tables.control_encoders import table10_costs, table10_encoders
+
+SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": False}}
+EXPLAINERS = {"gpca": "GP-CA", "gpca_pair": "GP-CA on the pair"}
+
+
+def row(control, source, trained_on, method, value, change):
+    bounds = (value, value - 0.03, value + 0.01, change, change - 0.02, change + 0.02)
+    return (control, source, trained_on, method, "accuracy", 200, 1, *bounds)
+
+
+@pytest.fixture
+def intervals():
+    rows = []
+    for source in (*SOURCES, POOLED):
+        rows += [row(of, source, source, "gpca_pair", 0.99, 0.0) for of in ("paper", "unseen_objects")]
+        rows.append(row("transfer", source, POOLED, "gpca_pair", 0.97, -0.02))
+        rows += [
+            row(of, source, source, "gpca", value, 0.0) for of, value in (("paper", 0.98), ("unseen_objects", 0.75))
+        ]
+        rows.append(row("unseen_objects", source, source, "gpca_random_draws", 0.79, 0.04))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def test_an_encoder_trained_otherwise_stands_below_the_papers_with_what_it_gains(intervals):
+    text = table10_encoders(intervals, SOURCES, EXPLAINERS).markdown()
+    assert "| All together | GP-CA | 98.0 | – | 75.0 |" in text
+    assert "| All together | GP-CA, draws of random size | – | – | 79.0 (+4.0 ± 2.0) |" in text
+    assert "head of two layers" not in text and "on the pair" not in text
+
+
+def test_a_cost_stands_beside_its_gain(intervals):
+    seconds = {("ycb", "learning_seconds"): 2.0, ("cups", "learning_seconds"): 4.0, ("ycb", "seconds"): 0.008}
+    records = [("costs", source, "gpca_pair", metric, "all", 100, value) for (source, metric), value in seconds.items()]
+    table = table10_costs(intervals, pd.DataFrame(records, columns=list(TIDY_COLUMNS)), SOURCES, EXPLAINERS)
+    assert "| GP-CA on the pair | 3.0 | 8.0 | 99.0 ± 2.0 | 99.0 ± 2.0 | 97.0 ± 2.0 |" in table.markdown()
+
+
+def test_tables_without_a_row_say_what_is_missing(intervals):
+    with pytest.raises(InputError, match="hold no GP-CA for table10_encoders"):
+        table10_encoders(intervals[intervals["method"] == "gpca_pair"], SOURCES, EXPLAINERS)
+    with pytest.raises(InputError, match="costs: hold no explainer for table10_costs"):
+        table10_costs(intervals, pd.DataFrame(columns=list(TIDY_COLUMNS)), SOURCES, EXPLAINERS)
