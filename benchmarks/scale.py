@@ -3,7 +3,7 @@
     python benchmarks/scale.py results/real [--configfile config/real.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
     python benchmarks/scale.py results/real --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
 
-The first form schedules the jobs of a finished run, each with the seconds that its benchmark file says, on several
+The first form schedules the jobs of a finished run, each with the seconds of its benchmark file, on several
 numbers of cores (Snakemake's own start and the cores' shared memory are not in it), and names the chain of jobs that no
 core shortens. The second plans the embedded default with so many datasets (copies of its own), seeds and explainers,
 dry, and takes the wall time and memory of that plan. A job of the plan takes the mean seconds of its rule in the
@@ -33,7 +33,7 @@ from time import perf_counter
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 from benchmarks import markdown  # noqa: E402 (the script runs from a plain checkout)
-from benchmarks.pipeline import number  # noqa: E402
+from benchmarks.pipeline import SIDECAR, number  # noqa: E402
 from benchmarks.schedule import Job, critical_path, wall_time  # noqa: E402
 from benchmarks.targets import plan, read_plan  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
@@ -75,15 +75,25 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measured(jobs: Sequence[Job], folder: Path) -> dict[str, float]:
-    """Return the seconds of each job of the run.
+    """Return the seconds of each job of the run: of the whole job, or else of the work that its provenance tells.
 
     Raises:
-        InputError: one of them has no benchmark file.
+        InputError: one of them has neither.
     """
-    missing = [job.benchmark for job in jobs if not (folder / job.benchmark).is_file()]
-    if missing:
-        raise InputError(folder, f"holds no {missing[0]}", "finish the run, or give its --configfile and --config")
-    return {job.benchmark: sum(number(folder / job.benchmark, "s")) for job in jobs}
+    seconds = {}
+    for job in jobs:
+        path = folder / job.benchmark
+        records = [folder / f"{output}{SIDECAR}" for output in job.outputs]
+        blocks = {record.read_bytes(): record for record in records if record.is_file()}  # one may stand beside several
+        if path.is_file():
+            seconds[job.benchmark] = sum(number(path, "s"))
+        elif blocks:
+            seconds[job.benchmark] = sum(value for record in blocks.values() for value in number(record, "seconds"))
+        else:
+            raise InputError(
+                folder, f"holds no {job.benchmark}", "finish the run, or give its --configfile and --config"
+            )
+    return seconds
 
 
 def on_cores(jobs: Sequence[Job], seconds: Mapping[str, float], cores: Sequence[int]) -> tuple[list[str], dict]:

@@ -117,7 +117,7 @@ def test_the_queue_sees_compute_alone_and_groups_of_jobs_as_one(cluster, project
     assert [name for name in wanted if not (project.folder / f"results/smoke/{name}").is_file()] == []
     jobs = [line.split("|") for line in said("squeue", "--states=all", "--noheader", "--format=%k|%T").splitlines()]
     assert {state for _, state in jobs} == {"COMPLETED"}
-    # Of two seeds. A training with its embedding is one job of the queue, as are the two explainers; the figure is none.
+    # A training with its embedding is one job of the queue, as are the explainers (of two seeds); the figure is none.
     names = ("sample_objects", "register", "encoder", "attribute")
     expected = {"sample_objects": 1, "register": 2, "encoder": 2, "attribute": 1}
     assert Counter(re.match(f"rule_({'|'.join(names)})", name)[1] for name, _ in jobs) == expected
