@@ -34,6 +34,7 @@ SlurmdParameters=config_overrides
 ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
 MpiDefault=none
+MinJobAge=86400
 ReturnToService=2
 SchedulerParameters=sched_interval=1,batch_sched_delay=0
 SelectType=select/cons_tres
