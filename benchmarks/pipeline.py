@@ -173,16 +173,20 @@ def summary(stages: dict[str, Stage], core_s: float) -> dict:
 
 
 def page_table(stages: dict[str, Stage]) -> list[str]:
-    """Return the stages as a Markdown table, longest first, with what their processes take to start and import."""
-    of_all_s = sum(sum(stage.job_s) for stage in stages.values())
-    long = {name: stage for name, stage in stages.items() if sum(stage.job_s) >= SMALL * of_all_s}
-    longest_first = sorted(long, key=lambda name: -sum(long[name].job_s))
-    short = [stage for name, stage in stages.items() if name not in long]
+    """Return the stages as a Markdown table, longest first, with what their processes take to start and import.
+
+    Of a stage without benchmark files the work counts alone; what is no stage of its own belongs to the jobs of others.
+    """
+    stages = {name: stage for name, stage in stages.items() if stage.job_s or name in STAGES}
+    time_s = {name: sum(stage.job_s or stage.work_s) for name, stage in stages.items()}
+    of_all_s = sum(time_s.values())
+    long = [name for name in sorted(time_s, key=lambda name: -time_s[name]) if time_s[name] >= SMALL * of_all_s]
     rows = []
-    for title, of_row in [*((f"`{name}/`", [long[name]]) for name in longest_first), ("all others", short)]:
-        job_s, work_s = (sum(sum(getattr(stage, name)) for stage in of_row) for name in ("job_s", "work_s"))
-        jobs = sum(len(stage.job_s) for stage in of_row)
-        rows.append([title, jobs, f"{job_s / 60:.1f}", f"{job_s / of_all_s:.0%}", f"{(job_s - work_s) / 60:.1f}"])
+    for title, names in [*((f"`{name}/`", [name]) for name in long), ("all others", sorted(set(stages) - set(long)))]:
+        row_s, work_s = sum(time_s[name] for name in names), sum(sum(stages[name].work_s) for name in names)
+        jobs = sum(len(stages[name].job_s or stages[name].work_s) for name in names)
+        starting = f"{max(row_s - work_s, 0) / 60:.1f}"
+        rows.append([title, jobs, f"{row_s / 60:.1f}", f"{row_s / of_all_s:.0%}", starting])
     return markdown.table(["stage", "jobs", "time of its jobs (min)", "share", "of which start-up (min)"], rows)
 
 
