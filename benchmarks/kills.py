@@ -23,7 +23,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-MEASURED = ("timings", "timings.csv", "benchmarks", "logs", "page", "index.html")
+MEASURED = ("timings", "timings.csv", "benchmarks", "logs", "page", "index.html", "ro-crate-metadata.json")
 DRAWN_FROM_IT = (  # and show seconds
     *("runtime", "table1_extended", "table7_runtime", "table8_recovery", "table11_registration", "comparison"),
 )

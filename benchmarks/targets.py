@@ -14,35 +14,24 @@ last line is a JSON object of the target `all`.
 from __future__ import annotations
 
 import argparse
-import heapq
 import json
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-from benchmarks.pipeline import number  # noqa: E402 (the script runs from a plain checkout)
+from benchmarks import markdown  # noqa: E402 (the script runs from a plain checkout)
+from benchmarks.pipeline import number  # noqa: E402
+from benchmarks.schedule import Job, wall_time  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
-from gpca.files import whole_file  # noqa: E402
 
 TARGETS = re.compile(r"(tables/\w+\.md|figures/\w+\.png|[\w.]+)$")  # and what lies in the run's folder itself
 ON_PAGE = re.compile(r"tables/|model\.pt$|all$")  # a figure takes about what the table of the same results takes
-
-
-@dataclass(frozen=True)
-class Job:
-    """A job of the plan: files read and written, its benchmark file (relative to the run), how it is scheduled."""
-
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    benchmark: str
-    priority: int
-    threads: int
 
 
 @dataclass(frozen=True)
@@ -71,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
         costs = {target: cost(needed, options.folder, options.cores) for target, needed in targets(jobs).items()}
         if options.write:
             shown = {target: of_target for target, of_target in costs.items() if ON_PAGE.match(target)}
-            write_between(options.write, f"results/{run}", table(shown, options.cores))
+            markdown.write_between(options.write, f"results/{run}", table(shown, options.cores))
     except InputError as fault:
         print(f"targets: {fault}", file=sys.stderr)
         return 2
@@ -97,7 +86,8 @@ def plan(run: str, configfile: Path | None, config: list[str]) -> str:
 def read_plan(text: str, run: str) -> list[Job]:
     """Return the jobs that leave a benchmark file; paths below the run's folder are relative to it."""
     jobs, prefix = [], f"results/{run}/"
-    for block in re.split(r"^(?:local)?rule \w+:$", text, flags=re.MULTILINE)[1:]:
+    blocks = re.split(r"^(?:local)?rule (\w+):$", text, flags=re.MULTILINE)[1:]
+    for rule, block in zip(blocks[::2], blocks[1::2], strict=True):
         given = dict(re.findall(r"^    (input|output|benchmark|priority|threads): (.*)$", block, flags=re.MULTILINE))
         if "benchmark" in given:
             inputs, outputs = (
@@ -105,7 +95,7 @@ def read_plan(text: str, run: str) -> list[Job]:
                 for name in ("input", "output")
             )
             scheduled = (int(given.get(name, default)) for name, default in (("priority", 0), ("threads", 1)))
-            jobs.append(Job(inputs, outputs, given["benchmark"].removeprefix(prefix), *scheduled))
+            jobs.append(Job(inputs, outputs, given["benchmark"].removeprefix(prefix), *scheduled, rule))
     return jobs
 
 
@@ -138,52 +128,17 @@ def cost(jobs: list[Job], folder: Path, cores: int) -> Cost | None:
     return Cost(len(jobs), core_s, wall_time(jobs, seconds, cores), peak_mb)
 
 
-def wall_time(jobs: Iterable[Job], seconds: Mapping[str, float], cores: int) -> float:
-    """Return the seconds until the last job ends, where each starts once its inputs are there and its cores free."""
-    waiting = sorted(jobs, key=lambda job: (-job.priority, -seconds[job.benchmark], job.benchmark))
-    missing = {path for job in waiting for path in job.outputs}
-    running: list[tuple[float, str, Job]] = []
-    now, free = 0.0, cores
-    while waiting or running:
-        for job in list(waiting):
-            if min(job.threads, cores) <= free and not missing.intersection(job.inputs):
-                free -= min(job.threads, cores)
-                heapq.heappush(running, (now + seconds[job.benchmark], job.benchmark, job))
-                waiting.remove(job)
-        now, _, ended = heapq.heappop(running)
-        free += min(ended.threads, cores)
-        missing.difference_update(ended.outputs)
-    return now
-
-
 def table(costs: Mapping[str, Cost | None], cores: int) -> list[str]:
     """Return the Markdown table, a row per target."""
-    lines = [f"| target | jobs | core time (min) | wall time on {cores} cores (min) | largest job (MB) |"]
-    lines.append("|---|---:|---:|---:|---:|")
+    rows = []
     for target, of_target in costs.items():
         cells = ["not measured", "", "", ""]
         if of_target:
             minutes = (f"{value_s / 60:.1f}" for value_s in (of_target.core_s, of_target.wall_s))
             cells = [str(of_target.jobs), *minutes, f"{of_target.peak_mb:.0f}"]
-        lines.append(f"| `{target}` | {' | '.join(cells)} |")
-    return lines
-
-
-def write_between(page: Path, name: str, lines: list[str]) -> None:
-    """Replace what stands between the page's comments `<!-- times of NAME -->` and `<!-- end of NAME -->`.
-
-    Raises:
-        InputError: no such page, or it has no such comments.
-    """
-    if not page.is_file():
-        raise InputError(page, "no such page", "name a Markdown file")
-    begin, end = f"<!-- times of {name} -->\n", f"<!-- end of {name} -->"
-    before, found_begin, rest = page.read_text(encoding="utf-8").partition(begin)
-    _, found_end, after = rest.partition(end)
-    if not found_begin or not found_end:
-        raise InputError(page, f"has no place for {name}", f"add the lines '{begin.strip()}' and '{end}'")
-    with whole_file(page) as partial:
-        partial.write_text(before + begin + "\n".join(["", *lines, "", ""]) + end + after, encoding="utf-8")
+        rows.append([f"`{target}`", *cells])
+    head = ["target", "jobs", "core time (min)", f"wall time on {cores} cores (min)", "largest job (MB)"]
+    return markdown.table(head, rows)
 
 
 if __name__ == "__main__":

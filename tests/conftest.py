@@ -156,3 +156,11 @@ def drawn(four):
 @pytest.fixture(scope="session")
 def causes(drawn):
     return drawn[0]
+
+
+@pytest.fixture(scope="session")
+def smoke_plan():
+    """What Snakemake prints of a dry run of the whole smoke run."""
+    from benchmarks.targets import plan
+
+    return plan("smoke", None, [])

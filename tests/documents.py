@@ -36,6 +36,20 @@ def code_in(text):
     return [code for code in (*lines, *re.findall(r"`([^`\n]+)`", prose)) if code and not code.startswith("#")]
 
 
+def section(page, anchor):
+    """The text below the heading with that anchor, up to the next one of its level."""
+    parts = re.split(r"^(##+ .+)$", page.read_text(), flags=re.MULTILINE)
+    found = [text for head, text in zip(parts[1::2], parts[2::2], strict=True) if anchor_of(head) == anchor]
+    assert found, f"{relative(page)} has no heading '{anchor}'"
+    return found[0]
+
+
+def anchor_of(heading):
+    """The anchor that is made from a heading's text."""
+    name = re.sub(r"\]\(.*?\)", "", heading.lstrip("# "))
+    return re.sub(r"[^\w -]", "", name).strip().lower().replace(" ", "-")
+
+
 def commands(program):
     """Every different command of that program on any page."""
     found = {code for page in PAGES for code in code_in(page.read_text()) if code.startswith(program)}

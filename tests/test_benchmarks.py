@@ -135,6 +135,18 @@ def test_an_existing_run_ends_with_the_documented_line(run_folder, monkeypatch, 
     assert result["overhead_share"] == pytest.approx(1 - 12 / 32)
 
 
+def test_the_stages_of_a_page_are_the_longest_first_and_small_ones_share_a_row(run_folder):
+    (run_folder / "benchmarks/objects/cup.tsv").write_text("s\tmax_rss\n0.05\tNA\n")
+    head, _, *rows = pipeline.page_table(pipeline.read_stages(run_folder))
+    assert head.startswith("| stage | jobs | time of its jobs (min) |")
+    assert rows == [
+        "| `encoders/` | 1 | 0.2 | 83% | 0.0 |",
+        "| `collect/` | 1 | 0.0 | 8% | 0.0 |",
+        "| `tables/` | 1 | 0.0 | 8% | 0.0 |",
+        "| all others | 1 | 0.0 | 0% | 0.0 |",
+    ]
+
+
 def test_a_missing_run_is_one_line_and_status_2(capsys):
     assert pipeline.main(["--existing", "no_such_run"]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -34,9 +34,10 @@ RUN = {"mypy", "pytest-cov", "ruff", "setuptools", "snakefmt", "snakemake", "sna
 
 
 def requirements(*lists):
-    """What pyproject.toml names for the library, and in the lists of extras."""
+    """What pyproject.toml names for this system: for the library, and in the lists of extras."""
     named = [PROJECT["dependencies"], *(PROJECT["optional-dependencies"][name] for name in lists)]
-    return [Requirement(line) for lines in named for line in lines]
+    found = [Requirement(line) for lines in named for line in lines]
+    return [requirement for requirement in found if requirement.marker is None or requirement.marker.evaluate()]
 
 
 def lock():

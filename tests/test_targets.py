@@ -5,7 +5,8 @@ import json
 import pytest
 
 from benchmarks import targets
-from benchmarks.targets import Job, cost, read_plan, wall_time
+from benchmarks.schedule import Job, critical_path, wall_time
+from benchmarks.targets import cost, read_plan
 from gpca.errors import InputError
 
 HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
@@ -14,11 +15,6 @@ TABLE2 = 2 + 4 + 4 + 4 + 4 + 1  # objects, registrations, encoders, embeddings, 
 
 def job(name, *inputs, priority=0, threads=1):
     return Job(inputs, (name,), f"benchmarks/{name}.tsv", priority, threads)
-
-
-@pytest.fixture(scope="module")
-def smoke_plan():
-    return targets.plan("smoke", None, [])
 
 
 @pytest.fixture
@@ -45,6 +41,14 @@ def test_wall_time_keeps_order_cores_and_priority():
     assert wall_time(late, seconds, cores=2) == 35  # a waits until b or c ends
     assert wall_time([job("a", threads=2), job("b")], seconds, cores=2) == 35
     assert wall_time([job("a", threads=8)], seconds, cores=2) == 25
+
+
+def test_the_critical_path_is_the_longest_chain_in_seconds():
+    seconds = {f"benchmarks/{name}.tsv": value for name, value in {"a": 5, "b": 9, "c": 1, "d": 2, "e": 3}.items()}
+    jobs = [job("e", "c", "d"), job("c", "a"), job("d", "b"), job("b"), job("a", "from_outside")]
+    assert [each.outputs[0] for each in critical_path(jobs, seconds)] == ["b", "d", "e"]
+    assert critical_path([], {}) == []
+    assert wall_time(jobs, seconds, cores=9) == 14
 
 
 def test_a_target_counts_its_own_jobs_once_each(smoke_plan, run_folder):

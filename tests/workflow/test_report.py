@@ -5,7 +5,10 @@ import re
 
 import pytest
 
+from gpca.reporting.crate import NAME
 from gpca.reporting.registry import registered
+
+from ..reporting.test_crate import faults
 
 ENTRIES = {
     entry.name: entry
@@ -58,3 +61,14 @@ def test_the_page_holds_every_table_and_figure_of_the_run(smoke):
     assert set(re.findall(r'<article id="([^"]+)">', text)) == shown_in(folder)
     assert "procedural stand-in" in text
     assert (folder / "page/plotly.min.js").is_file()
+
+
+def test_the_crate_of_the_run_names_every_result_with_a_record(smoke):
+    folder = smoke.folder / "results/smoke"
+    crate = json.loads((folder / NAME).read_text())
+    assert faults(crate, folder) == []
+    parts = {entity["@id"].rstrip("/") for entity in crate["@graph"] if entity["@type"] in ("File", "Dataset")}
+    recorded = {str(path.relative_to(folder)) for path in folder.rglob("*.provenance.json")}
+    # The records of the job that wrote the crate come after it.
+    own = {"index.html", "page/plotly.min.js", NAME}
+    assert parts - {"."} == {name.removesuffix(".provenance.json") for name in recorded} - own

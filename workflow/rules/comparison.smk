@@ -110,9 +110,12 @@ rule page:
             f"<results>/uncertainty/{{source}}/causal/seed{SEEDS[0]}.csv",
             source=UNCERTAIN,
         ),
-        code=code_files("gpca.reporting.page.page", "gpca.reporting.script"),
+        code=code_files(
+            "gpca.reporting.page.page", "gpca.reporting.crate", "gpca.reporting.script"
+        ),
     output:
         page="<results>/index.html",
+        crate="<results>/ro-crate-metadata.json",
         script="<results>/page/plotly.min.js",
     log:
         "<logs>/page.log",

@@ -103,8 +103,8 @@ rule time_stages:
         "<benchmarks>/runtime.tsv"
     conda:
         "../envs/gpca.yaml"
-    # It works on one thread but reserves the whole machine, since it measures times.
-    threads: workflow.cores or 1
+    # It works on one thread but reserves the whole machine, since it measures times; on a cluster the profile does that.
+    threads: workflow.resource_settings.cores or 1
     resources:
         mem_mb=2000,
         runtime=10,

@@ -1,7 +1,8 @@
-"""What was found, every table and figure, the comparison and some registrations -> index.html."""
+"""What was found, every table and figure, the comparison and some registrations -> index.html, and the RO-Crate."""
 
 from pathlib import Path
 
+from gpca.reporting.crate import write_crate
 from gpca.reporting.page.findings import Titles
 from gpca.reporting.page.page import Run, Shown, write_page
 from gpca.reporting.script import job
@@ -27,4 +28,6 @@ with job(snakemake):
         config=given.config,
         command=f"snakemake -j2 {snakemake.output.page}",
     )
-    write_page(Path(snakemake.output.page).parent, run)
+    folder = Path(snakemake.output.page).parent
+    write_page(folder, run)
+    write_crate(folder, run.name, [source["title"] for source in run.sources.values()], run.seeds)

@@ -1,0 +1,215 @@
+"""What a run scales to: more cores for the same run, and more datasets, seeds and explainers on a cluster.
+
+    python benchmarks/scale.py results/real [--configfile config/real.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
+    python benchmarks/scale.py results/real --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
+
+The first form schedules the jobs of a finished run, each with the seconds of its benchmark file, on several
+numbers of cores (Snakemake's own start and the cores' shared memory are not in it), and names the chain of jobs that no
+core shortens. The second plans the embedded default with so many datasets (copies of its own), seeds and explainers,
+dry, and takes the wall time and memory of that plan. A job of the plan takes the mean seconds of its rule in the
+finished run, in proportion to the results that it reads and writes: many jobs loop over the seeds. A rule that was not
+measured counts as the mean of the others, in the queue or out of it. Transfer between datasets is left out, as its cost
+grows with the square of their number. --write puts both tables between the comments that the page has for the run. The
+last line is a JSON object: speedup_<cores>, critical_s; and jobs, submitted, core_h, longest_s, results,
+plan_s, plan_mb.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import resource
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from functools import cache
+from itertools import cycle, islice
+from pathlib import Path
+from statistics import fmean
+from time import perf_counter
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+from benchmarks import markdown  # noqa: E402 (the script runs from a plain checkout)
+from benchmarks.pipeline import SIDECAR, number  # noqa: E402
+from benchmarks.schedule import Job, critical_path, wall_time  # noqa: E402
+from benchmarks.targets import plan, read_plan  # noqa: E402
+from gpca.errors import InputError  # noqa: E402
+
+RUN = "scale"
+SLOTS = (50, 500)  # jobs of a cluster at once
+WAIT_S = 10.0  # that a submitted job takes besides its work: the queue's turn, and Snakemake once more on the node
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="of a finished run, such as results/real")
+    parser.add_argument("--configfile", type=Path, help="of that run; by default config/{run}.yaml where it is")
+    parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
+    parser.add_argument("--cores", type=int, nargs="+", default=[1, 2, 4, 8, 16], help="default 1 2 4 8 16")
+    parser.add_argument("--sources", type=int, default=0, help="datasets of the larger run; by default none is planned")
+    parser.add_argument("--seeds", type=int, default=10, help="of the larger run, default 10")
+    parser.add_argument("--explainers", type=int, default=20, help="of the larger run, default 20")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the tables")
+    options = parser.parse_args(arguments)
+    try:
+        if not (options.folder / "benchmarks").is_dir():
+            raise InputError(options.folder, "holds no benchmark files", "name the folder of a finished run")
+        run = options.folder.resolve().name
+        jobs = read_plan(plan(run, options.configfile, options.config), run)
+        seconds = measured(jobs, options.folder)
+        lines, found = on_cores(jobs, seconds, options.cores)
+        if options.sources:
+            more, found_more = on_a_cluster(jobs, seconds, options)
+            lines, found = [*lines, "", *more], found | found_more
+        if options.write:
+            markdown.write_between(options.write, f"results/{run} at scale", lines)
+    except InputError as fault:
+        print(f"scale: {fault}", file=sys.stderr)
+        return 2
+    print("\n".join(lines))
+    print(json.dumps(found))
+    return 0
+
+
+def measured(jobs: Sequence[Job], folder: Path) -> dict[str, float]:
+    """Return the seconds of each job of the run: of the whole job, or else of the work that its provenance tells.
+
+    Raises:
+        InputError: one of them has neither.
+    """
+    seconds = {}
+    for job in jobs:
+        path = folder / job.benchmark
+        records = [folder / f"{output}{SIDECAR}" for output in job.outputs]
+        blocks = {record.read_bytes(): record for record in records if record.is_file()}  # one may stand beside several
+        if path.is_file():
+            seconds[job.benchmark] = sum(number(path, "s"))
+        elif blocks:
+            seconds[job.benchmark] = sum(value for record in blocks.values() for value in number(record, "seconds"))
+        else:
+            raise InputError(
+                folder, f"holds no {job.benchmark}", "finish the run, or give its --configfile and --config"
+            )
+    return seconds
+
+
+def on_cores(jobs: Sequence[Job], seconds: Mapping[str, float], cores: Sequence[int]) -> tuple[list[str], dict]:
+    """Return the table of wall times by number of cores with the critical path, and their numbers."""
+    alone_s = wall_time(jobs, seconds, 1)
+    walls_s = {count: wall_time(jobs, seconds, count) for count in cores}
+    rows = [[count, f"{wall_s / 60:.1f}", f"{alone_s / wall_s:.1f}"] for count, wall_s in walls_s.items()]
+    chain = critical_path(jobs, seconds)
+    critical_s = sum(seconds[job.benchmark] for job in chain)
+    steps = " → ".join(f"`{job.rule}` {seconds[job.benchmark]:.0f}" for job in chain)
+    lines = markdown.table(["cores", "wall time (min)", "times as fast as one core"], rows)
+    lines += ["", f"The longest chain of jobs takes {critical_s / 60:.1f} minutes (in seconds: {steps})."]
+    speedups = {f"speedup_{count}": round(alone_s / wall_s, 2) for count, wall_s in walls_s.items()}
+    return lines, speedups | {"critical_s": round(critical_s, 1)}
+
+
+def on_a_cluster(
+    jobs: Sequence[Job], seconds: Mapping[str, float], options: argparse.Namespace
+) -> tuple[list[str], dict]:
+    """Return the table of the larger run, planned dry, and its numbers."""
+    with tempfile.TemporaryDirectory() as folder:
+        config = Path(folder, "scale.json")
+        config.write_text(json.dumps(larger_config(options.sources, options.seeds, options.explainers)))
+        started = perf_counter()
+        text = plan(RUN, config, [])
+        plan_s = perf_counter() - started
+    plan_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    larger = read_plan(text, RUN)
+    expected = estimated(jobs, seconds, larger)
+    submitted = [job for job in larger if not is_local(job)]
+    core_h = sum(expected[job.benchmark] for job in larger) / 3600
+    longest_s = max(expected[job.benchmark] for job in submitted)
+    queued = expected | {job.benchmark: expected[job.benchmark] + WAIT_S for job in submitted}
+    by_rule: dict[str, float] = defaultdict(float)
+    for job in submitted:
+        by_rule[job.rule] += expected[job.benchmark] / 3600
+    most = sorted(by_rule.items(), key=lambda item: -item[1])[:5]
+    results = len({path for job in larger for path in job.outputs})
+    rows = [
+        ["jobs, and of these in the queue", f"{len(larger)}, {len(submitted)}"],
+        ["core time (h)", f"{core_h:.0f}"],
+        ["of which " + ", ".join(f"`{rule}`" for rule, _ in most), ", ".join(f"{hours:.0f}" for _, hours in most)],
+        ["longest job in the queue (min)", f"{longest_s / 60:.1f}"],
+        *([f"wall time with {n} jobs at once (h)", f"{wall_time(larger, queued, n) / 3600:.1f}"] for n in SLOTS),
+        ["results", results],
+        ["plan (`snakemake -n`): wall time (min), memory (GB)", f"{plan_s / 60:.1f}, {plan_mb / 1000:.1f}"],
+    ]
+    head = [f"{options.sources} datasets, {options.seeds} seeds, {options.explainers} explainers", ""]
+    found = {
+        "jobs": len(larger),
+        "submitted": len(submitted),
+        "core_h": round(core_h, 1),
+        "longest_s": round(longest_s, 1),
+        "results": results,
+        "plan_s": round(plan_s, 1),
+        "plan_mb": round(plan_mb),
+    }
+    return markdown.table(head, rows), found
+
+
+def larger_config(sources: int, seeds: int, explainers: int) -> dict:
+    """Return what a config changes of the default for so many of each; the default's own come first.
+
+    Raises:
+        InputError: fewer than the default has, or more explainers than there are.
+    """
+    import yaml
+
+    from baselines.registry import explainers as known
+
+    default = yaml.safe_load((ROOT / "config/config.yaml").read_text(encoding="utf-8"))
+    own = yaml.safe_load((ROOT / "config/sources.yaml").read_text(encoding="utf-8"))["sources"]
+    others = [name for name in known() if name not in default["explainers"] and not name.startswith("learner_")]
+    most = len(default["explainers"]) + len(others)
+    for name, count, low, high in (
+        ("sources", sources, len(own), 10_000),
+        ("seeds", seeds, 1, 1000),
+        ("explainers", explainers, len(default["explainers"]), most),
+    ):
+        if not low <= count <= high:
+            raise InputError(f"--{name} {count}", "cannot be planned", f"give {low} to {high}")
+    copies = islice(cycle(own.values()), sources - len(own))
+    return {
+        "seeds": list(range(seeds)),
+        "sources": {f"copy{n}": entry | {"title": f"Copy {n}"} for n, entry in enumerate(copies)},
+        "explainers": {name: {} for name in others[: explainers - len(default["explainers"])]},
+        "controls": {"controls": [name for name in default["controls"]["controls"] if name != "transfer"]},
+    }
+
+
+def estimated(jobs: Sequence[Job], seconds: Mapping[str, float], larger: Sequence[Job]) -> dict[str, float]:
+    """Return the seconds that each job of the larger run would take, by the rates of the measured one."""
+    made = {path for each in (jobs, larger) for job in each for path in job.outputs}
+
+    def files(job: Job) -> int:
+        return sum(path in made for path in (*job.inputs, *job.outputs))
+
+    rates, of_kind = defaultdict(list), defaultdict(list)
+    for job in jobs:
+        rate = seconds[job.benchmark] / files(job)
+        rates[job.rule].append(rate)
+        of_kind[is_local(job)].append(rate)
+    return {job.benchmark: files(job) * fmean(rates.get(job.rule) or of_kind[is_local(job)]) for job in larger}
+
+
+def is_local(job: Job) -> bool:
+    """Return whether a cluster's queue does not see the job: those that collect and draw run beside Snakemake."""
+    return job.rule in _local_rules() or job.benchmark.startswith(("benchmarks/tables/", "benchmarks/figures/"))
+
+
+@cache
+def _local_rules() -> set[str]:
+    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "workflow/rules").glob("*.smk"))
+    blocks = re.split(r"^rule (\w+):$", text, flags=re.MULTILINE)[1:]
+    return {rule for rule, block in zip(blocks[::2], blocks[1::2], strict=True) if "localrule: True" in block}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

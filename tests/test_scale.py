@@ -1,0 +1,83 @@
+"""What a run scales to, by the plan of the smoke run and made-up seconds; a larger run is configured, not planned."""
+
+import json
+
+import pytest
+import yaml
+from snakemake.utils import update_config
+
+from benchmarks import scale
+from benchmarks.schedule import Job
+from gpca.config.check import check
+from gpca.errors import InputError
+
+from .documents import ROOT
+
+HEADER = "s\th:m:s\tmax_rss\n"
+
+
+@pytest.fixture
+def run_folder(smoke_plan, tmp_path, monkeypatch):
+    """A run in which every job took 30 s; the larger run has the same jobs."""
+    monkeypatch.setattr(scale, "plan", lambda run, *_: smoke_plan.replace("results/smoke/", f"results/{run}/"))
+    folder = tmp_path / "smoke"
+    for job in scale.read_plan(smoke_plan, "smoke"):
+        (folder / job.benchmark).parent.mkdir(parents=True, exist_ok=True)
+        (folder / job.benchmark).write_text(HEADER + "30.0\t0:00:30\t100.0\n")
+    return folder
+
+
+def test_more_cores_are_faster_until_the_longest_chain_is_all_that_is_left(run_folder, capsys):
+    assert scale.main([str(run_folder), "--cores", "1", "2", "999"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    found = json.loads(lines[-1])
+    jobs = len(list(run_folder.rglob("*.tsv")))
+    assert found["speedup_1"] == 1
+    assert 1.9 < found["speedup_2"] <= 2
+    assert found["speedup_999"] == pytest.approx(30 * jobs / found["critical_s"], abs=0.01)
+    assert "`page` 30)." in lines[-2]
+
+
+def test_the_same_run_on_a_cluster_takes_the_same_and_the_tables_are_written(run_folder, tmp_path, capsys):
+    page = tmp_path / "page.md"
+    page.write_text("<!-- times of results/smoke at scale -->\nold\n<!-- end of results/smoke at scale -->\n")
+    assert scale.main([str(run_folder), "--sources", "3", "--write", str(page)]) == 0
+    found = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert found["jobs"] == len(list(run_folder.rglob("*.tsv"))) > found["submitted"] > 50
+    assert found["core_h"] == pytest.approx(found["jobs"] * 30 / 3600, abs=0.06)
+    assert f"| jobs, and of these in the queue | {found['jobs']}, {found['submitted']} |" in page.read_text()
+    assert "| 3 datasets, 10 seeds, 20 explainers |" in page.read_text()
+
+
+def test_a_job_grows_with_the_results_it_reads_and_writes():
+    def job(rule, inputs, outputs):
+        return Job(inputs, outputs, rule, 0, 1, rule)
+
+    jobs = [job("register", ("code.py",), ("a",)), job("metrics", ("a", "code.py"), ("t",))]
+    seconds = {"register": 10.0, "metrics": 4.0}
+    more = [job("register", ("code.py",), ("a", "b", "c")), job("metrics", ("a", "b", "c"), ("t",))]
+    more += [job("timings", ("t",), ("u",)), job("a_new_rule", (), ("v",))]
+    assert scale.estimated(jobs, seconds, more) == {"register": 30, "metrics": 8, "timings": 4, "a_new_rule": 10}
+
+
+def test_a_larger_run_has_as_many_of_each_and_passes_the_check():
+    config = {}
+    for name in ("sources", "config"):
+        update_config(config, yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()))
+    update_config(config, scale.larger_config(7, 4, 20))
+    sources = check(config)
+    assert (len(sources), len(config["seeds"]), len(config["explainers"])) == (7, 4, 20)
+    assert "transfer" not in config["controls"]["controls"]
+    assert {entry["kind"] for entry in sources.values()} == {"procedural"}
+    with pytest.raises(InputError, match="--sources 2: cannot be planned; give 3 to"):
+        scale.larger_config(2, 4, 20)
+
+
+def test_a_run_with_a_job_that_was_not_recorded_is_refused(run_folder, tmp_path, capsys):
+    assert scale.main([str(tmp_path / "nowhere")]) == 2
+    assert "nowhere: holds no benchmark files" in capsys.readouterr().err
+    (run_folder / "benchmarks/objects/ycb.tsv").unlink()
+    assert scale.main([str(run_folder)]) == 2
+    assert capsys.readouterr().err.endswith(
+        "holds no benchmarks/objects/ycb.tsv; finish the run, or give its --configfile and --config\n"
+    )
