@@ -33,26 +33,13 @@ pathvars:
     benchmarks=f"results/{config['run']}/benchmarks",
 
 
-include: "workflow/rules/common.smk"
-include: "workflow/rules/objects.smk"
-include: "workflow/rules/registrations.smk"
-include: "workflow/rules/methods.smk"
-include: "workflow/rules/causes.smk"
-include: "workflow/rules/estimators.smk"
-include: "workflow/rules/frames.smk"
-include: "workflow/rules/encoders.smk"
-include: "workflow/rules/uncertainty.smk"
-include: "workflow/rules/explainers.smk"
-include: "workflow/rules/active_learning.smk"
-include: "workflow/rules/diagnostics.smk"
-include: "workflow/rules/controls.smk"
-include: "workflow/rules/exchange.smk"
-include: "workflow/rules/gradients.smk"
-include: "workflow/rules/model.smk"
-include: "workflow/rules/recovery.smk"
-include: "workflow/rules/results.smk"
-include: "workflow/rules/comparison.smk"
-include: "workflow/rules/targets.smk"
+TOPICS = (
+    "common objects registrations methods causes estimators frames encoders uncertainty explainers active_learning "
+    "diagnostics controls exchange gradients model recovery results readings comparison targets"
+)
+for topic in TOPICS.split():
+
+    include: f"workflow/rules/{topic}.smk"
 
 
 rule all:

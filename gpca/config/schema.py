@@ -106,6 +106,7 @@ class Exchange(ExchangeSettings):
     explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
 
 
+@dataclass(frozen=True, kw_only=True)
 class Readings(ReadingSizes):
     """What the paper leaves unstated, by group, and how much of the data the readings see."""
 

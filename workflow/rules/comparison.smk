@@ -5,10 +5,6 @@ from gpca.code_files import ROOT
 from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import read_published
 
-
-include: "readings.smk"
-
-
 COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
