@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
@@ -99,5 +99,6 @@ class NewConceptSettings:
     @classmethod
     def from_dict(cls, section: dict) -> NewConceptSettings:
         """Build from the config's section ``new_concepts``, of which the encoder is another part."""
-        given = {name: value for name, value in section.items() if name != "encoder"}
-        return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})
+        given: dict[str, Any] = {name: value for name, value in section.items() if name != "encoder"}
+        lists = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
+        return cls(**given | lists)

@@ -13,7 +13,7 @@ def changed(section, **keys):
 
 FAULTS = [
     (removed("weights.pt"), {}, r"weights.pt: no such weights; make them anew with 'python -m gpca train'"),
-    (truncated("cause_weights.pt"), {}, r"cause_weights.pt: not the weights of backbone 'dgcnn', or damaged"),
+    (truncated("cause_weights.pt"), {}, r"cause_weights.pt: not the weights of backbone 'dgcnn'; make"),
     (removed("causes.npz"), {}, r"causes.npz: no such file; make it with 'python -m gpca causes'"),
     (arrays_changed("cause_embeddings.npz", sample=lambda s: s + 1), {}, r"cause_embeddings.npz: holds other samples"),
     (arrays_changed("descriptors.npz", sample=lambda s: s + 1), {}, r"descriptors.npz: holds other samples than the"),
