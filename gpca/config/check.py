@@ -10,6 +10,7 @@ from gpca.config.checks.explainers import (
     check_diagnosis,
     check_encoders,
     check_explainers,
+    check_gradients,
     check_learners,
     check_registrations,
     check_strategies,
@@ -76,6 +77,7 @@ def check(config: dict) -> dict[str, dict]:
     check_strategies(whole)
     check_learners(whole)
     check_controls(whole)
+    check_gradients(whole)
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs)
