@@ -7,6 +7,8 @@ settle the new weights in C dimensions (the extended Kalman filter of Bayesian c
 
 from __future__ import annotations
 
+from itertools import combinations_with_replacement
+
 import numpy as np
 from scipy.special import softmax
 
@@ -40,8 +42,10 @@ class BayesianLayer:
         features_N_F = _with_constant(x_N_D)
         classes, width = self._mean_C_F.shape
         spread_C_F_C_F = self._covariance_P_P.reshape(classes, width, classes, width)
-        half_C_C_N_F = np.einsum("nf,cfdg->cdng", features_N_F, spread_C_F_C_F, optimize=True)
-        covariance_N_C_C = np.einsum("cdng,ng->ncd", half_C_C_N_F, features_N_F, optimize=True)
+        covariance_N_C_C = np.empty((len(features_N_F), classes, classes))
+        for c, d in combinations_with_replacement(range(classes), 2):
+            half_N_F = features_N_F @ spread_C_F_C_F[c, :, d]
+            covariance_N_C_C[:, c, d] = covariance_N_C_C[:, d, c] = np.einsum("nf,nf->n", half_N_F, features_N_F)
         return features_N_F @ self._mean_C_F.T, covariance_N_C_C
 
     def attribute(self, x_N_D: np.ndarray, normal_M_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

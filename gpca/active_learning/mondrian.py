@@ -7,7 +7,7 @@ tree grown on all samples at once would have split, so the order of arrival does
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -34,8 +34,8 @@ class Node:
     axis: int = -1
     place: float = 0.0
     children: tuple[Node, Node] | None = None
-    x_N_D: np.ndarray | None = None
-    label_N: np.ndarray | None = None
+    x_N_D: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    label_N: np.ndarray = field(default_factory=lambda: np.empty(0, int))
 
 
 class MondrianForest:
@@ -89,7 +89,7 @@ class MondrianForest:
 
         A leaf of one class goes on waiting for a sample of its own class, and is drawn anew with one of another.
         """
-        if node.x_N_D is not None and node.label_N is not None:
+        if node.children is None:
             return self._block(np.vstack([node.x_N_D, x_D]), np.append(node.label_N, label), earlier)
         outside_D = np.maximum(node.low_D - x_D, 0) + np.maximum(x_D - node.high_D, 0)
         low_D, high_D = np.minimum(node.low_D, x_D), np.maximum(node.high_D, x_D)
@@ -102,7 +102,7 @@ class MondrianForest:
                 pair = (node, leaf) if is_above else (leaf, node)
                 counts_C = _tables(node) + _tables(leaf)
                 return Node(low_D, high_D, time, counts_C, axis, self._random.uniform(*ends), pair)
-        lower, upper = node.children or ()
+        lower, upper = node.children
         if x_D[node.axis] > node.place:
             upper = self._extended(upper, node.time, x_D, label)
         else:

@@ -19,7 +19,7 @@ from gpca.classifier.latents import Projection
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 
-TREES = 20
+TREES = 10
 DEVIATION = 3.0  # of a logit by the prior; both numbers are of development seed 100 of YCB
 DRAWS = 30  # of the weights, CLEVER's number
 

@@ -11,6 +11,7 @@ from gpca.config.checks.explainers import (
     check_diagnosis,
     check_encoders,
     check_explainers,
+    check_gradients,
     check_learners,
     check_registrations,
     check_strategies,
@@ -78,6 +79,7 @@ def check(config: dict) -> dict[str, dict]:
     check_learners(whole)
     check_controls(whole)
     check_exchange(whole, *(names_left_out(config, key) for key in ("sources", "methods", "estimators")))
+    check_gradients(whole)
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs, sources)

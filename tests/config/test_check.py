@@ -178,6 +178,12 @@ FAULTS = [
     ("model.source", "lab", "model.source: no source 'lab'; known are coffee_cup, linemod, ycb, real_rgbd"),
     ("model.encoder", "voxelnet", "model.encoder: no encoder 'voxelnet'; known are dgcnn"),
     ("runtime.repeats", 1, "runtime.repeats: 1 is less than the minimum of 2"),
+    ("gradients.deleted", [], "gradients.deleted: [] should be non-empty"),
+    (
+        "gradients.deleted",
+        [0.1, 0.98],
+        "gradients.deleted: 0.98 of 512 points leave fewer than the 20 that the encoder",
+    ),
     ("kernel_grid.sources", ["ycbv"], "kernel_grid.sources: no source 'ycbv'; known are coffee_cup, linemod, ycb"),
     ("learners.learner_tree", {}, "learners.learner_tree: explainer 'learner_tree': unknown; known are gpca_paper"),
     ("learners.learner_forest", {"tree": 3}, "learners.learner_forest: explainer 'learner_forest': got an unexpected"),

@@ -14,7 +14,7 @@ SMOKE = ("--configfile", "config/smoke.yaml")
 ROW = {"sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "run_icp": 5, "attribute": 16}
 ROW |= {"sample_causes": 2, "describe": 2, "train_on_causes": 2, "diagnose": 4}
 ROW |= {"sample_model_causes": 1, "describe_model_causes": 1}
-ROW |= {"register_methods": 1, "estimate": 1, "train_control": 1}
+ROW |= {"register_methods": 1, "estimate": 1, "train_control": 1, "follow_gradients": 1}
 ROW |= {"shift": 1, "fit_learners": 1, "embed_without": 2, "learn_actively": 2}
 COLLECTORS = {"metrics": 1, "timings": 1, "fig_attribution_confusions": 1, "table1_extended": 1}
 TABLES = dict.fromkeys(("table1_single_baselines", "table2_per_concept"), 1)
@@ -29,6 +29,7 @@ TABLES |= dict.fromkeys(("registration_methods", "table11_registration", "table1
 TABLES |= dict.fromkeys(("estimator_metrics", "table12_uncertainty", "estimators"), 1)
 TABLES |= dict.fromkeys(("control_metrics", "control_intervals", "control_severities"), 1)
 TABLES |= dict.fromkeys(("table10_controls", "table10_transfer", "table10_costs", "severity_curves", "transfer"), 1)
+TABLES |= dict.fromkeys(("gradient_metrics", "saliency_deletion", "tcav"), 1)
 TABLES |= dict.fromkeys(("coverage_risk", "reliability", "uncertainty_vs_distance"), 1)
 
 

@@ -47,6 +47,9 @@ CONTROLS_SHOWN += jobs("table10_controls", "table10_transfer", "table10_costs", 
 CONTROLS = jobs(explain_controls=2) + CONTROLS_SHOWN
 # With other methods and estimators beneath them: explainers of one source.
 EXCHANGED = jobs("explain_exchanged", "exchange_metrics", "table14_estimator_explanations", "table14_method_matrix")
+GRADIENTS_SHOWN = jobs("gradient_metrics", "saliency", "saliency_deletion", "tcav")
+GRADIENTS = jobs(follow_gradients=2) + GRADIENTS_SHOWN
+READINGS_SHOWN = jobs("readings", "table13_readings")
 # Explainers times two sources: three with a GPC (on the frames classic features and the pair too), four on embeddings,
 # 11 on uncertainties.
 WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 2, 2 * 4, 2 * 11))
@@ -135,7 +138,7 @@ def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
 EDITS = {
     "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
     + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD
-    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW,
+    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW + GRADIENTS,
     "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
@@ -167,7 +170,7 @@ EDITS = {
     "gpca/encoders/dgcnn.py": PRETRAINED + jobs(train_encoder=4, embed=6, embed_without=4, learn_actively=4)
     + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
     + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
-    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW,
+    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW + GRADIENTS,
     "gpca/objects/uw_rgbd.py": jobs(),
     "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
     + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=4, run_icp=5)
@@ -175,7 +178,7 @@ EDITS = {
     + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
     + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
     + jobs(sample_model_causes=1, describe_model_causes=1, train_control=1) + MODEL
-    + jobs("register_methods", "estimate") + METHODS + ESTIMATED + CONTROLS + NEW,
+    + jobs("register_methods", "estimate", "follow_gradients") + METHODS + ESTIMATED + CONTROLS + NEW + GRADIENTS_SHOWN,
     "gpca/descriptors/entropy.py":
         jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED
         + EXCHANGED + NEW + NEW_SHOWN,
@@ -233,7 +236,7 @@ def test_a_changed_setting_reruns_what_depends_on_it(finished):
     planned = finished.dry_run(*SMOKE, "mine.yaml")
     assert without_ends(planned.jobs) == (
         jobs("table1_single_baselines", "table2_per_concept", attribute=2)
-        + COLLECTORS + DIAGNOSED + BACKBONES + MODEL + RECOVERY + METHOD
+        + COLLECTORS + DIAGNOSED + BACKBONES + MODEL + RECOVERY + METHOD + GRADIENTS
     )  # fmt: skip
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 

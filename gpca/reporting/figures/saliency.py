@@ -16,6 +16,7 @@ from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.style import LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, save_figure, use_style, write_title
 
 HEIGHT_IN = 2.75
+COLOURS = "viridis"
 
 
 def draw_saliency(
@@ -49,19 +50,20 @@ def draw_saliency(
         raise InputError(maps_npz, f"holds other samples than {deletions_csv}", "make both anew")
     use_style()
     import matplotlib.pyplot as plt
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure, axes = plt.subplots(1, len(CONCEPTS), figsize=(TEXT_WIDTH_IN, HEIGHT_IN), layout="constrained")
-    figure.get_layout_engine().set(rect=(0, 0, 1, 1 - 0.2 / HEIGHT_IN))
-    drawn = None
+    below_title = ConstrainedLayoutEngine(rect=(0, 0, 1, 1 - 0.2 / HEIGHT_IN))
+    figure, axes = plt.subplots(1, len(CONCEPTS), figsize=(TEXT_WIDTH_IN, HEIGHT_IN), layout=below_title)
     for panel, concept in zip(axes, CONCEPTS, strict=True):
         panel.set_axis_off()
         if concept in shown:
             sample = shown[concept]
             of_sample = (maps["points"][places[sample]], maps["saliency"][places[sample]])
-            drawn = _draw_map(panel, registrations.target(test[sample]), *of_sample)
+            _draw_map(panel, registrations.target(test[sample]), *of_sample)
             score = rows.loc[rows["sample"] == str(sample), ["named", "before"]].iloc[0]
             panel.set_title(f"{concept}: named {score['named']}, {score['before']:.2f}", fontsize=SMALL_PT + 1)
-    bar = figure.colorbar(drawn, ax=axes, shrink=0.75, pad=0.01, ticks=[0, 0.5, 1])
+    bar = figure.colorbar(ScalarMappable(cmap=COLOURS), ax=axes, shrink=0.75, pad=0.01, ticks=[0, 0.5, 1])
     bar.set_label("rank of the point's saliency", fontsize=SMALL_PT)
     bar.ax.set_yticklabels(["least", "median", "most"], fontsize=SMALL_PT)
     write_title(figure, f"{title}: points that GP-CA's score reacts to")
@@ -74,15 +76,12 @@ def _chosen(of_concept) -> int | None:
     return None if kept.empty else int(kept["sample"].iloc[(len(kept) - 1) // 2])
 
 
-def _draw_map(panel, target_Q_3: np.ndarray, points_N_3: np.ndarray, saliency_N: np.ndarray):
+def _draw_map(panel, target_Q_3: np.ndarray, points_N_3: np.ndarray, saliency_N: np.ndarray) -> None:
     """Scatter the target in grey and the points by the rank of their saliency, the salient ones in front."""
     view = widest_views(target_Q_3)[0]
     target, points = target_Q_3 @ view.T, points_N_3 @ view.T
     panel.scatter(target[:, 0], target[:, 1], s=0.6, c=LIGHT_GREY, linewidths=0)
     order = np.argsort(saliency_N, kind="stable")
     ranks = np.linspace(0, 1, len(order))
-    drawn = panel.scatter(
-        points[order, 0], points[order, 1], s=5, c=ranks, cmap="viridis", vmin=0, vmax=1, linewidths=0
-    )
+    panel.scatter(points[order, 0], points[order, 1], s=5, c=ranks, cmap=COLOURS, vmin=0, vmax=1, linewidths=0)
     panel.set_aspect("equal")
-    return drawn
