@@ -48,7 +48,11 @@ rule reading:
         code=lambda wildcards: code_files(
             "gpca.steps.readings",
             GROUPS[wildcards.reading_group].module,
-            encoder_module(config["embedding"]["encoder"]),
+            *(
+                [encoder_module(config["embedding"]["encoder"])]
+                if wildcards.reading_group == "encoder_head"
+                else []
+            ),
         ),
     output:
         "<results>/readings/{reading_group}.csv",
