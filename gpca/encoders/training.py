@@ -290,4 +290,4 @@ def _two_layers(embedding_size: int, classes: int) -> nn.Module:
     return nn.Sequential(hidden, nn.BatchNorm1d(HIDDEN), nn.LeakyReLU(0.2), nn.Dropout(0.5), nn.Linear(HIDDEN, classes))
 
 
-_HEADS = {"linear": nn.Linear, "two_layer": _two_layers}
+_HEADS: dict[str, Callable[[int, int], nn.Module]] = {"linear": nn.Linear, "two_layer": _two_layers}

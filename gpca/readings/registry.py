@@ -23,6 +23,7 @@ class Group:
         reads: kinds of files, fields of :class:`gpca.readings.given.Given`.
         sources: of which printed numbers are asked; empty for depth frames.
         methods: whose predictions it reads.
+        costly: it takes minutes a seed, so that it sees the first one alone.
     """
 
     title: str
@@ -31,6 +32,7 @@ class Group:
     reads: tuple[str, ...]
     sources: tuple[str, ...] = ALL_SOURCES
     methods: tuple[str, ...] = ()
+    costly: bool = False
 
     @property
     def module(self) -> str:
@@ -53,7 +55,9 @@ GROUPS = {
         ("registrations", "predictions"),
         methods=("gpca_paper", "gpca"),
     ),
-    "gpc_start": Group("How the GPC starts", settings.GPCStart, "gpc_start:run", ("sets",), ("ycb", "linemod")),
+    "gpc_start": Group(
+        "How the GPC starts", settings.GPCStart, "gpc_start:run", ("sets",), ("ycb", "linemod"), costly=True
+    ),
     "kernel": Group("Kernel of Table V's GPC", settings.TableKernel, "learners:kernel", ("sets",)),
     "linear_svm": Group("Which linear SVM", settings.LinearSVM, "learners:linear_svm", ("sets",)),
     "encoder_head": Group(

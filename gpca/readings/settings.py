@@ -14,12 +14,22 @@ from gpca.classifier.settings import Kernel, LearningRate
 from gpca.settings import Bounds, Count, OpenShare, Positive
 
 Quantity = Literal[
-    *("divergence", "divergence_reversed", "log_determinant", "trace"),
-    *("residual", "inlier_rmse", "inlier_rmse_of_one"),
+    "divergence",
+    "divergence_reversed",
+    "log_determinant",
+    "trace",
+    "residual",
+    "inlier_rmse",
+    "inlier_rmse_of_one",
 ]
 Set = Literal[
-    *("in_distribution", "severity", "source", "objects"),
-    *("in_distribution+severity", "in_distribution+source", "seen_objects+objects"),
+    "in_distribution",
+    "severity",
+    "source",
+    "objects",
+    "in_distribution+severity",
+    "in_distribution+source",
+    "seen_objects+objects",
 ]
 Starts = Annotated[int, Bounds(minimum=2)]
 

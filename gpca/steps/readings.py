@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, get_type_hints
 
 import pandas as pd
 import torch
@@ -17,7 +19,7 @@ from gpca.readings.settings import ReadingSizes, name_of, readings_of
 from gpca.settings import check_settings
 from gpca.steps import checked_sections
 
-KINDS = {
+KINDS: dict[str, Callable[[list[Path]], dict]] = {
     "registrations": by_source_and_seed,
     "sets": by_source_and_seed,
     "predictions": by_method,
@@ -42,7 +44,7 @@ def run(options: Namespace) -> None:
     check_settings(choices, "readings", "groups", options.group)
     check_settings(sizes, "readings")
     sections = checked_sections(settings, SECTIONS)
-    names = list(group.choices.__dataclass_fields__)
+    names = list(get_type_hints(group.choices))
     if missing := [name for name in names if name not in choices]:
         raise InputError(f"choices of {options.group}", f"lack '{missing[0]}'", "give its values")
     for kind in KINDS:
@@ -50,7 +52,7 @@ def run(options: Namespace) -> None:
             wanted = "give at least one file" if kind in group.reads else "leave it out"
             read = ", ".join(group.reads)
             raise InputError(f"--{kind}", f"readings of {options.group} read {read}", wanted)
-    files = {kind: by_name(getattr(options, kind)) for kind, by_name in KINDS.items()}
+    files: dict[str, Any] = {kind: by_name(getattr(options, kind)) for kind, by_name in KINDS.items()}
     inputs = [path for of_kind in files.values() for path in of_kind.values()]
     with record_provenance([options.out], inputs, options.settings):
         given = Given(**files, sections=sections)

@@ -201,6 +201,11 @@ def test_what_the_page_alone_uses_makes_the_page_alone(planned, name):
     assert planned.behind(name) == {"page": 1}
 
 
+def test_a_group_of_readings_is_run_again_for_its_own_code_alone(planned):
+    again = planned.behind("gpca/readings/severities.py")
+    assert [again[rule] for rule in ("reading", "reading_values", "comparison", "table13_readings")] == [1, 1, 1, 1]
+
+
 def test_the_comparison_comes_after_every_number(planned):
     for name in ("metrics", "active_learning", "real_world", "diagnostics", "kernels", "runtime"):
         assert "comparison" in planned.behind(f"results/smoke/{name}.csv")

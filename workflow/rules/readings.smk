@@ -16,7 +16,7 @@ def read_by_readings(wildcards):
     """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
     group = GROUPS[wildcards.reading_group]
     sources = [name for name in group.sources if name in SOURCES]
-    seeds = SEEDS[: READINGS["seeds"]]
+    seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
     made = "predictions"
     methods = [name for name in group.methods if name in config["explainers"]]
     if wildcards.reading_group == "diagnostics":
@@ -48,7 +48,11 @@ rule reading:
         code=lambda wildcards: code_files(
             "gpca.steps.readings",
             GROUPS[wildcards.reading_group].module,
-            encoder_module(config["embedding"]["encoder"]),
+            *(
+                [encoder_module(config["embedding"]["encoder"])]
+                if wildcards.reading_group == "encoder_head"
+                else []
+            ),
         ),
     output:
         "<results>/readings/{reading_group}.csv",
