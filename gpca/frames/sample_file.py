@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,11 +11,14 @@ from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
 _TRUTH = {"True": True, "False": False}
 
 
-def read_samples_of_frames(path: str | Path):
+def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
     """Read the columns that tell samples apart, as text but for `in_training`.
 
     Raises:

@@ -82,7 +82,7 @@ rule pretrain_encoder:
         "../envs/gpca.yaml"
     threads: 1
     resources:
-        mem_mb=4000,
+        mem_mb=3000,
         runtime=60,
     params:
         settings=lambda wildcards: encoder_settings(
