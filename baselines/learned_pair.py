@@ -38,8 +38,7 @@ class LearnedPairGPCA(DescribedPairs):
     ) -> None:
         super().__init__(source, seed, "relations", points)
         self._encoder = encoder
-        self._training = {"draw_points": min(draw_points, points), "epochs": epochs}
-        self._training["learning_rate"] = encoder_learning_rate
+        self._training = (min(draw_points, points), epochs, encoder_learning_rate)
         self._embedding = f"{self._prefix}embedding_by_{encoder}"
         self._gpca = GPCA(source, seed, **settings)
         self._embed: Callable[[Registrations], Registrations] | None = None
@@ -48,7 +47,7 @@ class LearnedPairGPCA(DescribedPairs):
         """Train the encoder on the labelled pairs, and return what attaches its embeddings."""
         from gpca.descriptors.registered import MOTION
         from gpca.encoders.settings import EncoderSettings
-        from gpca.explainers.pair_encoder import PairDraw, PairEncoder
+        from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
 
         draw = PairDraw(self._prefix + "points", self._prefix + "motion")
 
@@ -57,8 +56,9 @@ class LearnedPairGPCA(DescribedPairs):
             motion = self.features(described)[:, -MOTION:]
             return replace(described, attached={**described.attached, draw.motion: motion})
 
-        settings = EncoderSettings(backbone=self._encoder, draws=2, **self._training)
-        encoder = PairEncoder(settings, draw, *self._axes).fit(seen(registrations))
+        draw_points, epochs, learning_rate = self._training
+        settings = EncoderSettings(self._encoder, draw_points, draws=2, epochs=epochs, learning_rate=learning_rate)
+        encoder = learn_pair_encoder(seen(registrations), settings, draw, *self._axes)
 
         def embed(asked: Registrations) -> Registrations:
             described = self.describe(asked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ import torch
 
 from gpca.encoders.pair import PAIR_ENCODERS
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import Classifier, embed, train_encoder
+from gpca.encoders.training import embed, train_encoder
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import generator
 
@@ -39,27 +40,17 @@ class PairDraw:
         return [torch.from_numpy(np.array(drawn, np.float32)), torch.from_numpy(motion_B_M.astype(np.float32))]
 
 
-class PairEncoder:
-    """One of :data:`gpca.encoders.pair.PAIR_ENCODERS`, with its training.
+def learn_pair_encoder(
+    registrations: Registrations, settings: EncoderSettings, draw: PairDraw, source: str, seed: int
+) -> Callable[[Registrations], np.ndarray]:
+    """Train an encoder with a head over the concepts, drop the head, and return what embeds registrations, (N, d).
 
     Args:
-        settings: how it is trained; the backbone is its name.
+        registrations: labelled, with the arrays of `draw` attached.
+        settings: how it is trained; the backbone is one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
         draw: what it sees.
         source, seed: name what is random.
     """
-
-    def __init__(self, settings: EncoderSettings, draw: PairDraw, source: str, seed: int) -> None:
-        self._settings, self._draw, self._axes = settings, draw, (source, seed)
-        self._model: Classifier | None = None
-
-    def fit(self, registrations: Registrations) -> PairEncoder:
-        """Train it with a head over the concepts, and drop the head."""
-        make = PAIR_ENCODERS[self._settings.backbone]
-        self._model, _ = train_encoder(
-            registrations, *self._axes, self._settings, make=lambda: make(**self._settings.options), draw=self._draw
-        )
-        return self
-
-    def __call__(self, registrations: Registrations) -> np.ndarray:
-        """Return embeddings (N, d)."""
-        return embed(self._model, registrations, *self._axes, self._settings, self._draw)[0]
+    make = PAIR_ENCODERS[settings.backbone]
+    model, _ = train_encoder(registrations, source, seed, settings, make=lambda: make(**settings.options), draw=draw)
+    return lambda asked: embed(model, asked, source, seed, settings, draw)[0]
