@@ -97,7 +97,7 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
     entities += [_software(job.code, job.libraries) for job in jobs]
     entities += [_library(*library) for job in jobs for library in job.libraries.items()]
     actions = [_action(job, named) for job in jobs]
-    root = {
+    root: dict[str, Any] = {
         "@id": "./",
         "@type": "Dataset",
         "name": name,
@@ -110,8 +110,13 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
         "mentions": _references(action["@id"] for action in actions),
     }
     title = "Human-Interpretable Uncertainty Explanations for Point Cloud Registration"
-    about = {"@id": NAME, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": SPECIFICATION}}
-    known = [
+    about: dict[str, Any] = {
+        "@id": NAME,
+        "@type": "CreativeWork",
+        "about": {"@id": "./"},
+        "conformsTo": {"@id": SPECIFICATION},
+    }
+    known: list[dict[str, Any]] = [
         {"@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5"},
         {"@id": PAPER, "@type": "ScholarlyArticle", "name": title},
     ]

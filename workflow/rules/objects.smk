@@ -21,7 +21,7 @@ rule sample_objects:
         "<benchmarks>/objects/{source}.tsv"
     wildcard_constraints:
         source="|".join(CONFIGURED_SOURCES),
-    priority: 20 # everything waits for it
+    priority: 20  # everything waits for it
     conda:
         "../envs/gpca.yaml"
     threads: 1

@@ -21,7 +21,7 @@ rule register:
         "<benchmarks>/registrations/{source}/seed{seed}.tsv"
     wildcard_constraints:
         source="|".join(SOURCES),
-    priority: 15 # more than any training: with many cores, the longest ones would start late
+    priority: 15  # more than any training: with many cores, the longest ones would start late
     conda:
         "../envs/gpca.yaml"
     threads: 1
