@@ -6,7 +6,7 @@
 The first form schedules the jobs of a finished run, each with the seconds of its benchmark file, on several
 numbers of cores (Snakemake's own start and the cores' shared memory are not in it), and names the chain of jobs that no
 core shortens. The second plans the embedded default with so many datasets (copies of its own), seeds and explainers,
-dry, and takes the wall time and memory of that plan. A job of the plan takes the mean seconds of its rule in the
+dry, and takes the core time and memory of that plan. A job of the plan takes the mean seconds of its rule in the
 finished run, in proportion to the results that it reads and writes: many jobs loop over the seeds. A rule that was not
 measured counts as the mean of the others, in the queue or out of it. Transfer between datasets is left out, as its cost
 grows with the square of their number. --write puts both tables between the comments that the page has for the run. The
@@ -28,7 +28,6 @@ from functools import cache
 from itertools import cycle, islice
 from pathlib import Path
 from statistics import fmean
-from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
@@ -117,10 +116,11 @@ def on_a_cluster(
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder, "scale.json")
         config.write_text(json.dumps(larger_config(options.sources, options.seeds, options.explainers)))
-        started = perf_counter()
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         text = plan(RUN, config, [])
-        plan_s = perf_counter() - started
-    plan_mb = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    plan_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    plan_mb = after.ru_maxrss / 1024
     larger = read_plan(text, RUN)
     expected = estimated(jobs, seconds, larger)
     submitted = [job for job in larger if not is_local(job)]
@@ -139,7 +139,7 @@ def on_a_cluster(
         ["longest job in the queue (min)", f"{longest_s / 60:.1f}"],
         *([f"wall time with {n} jobs at once (h)", f"{wall_time(larger, queued, n) / 3600:.1f}"] for n in SLOTS),
         ["results", results],
-        ["plan (`snakemake -n`): wall time (min), memory (GB)", f"{plan_s / 60:.1f}, {plan_mb / 1000:.1f}"],
+        ["plan (`snakemake -n`): core time (min), memory (GB)", f"{plan_s / 60:.1f}, {plan_mb / 1000:.1f}"],
     ]
     head = [f"{options.sources} datasets, {options.seeds} seeds, {options.explainers} explainers", ""]
     found = {

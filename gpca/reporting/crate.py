@@ -73,13 +73,17 @@ def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Seq
 
 
 def read_jobs(folder: Path) -> list[Job]:
-    """Return the jobs of a run, by their first output; those that wrote several files left one record beside each."""
+    """Return the jobs of a run, by their first output; those that wrote several files left one record beside each.
+
+    The job that writes the crate is left out: what an earlier one has left says nothing of this one.
+    """
     paths_of = defaultdict(list)
     for path in sorted(folder.rglob(f"*{RECORD}")):
         paths_of[path.read_bytes()].append(path)
     if not paths_of:
         raise InputError(folder, f"holds no *{RECORD}", "name the folder of a finished run")
-    return [_job(folder, paths) for paths in paths_of.values()]
+    own = {folder / f"{NAME}{RECORD}"}
+    return [_job(folder, paths) for paths in paths_of.values() if own.isdisjoint(paths)]
 
 
 def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
@@ -97,7 +101,7 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
     entities += [_software(job.code, job.libraries) for job in jobs]
     entities += [_library(*library) for job in jobs for library in job.libraries.items()]
     actions = [_action(job, named) for job in jobs]
-    root = {
+    root: dict[str, Any] = {
         "@id": "./",
         "@type": "Dataset",
         "name": name,
@@ -110,8 +114,13 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
         "mentions": _references(action["@id"] for action in actions),
     }
     title = "Human-Interpretable Uncertainty Explanations for Point Cloud Registration"
-    about = {"@id": NAME, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": SPECIFICATION}}
-    known = [
+    about: dict[str, Any] = {
+        "@id": NAME,
+        "@type": "CreativeWork",
+        "about": {"@id": "./"},
+        "conformsTo": {"@id": SPECIFICATION},
+    }
+    known: list[dict[str, Any]] = [
         {"@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5"},
         {"@id": PAPER, "@type": "ScholarlyArticle", "name": title},
     ]
