@@ -118,8 +118,8 @@ def _try_situation(
         return None, 1
     for tried in range(1, 1 + MISPLACED):
         situation = situations.misplaced(clean, tried)
-        start = register_misplaced(situation, estimated, points, icp)
-        assert start is not None  # the same points were registered before
-        if not is_right(start):
+        attempt = register_misplaced(situation, estimated, points, icp)
+        assert attempt is not None  # the same points were registered before
+        if not is_right(attempt):
             break
-    return (situation, start), tried
+    return (situation, attempt), tried

@@ -62,7 +62,7 @@ rule train_control:
         mem_mb=3000,
         runtime=60,
     params:
-        settings=control_settings,
+        settings=lambda wildcards: control_settings(wildcards),
     shell:
         "python -m gpca train_control --threads {threads} --control {wildcards.control} "
         "--registrations {input.registrations} --source {wildcards.source} --seed {wildcards.seed} "
