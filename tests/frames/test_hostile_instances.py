@@ -68,7 +68,7 @@ ARRAYS = {
     "negative pixels": ("pixels", put(-1, 0, 0), "'pixels' lie outside of any image"),
     "pixels that would fill the memory": ("pixels", put(2**31 - 1, 0), "'pixels' lie outside of any image"),
     "offsets backwards": ("offsets", lambda a: a[::-1], "'offsets' do not match"),
-    "one group": ("group", lambda a: 0 * a, "all are of one group of frames"),
+    "one scene": ("scene", lambda a: 0 * a, "all are of one scene"),
     "symmetry as words": ("symmetric", lambda a: a.astype(str), "array 'symmetric' is of type <U"),
 }
 
