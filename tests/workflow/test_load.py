@@ -102,7 +102,7 @@ def test_the_slurm_profile_plans_everything_with_what_the_rules_declare(project)
     pytest.importorskip("snakemake_executor_plugin_slurm")
     done = project.plan("all", "--profile", "workflow/profiles/slurm")
     assert "profiles/slurm and workflow specific profile profiles/default" in done.stderr
-    encoder = re.search(r"^rule train_encoder:\n(?:    .*\n)+", done.stdout, re.MULTILINE)[0]
+    encoder = re.search(r"^ *rule train_encoder:\n(?: +.*\n)+", done.stdout, re.MULTILINE)[0]  # within its group
     assert "mem_mb=3000" in encoder
     assert "runtime=60" in encoder
 
