@@ -43,7 +43,7 @@ class LearnedPairGPCA(DescribedPairs):
         self._gpca = GPCA(source, seed, **settings)
         self._embed: Callable[[Registrations], Registrations] | None = None
 
-    def learn(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
+    def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
         """Train the encoder on the labelled pairs, and return what attaches its embeddings."""
         from gpca.descriptors.registered import MOTION
         from gpca.encoders.settings import EncoderSettings
@@ -69,7 +69,7 @@ class LearnedPairGPCA(DescribedPairs):
     def fit(self, registrations: Registrations) -> None:
         """Fit the GPC to the labelled pairs, after the encoder, unless its embeddings are attached."""
         if self._embedding not in registrations.attached:
-            self._embed = self.learn(registrations)
+            self._embed = self.learn_encoder(registrations)
         self._gpca.fit(self._embedded(registrations))
 
     def explain(self, registrations: Registrations) -> Attribution:

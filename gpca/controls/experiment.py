@@ -129,7 +129,7 @@ class Experiment:
             explainer = rival.make()
             if isinstance(explainer, Encoding):
                 with self.costs.learning(control, name):
-                    embeds[name] = explainer.learn(train)
+                    embeds[name] = explainer.learn_encoder(train)
         return embeds
 
     def _time_asking(self, plain: Registrations, embeds: Mapping[str, Attach]) -> None:

@@ -40,7 +40,7 @@ class Describing(Protocol):
 class Encoding(Protocol):
     """An explainer with an encoder of its own, learnt once for all labels on its embeddings."""
 
-    def learn(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
+    def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
         """Train the encoder on labelled registrations, and return what attaches its embeddings.
 
         Where they are attached, ``fit`` and ``explain`` read them.

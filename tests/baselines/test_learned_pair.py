@@ -16,7 +16,7 @@ def test_concepts_are_told_apart_by_an_encoder_of_its_own_or_by_embeddings_that_
     assert found.concepts == CONCEPTS
     assert (found.predicted_N == test.concept).mean() > 0.6
 
-    attach = EXPLAINERS[name].make("tiny", 100, **SETTINGS, draws=50).learn(train)
+    attach = EXPLAINERS[name].make("tiny", 100, **SETTINGS, draws=50).learn_encoder(train)
     after.fit(attach(train))
     again = after.explain(attach(test).without_labels())
     assert np.array_equal(again.scores_N_C, found.scores_N_C)

@@ -108,7 +108,7 @@ class WithEncoder(Nearest):
 
     learnt: ClassVar[list] = []
 
-    def learn(self, registrations):
+    def learn_encoder(self, registrations):
         self.learnt.append(registrations.concept.tolist())
         return lambda asked: replace(asked, attached={**asked.attached, "embedding": seen(asked)[0]})
 
