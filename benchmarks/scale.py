@@ -158,7 +158,7 @@ def larger_config(sources: int, seeds: int, explainers: int) -> dict:
     """Return what a config changes of the default for so many of each; the default's own come first.
 
     Raises:
-        InputError: fewer than the default has, or more explainers than there are.
+        InputError: fewer sources than the default has, or more explainers than there are.
     """
     import yaml
 
@@ -171,15 +171,16 @@ def larger_config(sources: int, seeds: int, explainers: int) -> dict:
     for name, count, low, high in (
         ("sources", sources, len(own), 10_000),
         ("seeds", seeds, 1, 1000),
-        ("explainers", explainers, len(default["explainers"]), most),
+        ("explainers", explainers, 1, most),
     ):
         if not low <= count <= high:
             raise InputError(f"--{name} {count}", "cannot be planned", f"give {low} to {high}")
+    further = {name: {} for name in others[: max(0, explainers - len(default["explainers"]))]}
     copies = islice(cycle(own.values()), sources - len(own))
     return {
         "seeds": list(range(seeds)),
         "sources": {f"copy{n}": entry | {"title": f"Copy {n}"} for n, entry in enumerate(copies)},
-        "explainers": {name: {} for name in others[: explainers - len(default["explainers"])]},
+        "explainers": further | dict.fromkeys(list(default["explainers"])[explainers:], False),
         "controls": {"controls": [name for name in default["controls"]["controls"] if name != "transfer"]},
     }
 

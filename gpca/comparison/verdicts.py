@@ -73,15 +73,13 @@ def compare(
     """
     import pandas as pd
 
-    deviations: dict[Counterpart | None, Number] = {
-        n.counterpart: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"
-    }
+    deviations = {n.key[:2]: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"}
     records: list[dict] = []
     values: dict[tuple[str, ...], Reproduced | None] = {}
     for number in numbers:
         if number.unit not in tolerances:
             raise InputError("config key comparison.tolerances", f"no unit '{number.unit}'", "give its tolerance")
-        deviation = deviations.get(_deviation_of(number.counterpart))
+        deviation = _deviation_of(number, deviations)
         printed = printed_of(number, deviation)
         found = values[number.key] = value_of_run(number, results, clusters)
         tolerance = tolerances[number.unit]
@@ -212,10 +210,12 @@ def _hardware(number: Number, results: Mapping[str, pd.DataFrame], hardware: str
     return ", ".join(rows.loc[rows["device"] == counterpart.concept, "hardware"].unique())
 
 
-def _deviation_of(counterpart: Counterpart | None) -> Counterpart | None:
-    from dataclasses import replace
-
-    return replace(counterpart, statistic="deviation") if counterpart and counterpart.statistic == "mean" else None
+def _deviation_of(number: Number, deviations: Mapping[tuple[str, str], Number]) -> Number | None:
+    """Return what is printed beside a mean as its standard deviation: in its row, or in that of the same number."""
+    if not number.counterpart or number.counterpart.statistic != "mean":
+        return None
+    table, row, _ = number.same_as or number.key
+    return deviations.get((table, row))
 
 
 def _log(value: float) -> float:

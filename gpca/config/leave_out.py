@@ -16,8 +16,7 @@ from gpca.recovery.policies import ALWAYS, POLICIES
 LEAVABLE = (
     *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
     *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
-    "exchange.explainers",
-    "readings.groups",
+    *("exchange.explainers", "readings.groups"),
 )
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
 SWITCHES = ("active_learning.strategies", "recovery.policies")
@@ -37,7 +36,7 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the config without what it leaves out, and without the rows that need it; `config` stays as it is.
 
     A row is an entry of a list, an explainer or a policy. What names one thing that is left out, such as
-    `figures.source`, stays: :func:`gpca.config.check.check` says that it has to name another.
+    `figures.source`, or a list of nothing else stays: :func:`gpca.config.check.check` says that it has to name another.
 
     Raises:
         InputError: a switch that is neither true nor false.
@@ -49,7 +48,9 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     for key in SWITCHES:
         _change(whole, key, lambda switches, key=key: list(_names_switched_on(key, switches)))
     for key, of in LISTED.items():
-        _change(whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone], list)
+        _change(
+            whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone] or names, list
+        )
     gone = left_out["encoders"]
     _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}

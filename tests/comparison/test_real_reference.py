@@ -46,14 +46,15 @@ def shown():
 def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
     rows = reference()
     assert len(rows) == len(shown) == 112
-    kept = (rows["verdict"] != "not run").to_numpy()  # the file behind Table V is too large to be kept
-    assert set(rows.loc[~kept, "table"]) <= {"V"}
+    # The file behind Table V is too large to be kept, and that run had no row of one encoder in Table VI.
+    kept = (rows["verdict"] != "not run").to_numpy()
+    assert set(rows.loc[~kept, "table"]) <= {"V", "VI"}
     numbers = ("published", "paper_low", "paper_high", "reproduced", "ci_low")
     for column in ("table", "row", "column", *numbers, "repeat_of"):
         assert rows.loc[kept, column].tolist() == pytest.approx(shown.loc[kept, column].tolist(), nan_ok=True)
     # Predictions are not kept either: where they widen the interval, the verdict may have become another.
     kept = kept & shown["cluster_low"].isna().to_numpy()
-    assert kept.sum() > 50
+    assert kept.sum() > 30
     for column in ("verdict", "reason"):
         assert rows.loc[kept, column].tolist() == shown.loc[kept, column].tolist()
 
@@ -88,10 +89,11 @@ def test_the_readme_counts_the_verdicts_of_the_reference(shown):
     chances = chance(shown, TOLERANCES)
     of_all = chances.pop(ALL)
     told = (
-        f"{of_all.agree} numbers are reproduced or close, and {of_all.expected:.1f} would be with our values shuffled"
+        f"{of_all.agree} numbers are reproduced or close; {of_all.expected:.1f} would be if our values were shuffled "
+        f"within their columns (p = {of_all.p:.2f}). The levels agree, but the order of the rows does not, except for "
+        "the kernels of Table IV."
     )
     assert told in words
-    assert f"(p = {of_all.p:.2f}): levels agree, which row is which does not, but for the kernels of Table IV." in words
     assert min(chances, key=lambda table: chances[table].p) == "IV"
     missed = shown[(shown["verdict"] == "not reproduced") & (shown["repeat_of"] == "")]
     times = missed[missed["unit"].isin(["s", "ms"])]

@@ -73,7 +73,7 @@ def test_a_dataset_that_is_false_leaves_the_scenes():
         ("estimators.gauss", "estimators: no estimator 'gauss'; known are bayesian_icp, "),
         ("methods.icp", "methods: no registration method 'icp'; known are fgr, "),
         ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; known are pointnet, "),
-        ("sources.ycb", "recovery.objects: source 'ycb' is left out; known are coffee_cup, linemod"),
+        ("sources.ycb", "exchange.sources: source 'ycb' is left out; known are coffee_cup, linemod"),
         ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; known are linemod, ycb"),
         ("recovery.actions.denoise", "recovery.treatments.noise: action 'denoise' is left out; known are reinit"),
         ("uncertainty.causal", "uncertainty: 'causal' is a required property"),

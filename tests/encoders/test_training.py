@@ -11,7 +11,7 @@ from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
 SETTINGS = EncoderSettings(draw_points=64, draws=2, epochs=6, batch_size=12, options={"k": 8, "point_features": 16})
-KEEP = training._keep
+KEEP = training.keep
 
 
 def train(registrations, checkpoint=None, seed=0, settings=SETTINGS):
@@ -37,7 +37,7 @@ def epochs_run(monkeypatch):
         epochs.append(curve[-1]["epoch"])
         KEEP(checkpoint, identity, state, curve)
 
-    monkeypatch.setattr(training, "_keep", keep)
+    monkeypatch.setattr(training, "keep", keep)
     return epochs
 
 
@@ -50,7 +50,7 @@ def interrupted(registrations, checkpoint, after, settings=SETTINGS):
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as monkeypatch, pytest.raises(KeyboardInterrupt):
-        monkeypatch.setattr(training, "_keep", keep)
+        monkeypatch.setattr(training, "keep", keep)
         train(registrations, checkpoint, settings=settings)
     assert checkpoint.is_file()
 

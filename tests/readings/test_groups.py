@@ -115,8 +115,10 @@ def test_pool_holds_the_share_and_labels_are_counted_to_the_target(given):
 
 
 def test_epochs_fall_with_the_rate(given, monkeypatch):
-    monkeypatch.setattr(labels, "EVERY", 25)
-    monkeypatch.setattr(labels, "MOST", 100)
+    monkeypatch.setattr(labels, "EVERY", 5)
+    monkeypatch.setattr(labels, "MOST", 50)
+    within_reach = SECTIONS["active_learning"] | {"target": 0.5}
+    given = replace(given, sections=SECTIONS | {"active_learning": within_reach})
     found = rows_of(labels.epochs, given, {"learning_rate": [0.001, 0.3], "labels": ["at_target", "all"]})
     slow, fast = (found[(rate, "all"), "bald_kmeans", "epochs_to_target", "overlap"] for rate in (0.001, 0.3))
     assert fast < slow <= labels.MOST

@@ -43,7 +43,7 @@ def keep(checkpoint, identity, state, curve):
     if len(curve) == 3:
         {stop}
 
-kept, training._keep = training._keep, keep
+kept, training.keep = training.keep, keep
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.exit(main(sys.argv[1:]))
 """

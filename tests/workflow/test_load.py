@@ -12,7 +12,7 @@ RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
 
 @pytest.mark.parametrize(
     ("config", "run", "sources", "explainers", "seeds", "backbones", "reductions"),
-    [("config", "embedded", 3, 19, 3, 4, 4), ("smoke", "smoke", 2, 16, 2, 1, 2), ("real", "real", 3, 19, 5, 4, 4)],
+    [("config", "embedded", 3, 23, 3, 4, 4), ("smoke", "smoke", 2, 16, 2, 1, 2), ("real", "real", 3, 23, 5, 4, 4)],
 )
 def test_every_config_loads_offline_and_asks_for_all_results(
     project, planned, config, run, sources, explainers, seeds, backbones, reductions
@@ -22,8 +22,9 @@ def test_every_config_loads_offline_and_asks_for_all_results(
     assert "profiles/default" in planned.messages
     assert planned.jobs["sample_objects"] == sources
     assert planned.jobs["register"] == sources * seeds
-    assert planned.jobs["train_encoder"] == (sources + backbones) * seeds
-    assert planned.jobs["attribute"] == sources * explainers + (1 if config == "smoke" else 2) + backbones * reductions
+    assert planned.jobs["train_encoder"] == sources * seeds
+    assert planned.jobs["train_on_frames"] == backbones * seeds
+    assert planned.jobs["attribute"] == sources * explainers + (2 if config == "smoke" else 3) + backbones * reductions
     assert planned.jobs["render_scenes"] == (config != "real")
     assert planned.jobs["run_icp"] == sources * (5 if config == "smoke" else 6)
     assert planned.jobs["shift"] == planned.jobs["fit_learners"] == sources

@@ -126,7 +126,8 @@ def test_table14_needs_one_source_and_its_encoders(planned):
 
 def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
     assert planned.before("results/smoke/tables/table7_runtime.md") == {
-        "render_scenes": 1, "instances": 1, "register_frames": 1, "train_encoder": 1, "embed": 1, "model": 1,
+        "render_scenes": 1, "instances": 1, "register_frames": 1, "embed": 1, "model": 1,
+        "register": 2, "pretrain_encoder": 1, "train_on_frames": 1,
         "sample_objects": 2, "sample_model_causes": 2, "describe_model_causes": 2,
         "time_stages": 1, "table7_runtime": 1,
     }  # fmt: skip
@@ -250,7 +251,7 @@ def test_a_figure_of_another_source_is_drawn_alone(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"source": "ycb"}}))
     assert (
         finished.dry_run(*SMOKE, "mine.yaml").jobs
-        == jobs("fig3_concepts", "causes_example", "estimators", "page") + METHOD
+        == jobs("fig3_concepts", "causes_example", "estimators", "saliency", "page") + METHOD
     )
 
 

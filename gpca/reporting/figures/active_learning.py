@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
 OVERLAP_ROWS = {**ROWS, "rare": "encoder saw all;\nthe new one is rare"}
 LEGEND_COLUMNS = 5
+LEGEND_LETTERS, LEGEND_LETTERS_OF_LINE = 130, 8  # in a line of the legend, and those that a line's sign takes
 STYLES = {  # The paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER.
     "bald_kmeans": (BLUE, "-", 1.8),
     "random": (BLACK, "-", 1.8),
@@ -117,7 +118,9 @@ def draw_panels(
     use_style()
     import matplotlib.pyplot as plt
 
-    below = -(-len(across) // LEGEND_COLUMNS)
+    longest = max(len(lines[line]) for line in across)
+    beside = max(1, min(LEGEND_COLUMNS, LEGEND_LETTERS // (longest + LEGEND_LETTERS_OF_LINE)))
+    below = -(-len(across) // beside)
     height_in = 0.22 + 0.2 * below + 1.5 * len(down)
     alike = len({curves[key]["labels"].iloc[-1] for key in shown}) == 1
     figure, axes = plt.subplots(
@@ -142,9 +145,7 @@ def draw_panels(
         axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}")
     handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
     ordered = [lines[line] for line in across]
-    figure.legend(
-        [handles[title] for title in ordered], ordered, ncol=LEGEND_COLUMNS, loc="lower center", columnspacing=1.4
-    )
+    figure.legend([handles[title] for title in ordered], ordered, ncol=beside, loc="lower center", columnspacing=1.4)
     figure.tight_layout(rect=(0, 0.2 * below / height_in, 1, 1), pad=0.4, h_pad=0.8)
     save_figure(figure, pdf_path, png_path)
 

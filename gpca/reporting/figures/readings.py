@@ -57,11 +57,12 @@ def draw_readings(
     import matplotlib.pyplot as plt
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    lines = -(-len(shown) // COLUMNS)
+    columns = min(COLUMNS, len(shown))
+    lines = -(-len(shown) // columns)
     height_in = ROW_IN * lines + 0.3
     figure, axes = plt.subplots(
         lines,
-        COLUMNS,
+        columns,
         figsize=(TEXT_WIDTH_IN, height_in),
         sharey=True,
         squeeze=False,
@@ -72,7 +73,7 @@ def draw_readings(
         panel.set_title(groups[group], fontsize=8)
     for panel in axes.flat[len(shown) :]:
         panel.set_visible(False)
-    figure.supylabel("difference from the printed number (times what is close)", fontsize=8)
+    figure.supylabel("distance from the printed number\n(times what is close)", fontsize=8)
     figure.supxlabel("share of the readings, from the lowest to the highest value", fontsize=8)
     write_title(figure, f"Every reading of the unstated{stand_in_clause(sources.values())}")
     save_figure(figure, pdf_path, png_path)
