@@ -34,7 +34,7 @@ pathvars:
 
 
 TOPICS = (
-    "common objects registrations methods causes estimators frames encoders uncertainty explainers active_learning "
+    "common functions objects registrations methods causes estimators frames encoders uncertainty explainers active_learning "
     "diagnostics controls exchange gradients model recovery results readings comparison targets"
 )
 for topic in TOPICS.split():

@@ -12,36 +12,6 @@ READING_SECTIONS = {
 }
 
 
-def read_by_readings(wildcards):
-    """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
-    group = GROUPS[wildcards.reading_group]
-    sources = [name for name in group.sources if name in SOURCES]
-    seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
-    made = "predictions"
-    methods = [name for name in group.methods if name in config["explainers"]]
-    if wildcards.reading_group == "diagnostics":
-        made = "learners"
-        methods = [name for name in group.methods if name in config["learners"]]
-    if not group.sources:
-        sources, seeds, methods = [FRAMES], SEEDS, NAMES["backbone"]
-    patterns = {
-        "registrations": "<results>/registrations/{source}/seed{seed}.npz",
-        "sets": "<results>/shifted/{source}/seed{seed}.npz",
-        "predictions": f"<results>/{made}/{{source}}/{{method}}/seed{{seed}}.csv",
-        "embeddings": "<results>/embeddings/{source}/{method}/seed{seed}.npz",
-    }
-    embedded = [method.replace("-", "/") for method in methods]
-    return {
-        kind: collect(
-            patterns[kind],
-            source=sources,
-            method=embedded if kind == "embeddings" else methods,
-            seed=SEEDS[:1] if kind == "embeddings" else seeds,
-        )
-        for kind in group.reads
-    }
-
-
 rule reading:
     input:
         unpack(read_by_readings),

@@ -1,0 +1,65 @@
+# Settings and inputs of jobs of single topics, where they take more than a line.
+
+
+def encoder_settings(wildcards, changes=None):
+    """Return an encoder's section of the config, with changes and the ICP that a reading repeats."""
+    icp = {"icp": config["registrations"]["icp"]}
+    return as_json(config["encoders"][wildcards.backbone] | (changes or {}) | icp)
+
+
+def explainer_settings(wildcards):
+    """Return the settings of an explainer in the config, or of one that is asked about frames alone."""
+    name = explainer_of(wildcards.explainer, NAMES)
+    return config["explainers"].get(name) or REAL_WORLD["explainers"].get(name) or {}
+
+
+def controls_of(seed):
+    """Return the controls of a seed: all, but those that need a further encoder for the first seeds alone."""
+    further = int(seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    return [
+        n for n in CONTROLS["controls"] if further or n == UNSEEN or n not in RETRAINED
+    ]
+
+
+def retrained(wildcards):
+    """Return the controls and ways of training for which a seed has encoders of their own."""
+    further = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    own = [name for name in controls_of(wildcards.seed) if name in RETRAINED]
+    return own + (NAMES["control_encoder"] if further else [])
+
+
+def control_settings(wildcards, **further):
+    own = {name: CONTROLS[name] for name in CONTROLS if name != "explainers"}
+    own["controls"] = controls_of(wildcards.seed)
+    encoder = config["encoders"][CONTROL_ENCODER]
+    return as_json({"controls": own, "encoder": encoder, **further})
+
+
+def read_by_readings(wildcards):
+    """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
+    group = GROUPS[wildcards.reading_group]
+    sources = [name for name in group.sources if name in SOURCES]
+    seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
+    made = "predictions"
+    methods = [name for name in group.methods if name in config["explainers"]]
+    if wildcards.reading_group == "diagnostics":
+        made = "learners"
+        methods = [name for name in group.methods if name in config["learners"]]
+    if not group.sources:
+        sources, seeds, methods = [FRAMES], SEEDS, NAMES["backbone"]
+    patterns = {
+        "registrations": "<results>/registrations/{source}/seed{seed}.npz",
+        "sets": "<results>/shifted/{source}/seed{seed}.npz",
+        "predictions": f"<results>/{made}/{{source}}/{{method}}/seed{{seed}}.csv",
+        "embeddings": "<results>/embeddings/{source}/{method}/seed{seed}.npz",
+    }
+    embedded = [method.replace("-", "/") for method in methods]
+    return {
+        kind: collect(
+            patterns[kind],
+            source=sources,
+            method=embedded if kind == "embeddings" else methods,
+            seed=SEEDS[:1] if kind == "embeddings" else seeds,
+        )
+        for kind in group.reads
+    }
