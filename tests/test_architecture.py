@@ -88,7 +88,7 @@ def test_every_step_and_rule_file_has_its_stage():
     steps = {name for _, _, steps, _ in stages for name in code(steps) if name in STEPS}
     assert steps == set(STEPS) - {"label", "explain", "ship", "check-config", "check-reference"}
     files = {name for *_, names in stages for name in code(names)} - {"sources/*.smk", "Snakefile"}
-    assert files == {path.name for path in (ROOT / "workflow/rules").glob("*.smk")} - {"common.smk"}
+    assert files == {path.name for path in (ROOT / "workflow/rules").glob("*.smk")} - {"common.smk", "functions.smk"}
 
 
 def test_every_folder_of_the_results_that_rules_write_has_its_stage():
