@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: results report test test-library test-processor test-workflow coverage smoke lint check-reference environment lock \
+.PHONY: results report test test-library test-processes test-workflow coverage smoke lint check-reference environment lock \
         clean-environment help
 
 CORES ?= 2
@@ -15,6 +15,7 @@ PYTEST_ARGS ?=
 # Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
 RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
+PROCESSES := tests/test_processor.py tests/test_benchmarks.py tests/encoders/test_reduction.py
 PYTEST := $(RUN) OMP_NUM_THREADS=1 python -m pytest
 
 results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
@@ -28,16 +29,16 @@ report: environment ## Snakemake's report of the same run in one HTML file, REPO
 # prints its report when it is done.
 test: environment ## the tests, or those of PYTEST_ARGS alone
 ifeq ($(strip $(PYTEST_ARGS)),)
-	@$(MAKE) --no-print-directory -j$(CORES) --keep-going --output-sync=target test-workflow test-library test-processor
+	@$(MAKE) --no-print-directory -j$(CORES) --keep-going --output-sync=target test-workflow test-library test-processes
 else
 	$(PYTEST) $(PYTEST_ARGS)
 endif
 
 test-library: environment ## the tests of functions and steps
-	$(PYTEST) --ignore=tests/workflow --ignore=tests/test_processor.py
+	$(PYTEST) --ignore=tests/workflow $(addprefix --ignore=,$(PROCESSES))
 
-test-processor: environment ## the same bytes on two processors
-	$(PYTEST) tests/test_processor.py
+test-processes: environment ## the tests that need little of the others' and take long: processors, benchmarks, reductions
+	$(PYTEST) $(PROCESSES)
 
 test-workflow: environment ## the tests that run Snakemake, the whole smoke run among them
 	$(PYTEST) tests/workflow
