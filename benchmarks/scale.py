@@ -34,7 +34,7 @@ sys.path.insert(0, str(ROOT))
 from benchmarks import markdown  # noqa: E402 (the script runs from a plain checkout)
 from benchmarks.pipeline import SIDECAR, number  # noqa: E402
 from benchmarks.schedule import Job, critical_path, wall_time  # noqa: E402
-from benchmarks.targets import plan, read_plan  # noqa: E402
+from benchmarks.targets import name_of_run, parser_of_run, plan, read_plan  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
 
 RUN = "scale"
@@ -43,10 +43,7 @@ WAIT_S = 10.0  # that a submitted job takes besides its work: the queue's turn, 
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="of a finished run, such as results/real")
-    parser.add_argument("--configfile", type=Path, help="of that run; by default config/{run}.yaml where it is")
-    parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
+    parser = parser_of_run(__doc__)
     parser.add_argument("--cores", type=int, nargs="+", default=[1, 2, 4, 8, 16], help="default 1 2 4 8 16")
     parser.add_argument("--sources", type=int, default=0, help="datasets of the larger run; by default none is planned")
     parser.add_argument("--seeds", type=int, default=10, help="of the larger run, default 10")
@@ -54,9 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the tables")
     options = parser.parse_args(arguments)
     try:
-        if not (options.folder / "benchmarks").is_dir():
-            raise InputError(options.folder, "holds no benchmark files", "name the folder of a finished run")
-        run = options.folder.resolve().name
+        run = name_of_run(options.folder)
         jobs = read_plan(plan(run, options.configfile, options.config), run)
         seconds = measured(jobs, options.folder)
         lines, found = on_cores(jobs, seconds, options.cores)

@@ -45,17 +45,12 @@ class Cost:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="of the run, such as results/real")
-    parser.add_argument("--configfile", type=Path, help="as for snakemake; by default config/{run}.yaml where it is")
-    parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
+    parser = parser_of_run(__doc__)
     parser.add_argument("--cores", type=int, default=2, help="of the wall time, default 2")
     parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the rows")
     options = parser.parse_args(arguments)
     try:
-        if not (options.folder / "benchmarks").is_dir():
-            raise InputError(options.folder, "holds no benchmark files", "name the folder of a finished run")
-        run = options.folder.resolve().name
+        run = name_of_run(options.folder)
         jobs = read_plan(plan(run, options.configfile, options.config), run)
         costs = {target: cost(needed, options.folder, options.cores) for target, needed in targets(jobs).items()}
         if options.write:
@@ -67,6 +62,26 @@ def main(arguments: list[str] | None = None) -> int:
     print("\n".join(table(costs, options.cores)))
     print(json.dumps(vars(costs["all"]) if costs["all"] else {}))
     return 0
+
+
+def parser_of_run(description: str | None) -> argparse.ArgumentParser:
+    """Return a parser of the folder of a finished run and of what that was configured by."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="of a finished run, such as results/real")
+    parser.add_argument("--configfile", type=Path, help="of that run; by default config/{run}.yaml where it is")
+    parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
+    return parser
+
+
+def name_of_run(folder: Path) -> str:
+    """Return the name of the run in a folder.
+
+    Raises:
+        InputError: no job was measured there.
+    """
+    if not (folder / "benchmarks").is_dir():
+        raise InputError(folder, "holds no benchmark files", "name the folder of a finished run")
+    return folder.resolve().name
 
 
 def plan(run: str, configfile: Path | None, config: list[str]) -> str:

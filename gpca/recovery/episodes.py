@@ -7,7 +7,6 @@ takes it after the same actions, so what was tried once is kept.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -117,10 +116,11 @@ def _try_situation(
     estimated = register_first(clean, points, icp)
     if estimated is None or not is_right(estimated):
         return None, 1
-    for tried in itertools.count(1):
+    tried = 0
+    while True:
+        tried += 1
         situation = situations.misplaced(clean, tried)
         attempt = register_misplaced(situation, estimated, points, icp)
         assert attempt is not None  # the same points were registered before
         if tried == MISPLACED or not is_right(attempt):
             return (situation, attempt), tried
-    raise AssertionError  # the loop has no end
