@@ -177,8 +177,6 @@ def test_every_page_of_the_docs_is_in_the_index():
         ("registration", 8),
         ("estimators", 13),
         ("active_learning", 25),
-        ("real_world", 5),
-        ("causes", 20),
         ("controls", 6),
     ],
 )
