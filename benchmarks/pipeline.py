@@ -61,7 +61,7 @@ STAGES = (
     "figures",
 )
 SIDECAR = ".provenance.json"
-SMALL = 0.01  # of the time of all jobs: stages below it share a row of the page
+SMALL = 0.04  # of the time of all jobs: stages below it share a row of the page
 
 
 @dataclass

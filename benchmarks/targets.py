@@ -31,7 +31,8 @@ from benchmarks.schedule import Job, wall_time  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
 
 TARGETS = re.compile(r"(tables/\w+\.md|figures/\w+\.png|[\w.]+)$")  # and what lies in the run's folder itself
-ON_PAGE = re.compile(r"tables/|model\.pt$|all$")  # a figure takes about what the table of the same results takes
+# A figure takes about what the table of the same results takes, and so does another form of a table.
+ON_PAGE = re.compile(r"tables/(?!\w+_(?:compact|grid|oracle|seen_unseen|severity|shift|stream)\.md)|model\.pt$|all$")
 
 
 @dataclass(frozen=True)

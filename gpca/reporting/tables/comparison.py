@@ -37,15 +37,13 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Toler
 def summary(comparison: pd.DataFrame) -> str:
     """Return what was counted: means, each value once, by verdict; standard deviations and repeats apart."""
     once, deviations, repeats = _parts(comparison)
-    told = [
-        f"Of {len(comparison)} printed numbers, {len(once)} are judged as means, each value here once: {_told(once)}."
-    ]
+    told = [f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {_told(once)}."]
     if len(deviations):
         told.append(f"{len(deviations)} are standard deviations: {_told(deviations)}.")
     if len(repeats):
-        told.append(f"{len(repeats)} stand beside a value that is judged already: {_told(repeats)}.")
+        told.append(f"{len(repeats)} repeat values that are already judged: {_told(repeats)}.")
     if (comparison["reason"] == STAND_IN).any():
-        told.append(f"Objects of this run are {STAND_IN}s, and only real ones are compared.")
+        told.append(f"The objects of this run are {STAND_IN}s, and only real ones are compared.")
     return " ".join(told)
 
 
