@@ -215,9 +215,7 @@ def test_the_page_counts_first_and_gives_each_reason_once():
     page = comparison_markdown(compared(numbers, results, reasons=[Reason("*", "*", "*", "Other | data.")]), TOLERANCES)
     first, second, *_ = [line for line in page.splitlines() if line]
     assert first == "# Published and reproduced"
-    assert second == (
-        "Of 4 printed numbers, 4 are means, each judged once: 1 reproduced, 3 not reproduced."
-    )
+    assert second == ("Of 4 printed numbers, 4 are means, each judged once: 1 reproduced, 3 not reproduced.")
     assert "| YCB | GP-CA | % | 90.0 | 90.0 (90.0 to 90.0) | – | 2 | +0.0 | **reproduced** |" in page
     assert "| LINEMOD | GP-CA | % | 97.0 | 90.0 (90.0 to 90.0) | – | 2 | -7.0 | not reproduced [1] |" in page
     assert (
