@@ -75,8 +75,8 @@ def table3_active_learning(
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
-            f"Rare: {conditions['rare_share']:.0%} of the pool are of the new concept, and {conditions['rare_labels']} "
-            "labels may be asked for.",
+            f"Rare: {conditions['rare_share']:.0%} of the pool belong to the new concept, and up to "
+            f"{conditions['rare_labels']} labels are given.",
             f"Retraining is a warm start of at most {conditions['iterations']} passes over the labels. Epochs: passes "
             "until the target, over all rounds. Acc.: after all labels.",
         ),
@@ -118,7 +118,7 @@ def table3_extended(
             _protocol(conditions),
             "Labels: until the target, by the concept held out. Reached: share of the runs that reached it. Accuracy: "
             "after all labels; New: that on the concept held out. Area: mean accuracy over the budget. Gain: area "
-            "minus that of random drawing from the same start, paired by seed. All but Labels are means over the "
+            "minus that of random sampling from the same start, paired by seed. All but Labels are means over the "
             "concepts held out, then over the seeds.",
         ),
     )
@@ -153,9 +153,9 @@ def table3_stream(
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
-            f"concepts ({conditions['initial']} labelled samples at the start), of the others a third is new. A label "
-            f"may be asked for at {stream['budget']:.0%} of the arrivals; the GPC learns at once, or the learner that "
-            "the row names instead, simplified as docs/active_learning.md says.",
+            f"concepts ({conditions['initial']} labelled samples at the start); a third of the others is new. A label "
+            f"may be requested for {stream['budget']:.0%} of the arrivals; the GPC learns it at once, or the learner "
+            "that the row names, simplified as docs/active_learning.md says.",
             "Delay: arrivals from the first sample of the new concept until half of its test samples are named right; "
             "'>': some runs ended before. Running: accuracy over the last arrivals, each judged before its label is "
             "known. Accuracy, New: on all test samples and those of the new concept, at the end. All but Delay are "

@@ -55,9 +55,9 @@ def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
             if name != PAPER
         },
         footnotes=(
-            "Apart from the paper's protocol, all learn from the same training samples of some of the objects, and are "
-            "asked about new samples of these and about the others. In brackets: points gained or lost by the "
-            "training, on the same test samples, for the seeds that have such an encoder. " + INTERVAL,
+            "Except under the paper's protocol, all learn from the same training samples of some of the objects, and "
+            "are asked about new samples of these objects and about the others. In brackets: points gained or lost by "
+            "the training, on the same test samples, for the seeds that have such an encoder. " + INTERVAL,
         ),
     )
 
@@ -97,9 +97,9 @@ def table10_costs(
             **{name: Column(words) for name, words in gains.items()},
         },
         footnotes=(
-            "Learning: encoder, if it has one of its own, and classifier, from the training samples of a source, when "
-            "these are measured. One registration: measured, embedded and explained. Means over sources and seeds, on "
-            "one core; they differ from run to run.",
+            "Learning: classifier, and encoder if it has its own, from the measured training samples of a source. One "
+            "registration: to measure, embed and explain it. Times are means over sources and seeds, on one core; "
+            "they differ from run to run.",
             INTERVAL,
         ),
     )

@@ -63,19 +63,19 @@ def table10_controls(
     if UNSEEN in names:
         columns |= {f"{name}_auroc": Column(words, 2, False, (0.0, 1.0)) for name, words in _AUROCS.items()}
     return table.build(
-        caption="Accuracy (%) of single-concept attribution with a shortcut closed, in brackets what that changes"
+        caption="Accuracy (%) of single-concept attribution with a shortcut closed (change in brackets)"
         + stand_in_clause(sources.values()),
         column_head="control",
         columns=columns,
         footnotes=(
             f"In brackets: points gained or lost against the paper's protocol, over "
             f"{plural(table.most_seeds(), 'seed')}. {INTERVAL}",
-            "Matched density: a random number of points of every cloud, in training and test. Unseen objects: encoder "
+            "Matched density: every cloud has a random number of points, in training and test. Unseen objects: encoder "
             "and explainer learnt from other objects. Other sources: they learnt from one other source. Wrong labels: "
-            "of the explainer's training samples. Shuffled labels teach nothing: guessing gives "
-            "33.3, and in a single source and seed chance names whole clusters of samples.",
-            "AUROC: how well the entropy of the scores tells the wrong from the right. A dash stands where a head is "
-            "trained with the encoder and learns no labels, and where a source does not admit a control.",
+            "among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
+            "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
+            "AUROC: how well the entropy of the scores separates wrong from right answers. A dash marks a head that is "
+            "trained with the encoder and learns no labels, and a source that does not admit a control.",
         ),
     )
 

@@ -74,11 +74,11 @@ def table12_uncertainty(
         footnotes=(
             f"{mean_over(table.most_seeds(), counted).replace(' test samples each', ' registrations each')}. KL: from "
             f"the reference, Monte-Carlo with {pairs['starts']} starts; trimmed means (10 to 90 %), as NNE, NEES. "
-            "NNE and NEES / 6 are near 1 and the coverage is 95 % where the covariance is that of the errors; above or "
-            "below 95 %, an estimator is too sure. Spread and error are those of the object's points. Bold: best of a "
-            "method, the reference apart.",
-            "None: refused, or failed with its reason in the files: Bonnabel's rule refuses point-to-point, Censi's "
-            "form here is that of point-to-point. ms: of one estimate, with descriptors and normals, without learning; "
-            "the one column that differs from run to run.",
+            "NNE and NEES / 6 are near 1 and the coverage is 95 % if the covariance is that of the errors; above 1, or "
+            "below 95 %, an estimator is overconfident. Spread and error are those of the object's points. Bold: best "
+            "of a method, the reference apart.",
+            "None: refused, or failed for a reason that the files name; Bonnabel's rule refuses point-to-point, "
+            "Censi's form here is that of point-to-point. ms: of one estimate, with descriptors and normals, without "
+            "learning; the one column that differs from run to run.",
         ),
     )

@@ -54,15 +54,15 @@ def table14_estimator_explanations(
     table.require_rows(*_NOTHING)
     table.compare_down([ALL], same=1)
     return table.build(
-        caption="Accuracy (%) with each estimator in the place of Monte-Carlo" + stand_in_clause(sources.values()),
+        caption="Accuracy (%) with each estimator in place of Monte-Carlo" + stand_in_clause(sources.values()),
         column_head="metric",
         columns={key: Column(key.capitalize()) for key in causes} | _OF_ESTIMATORS,
         footnotes=(
             f"{mean_over(table.most_seeds(), _samples(table, ALL))}. The uncertainty is how far the covariance "
-            "diverges from that of the untouched pair, as in Table I. As with Monte-Carlo: share of the samples of "
-            "which the same is said. Bold: best of an explainer.",
-            "Abstained: all concepts have the same value. No estimate: the estimator failed or refused under some "
-            "condition; the sample counts as wrong.",
+            "diverges from that of the untouched pair, as in Table I. As with Monte-Carlo: share of the samples "
+            "with the same answer. Bold: best of an explainer.",
+            "Abstained: all concepts have the same value. No estimate: the estimator failed or refused under at least "
+            "one condition, and the sample counts as wrong.",
         ),
     )
 
@@ -122,4 +122,4 @@ def _failed(
         for name, title in methods.items()
     }
     told = ", ".join(f"{title} {cell.mean:.1f} %" for title, cell in shares.items() if cell)
-    return [f"Registrations that failed by the method's own account, and count as they are: {told}."]
+    return [f"Registrations that failed by the method's own account, which are explained like any other: {told}."]

@@ -58,9 +58,9 @@ def saliency_deletion(metrics: pd.DataFrame, sources: Mapping[str, Mapping], con
         columns=columns,
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['samples'])}; one draw of points of each sample.",
-            "Fall: of the score of the concept named on the whole draw, in hundredths; in brackets how much more than "
-            "at random. To the centre: by what moving a point to the centre does to the score (Zheng et al. 2019). At "
-            "random is the mean of four orders.",
+            "Fall: of the score of the concept named on the whole draw, in hundredths; in brackets the excess over "
+            "random deletion. To the centre: in the order of how much moving a point to the centre changes the score "
+            "(Zheng et al. 2019). At random: mean of four orders.",
         ),
     )
 
@@ -95,9 +95,9 @@ def tcav(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapp
         columns=columns,
         footnotes=(
             f"Means over {plural(table.most_seeds(), 'seed')}; {conditions['vectors']} probes for each concept.",
-            "Score: share of the test samples of the class whose log odds of it grow along the concept; without any "
-            "relation about half. Seeds: in how many of them it differs from the scores of random probes, at the level "
-            f"{conditions['level']:g} over all tests of a seed (Bonferroni). Probes right: accuracy on training "
+            "Score: share of the test samples of the class whose log odds of it grow along the concept; about half "
+            "if there is no relation. Seeds: in how many of them it differs from the scores of random probes, at the "
+            f"level {conditions['level']:g} over all tests of a seed (Bonferroni). Probes right: accuracy on training "
             "samples that the probe did not learn, the mean of those with and without the concept.",
         ),
     )

@@ -77,7 +77,7 @@ def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -
         footnotes=(
             f"{mean_over(table.most_seeds(), test)}.",
             "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins. ELBO: per "
-            "training sample. Where the ELBO still rises from row to row and the confidence lies far below the "
+            "training sample. If the ELBO still rises from row to row and the confidence lies far below the "
             "accuracy, the fit was stopped before it had converged.",
         ),
     )

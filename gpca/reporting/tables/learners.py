@@ -62,8 +62,8 @@ def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learn
         footnotes=(
             repeats_note(table, metrics),
             OF_DISTANCE,
-            "AUC: area under risk and coverage, the mean risk; E-AUC: less the least that so many errors allow; AUGRC: "
-            "mean share of undetected failures. ECE over 15 equally wide bins; NLL in nats.",
+            "AUC: area under risk and coverage, the mean risk; E-AUC: AUC minus the least possible with as many "
+            "errors; AUGRC: mean share of undetected failures. ECE over 15 equally wide bins; NLL in nats.",
         ),
     )
 
@@ -115,7 +115,7 @@ def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners
         footnotes=(
             repeats_note(table, metrics),
             f"{OF_DISTANCE} It is taken over the shifted samples and those like the training's together.",
-            "Unseen objects: encoder and learners are others, which never saw some of the objects.",
+            "Unseen objects: another encoder and other learners, which never saw some of the objects.",
         ),
     )
 

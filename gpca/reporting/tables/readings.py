@@ -60,7 +60,7 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
             table.add_row(labels, cells)
     table.require_rows("reading_verdicts.csv", "holds no missed number", "nothing is missed")
     return table.build(
-        "What other readings of the unstated give in place of the numbers that are not reproduced"
+        "The numbers that are not reproduced, under other readings of what the paper leaves unstated"
         + stand_in_clause(sources.values())
         + ".",
         "value",

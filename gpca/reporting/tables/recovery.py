@@ -71,8 +71,8 @@ def table8_recovery(
             f"Noise, Pose, Overlap: by cause, within {budget} actions. Wrong first: of the first actions, those that "
             "are not the cause's own. Queued: left to a person instead. Acts on fine: of registrations on the same "
             "tables whose pose is right, those that the policy would change. Cost: of the actions on a failure, in "
-            "right poses, as the config declares it. Seconds: of explaining, acting and registering, per failure; the "
-            "camera's and the robot's own times are not in them.",
+            "right poses, as the config declares it. Seconds: of explaining, acting and registering, per failure, "
+            "without the times of a camera or robot.",
         ),
     )
 

@@ -68,9 +68,9 @@ def table11_registration(
         columns=columns | {"milliseconds": _MILLISECONDS},
         footnotes=(
             *_notes(table, metrics, sources, left_out),
-            "Errors are means over all registrations, failed ones too, where those ended; rotations up to the object's "
-            "symmetries. Failed: given up by the method itself, or not at rest. ms: of one registration, with that of "
-            "the global start where there is one, without the normals; the one column that differs from run to run.",
+            "Errors are means over all registrations, at the last pose of those that failed; rotations up to the "
+            "object's symmetries. Failed: given up by the method itself, or not at rest. ms: of one registration, with "
+            "its global start if it has one, without the normals; the only column that differs from run to run.",
         ),
     )
 
@@ -131,7 +131,7 @@ def _notes(
     per_seed = pairs.test_samples // pairs.seeds if pairs else 0
     notes = [
         f"{mean_over(table.most_seeds(), per_seed)}. A success is off by less than the config's `method_pairs.success` "
-        "of the diameter d, ADD or, for symmetric objects, ADD-S, and the method says so: a registration that failed "
-        "is none. Bold: best of a start."
+        "of the diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own "
+        "account is no success. Bold: best of a start."
     ]
     return [*notes, *missing_packages(left_out)]
