@@ -1,4 +1,4 @@
-"""The command ``gpca <step> …``, or ``python -m gpca <step> …``: the steps of the workflow, each usable by hand."""
+"""The command ``gpca <step> …``, or ``python -m gpca <step> …``: the steps of the workflow, each of which can be run by hand."""
 
 from __future__ import annotations
 
@@ -20,36 +20,36 @@ STEPS = {
     "scenes": "settings -> table-top scenes of procedural objects, seen by a virtual depth camera",
     "instances": "depth frames with masks and poses -> partial clouds with initial poses",
     "frame_registrations": "partial clouds -> perturbed ones aligned by ICP",
-    "register_methods": "registrations -> their test pairs registered by every method, and how far each is off",
+    "register_methods": "registrations -> their test pairs registered by every method, with errors",
     "train": "registrations -> encoder weights",
     "embed": "registrations and encoder -> embeddings",
-    "reduce": "embeddings -> embeddings of fewer numbers by PCA, UMAP or an autoencoder",
+    "reduce": "embeddings -> embeddings of fewer dimensions by PCA, UMAP or an autoencoder",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
-    "causes": "canonical clouds -> pairs with any subset of the causes, and what each cause does to the error",
-    "describe": "causes -> what can be measured of each pair without knowing the truth",
+    "causes": "canonical clouds -> pairs with any subset of the causes, and the share of each in the error",
+    "describe": "causes -> measurements of each pair that need no truth",
     "train_on_causes": "causes -> encoder weights and embeddings of their aligned sources",
-    "estimate": "causes -> what every estimator says of the test registrations' covariance, and how right it is",
+    "estimate": "causes -> covariances of the test registrations by every estimator, with errors",
     "diagnose": "causes, and descriptors or embeddings -> predictions of one explainer of causes",
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "train_control": "registrations -> embeddings by an encoder that is trained under a control",
-    "controls": "registrations and embeddings -> what every explainer says under every control",
-    "exchange": "registrations -> explanations with other methods and estimators of uncertainty beneath them",
+    "controls": "registrations and embeddings -> predictions of every explainer under every control",
+    "exchange": "registrations -> explanations based on other registration methods and estimators",
     "gradients": "registrations, encoder and embeddings -> what GP-CA's scores react to: saliency maps and TCAV",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "new_concepts": "registrations, causes and encoders -> learning curves of concepts that no encoder has seen",
     "kernel_grid": "embeddings -> every kernel, learning rate and number of iterations",
-    "shift": "registrations and encoder -> samples unlike the training samples, embedded, and how far they are",
+    "shift": "registrations and encoder -> embedded samples unlike the training samples, and their distances",
     "learners": "embeddings -> predictions of every learner, on test samples and on shifted ones",
-    "readings": "files of a run -> the printed numbers under every reading of what the paper leaves unstated",
-    "recover": "settings -> failures on virtual scenes, and what every policy of recovery makes of them",
-    "label": "registrations and embeddings -> labels that a person gives where the classifier asks",
-    "model": "encoder and embeddings -> one file with all that an explanation needs",
+    "readings": "files of a run -> the printed numbers under other readings of what the paper leaves unstated",
+    "recover": "settings -> failures on virtual scenes, and what every recovery policy does about them",
+    "label": "registrations and embeddings -> labels that a person gives when the classifier asks",
+    "model": "encoder and embeddings -> one file with everything that an explanation needs",
     "ship": "model of a run -> the model that comes with the package, and its card",
     "explain": "files of points -> why their registration is uncertain, and what to do",
     "runtime": "model, registrations and embeddings -> seconds of every stage",
     "check-config": "configs -> whether a run can use them",
-    "check-reference": "folder of a run -> whether its numbers agree with the reference's",
+    "check-reference": "folder of a run -> whether its numbers agree with the reference",
 }
 
 
@@ -67,15 +67,15 @@ def main(arguments: list[str] | None = None) -> int:
         say(f"gpca {chosen}: {fault}")
         return 2
     except MemoryError:
-        say(f"gpca {chosen}: this machine has no memory left for it; take smaller settings or another machine")
+        say(f"gpca {chosen}: this machine ran out of memory; use smaller settings or another machine")
         return 2
     except KeyboardInterrupt:
-        print(f"gpca {chosen}: stopped; the same command continues", file=sys.stderr)
+        print(f"gpca {chosen}: stopped; repeat the command to continue", file=sys.stderr)
         return 130
 
 
 def _run(arguments: list[str], chosen: str | None) -> int:
-    parser = OneLineParser(prog=_command(), description="The steps of the workflow, each usable by hand.")
+    parser = OneLineParser(prog=_command(), description="The steps of the workflow, each of which can be run by hand.")
     parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
     for name, summary in STEPS.items():

@@ -106,7 +106,7 @@ def taken_for_nothing():
 def test_the_command_line_knows_ctrl_c_in_whatever_it_is_changed_to(stopped, monkeypatch, capsys):
     monkeypatch.setattr(command_line, "_run", lambda arguments, chosen: stopped())
     assert main(["train"]) == 130
-    assert capsys.readouterr().err == "gpca train: stopped; the same command continues\n"
+    assert capsys.readouterr().err == "gpca train: stopped; repeat the command to continue\n"
 
 
 @pytest.mark.parametrize("fault", [SystemError, ValueError, KeyError])

@@ -59,7 +59,7 @@ def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder, s
         env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 130, done.stderr
-    assert done.stderr.splitlines()[-1] == "gpca train: stopped; the same command continues"
+    assert done.stderr.splitlines()[-1] == "gpca train: stopped; repeat the command to continue"
     assert ("Exception ignored in" in done.stderr) == (stop == "Deleted()")
     assert (folder / "weights.pt").read_bytes() == before
     assert (folder / "weights.checkpoint").exists()
