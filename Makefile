@@ -27,7 +27,7 @@ report: environment ## Snakemake's report of the same run in one HTML file, REPO
 
 # Side by side, as a test waits for one core most of the time; the last part starts on the core that is free first. Each
 # prints its report when it is done.
-test: environment ## the tests, or those of PYTEST_ARGS alone
+test: environment ## the tests, or only those of PYTEST_ARGS
 ifeq ($(strip $(PYTEST_ARGS)),)
 	@$(MAKE) --no-print-directory -j$(CORES) --keep-going --output-sync=target test-workflow test-library test-processes
 else
@@ -37,16 +37,16 @@ endif
 test-library: environment ## the tests of functions and steps
 	$(PYTEST) --ignore=tests/workflow $(addprefix --ignore=,$(PROCESSES))
 
-test-processes: environment ## the tests that need little of the others' and take long: processors, benchmarks, reductions
+test-processes: environment ## the tests that run long by themselves: processors, benchmarks, reductions
 	$(PYTEST) $(PROCESSES)
 
-test-workflow: environment ## the tests that run Snakemake, the whole smoke run among them
+test-workflow: environment ## the tests that run Snakemake, including the whole smoke run
 	$(PYTEST) tests/workflow
 
 smoke: environment ## every rule of the workflow at tiny size
 	$(RUN) snakemake -j$(CORES) all --configfile config/smoke.yaml $(SNAKEMAKE_ARGS)
 
-coverage: environment ## the share of the lines that the tests of functions and steps run, 90 % at the least
+coverage: environment ## the share of lines that the tests of functions and steps run, at least 90 %
 	$(PYTEST) --ignore=tests/workflow --cov --cov-report=term:skip-covered --cov-fail-under=90
 
 lint: environment ## ruff, snakefmt, mypy and snakemake's own linter
@@ -57,7 +57,7 @@ lint: environment ## ruff, snakefmt, mypy and snakemake's own linter
 	mypy
 	snakemake --lint
 
-check-reference: environment ## whether the numbers of results/CHECKED agree with its reference; reruns nothing
+check-reference: environment ## compare the numbers of results/CHECKED with its reference; reruns nothing
 	$(RUN) python -m gpca check-reference results/$(CHECKED)
 
 environment: .venv/complete ## only the virtual environment

@@ -1,4 +1,4 @@
-"""The command ``gpca <step> …``, or ``python -m gpca <step> …``: the steps of the workflow, each of which can be run by hand."""
+"""The command ``gpca <step> …``, or ``python -m gpca <step> …``: the steps of the workflow, one at a time."""
 
 from __future__ import annotations
 
