@@ -87,10 +87,10 @@ def _chance_told(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) 
     if of_all is None:
         return ""
     return (
-        f"{of_all.agree} numbers are reproduced or close, and {of_all.expected:.1f} would be by chance: with the "
-        f"values here shuffled within their column, the mean of {SHUFFLES} shuffles. p is the share of the shuffles in "
-        f"which as many are; {of_all.p:.2f} in all. ρ is Spearman's rank correlation of what is printed and what came "
-        "out here, the ranks taken within each column."
+        f"{of_all.agree} numbers are reproduced or close; {of_all.expected:.1f} would be by chance, if the values here "
+        f"were shuffled within their columns (mean of {SHUFFLES} shuffles). p is the share of shuffles that reach the "
+        f"actual number, {of_all.p:.2f} for all tables together. ρ is Spearman's rank correlation of printed and "
+        "reproduced values, with ranks taken within each column."
     )
 
 
@@ -100,10 +100,10 @@ def _name(table: str) -> str:
 
 def _rule(tolerances: Mapping[str, Tolerance]) -> list[str]:
     return [
-        f"Reproduced: the mean here is within {_limits(tolerances, 'reproduced')} of what is printed, or the 95 % "
-        f"interval of the difference holds 0. Close: within {_limits(tolerances, 'close')}. Inconclusive: that "
-        "interval, the paper's own sampling error included where it can be told, reaches farther than what is close, "
-        "and not all of it lies beyond. docs/comparison.md has the whole rule.",
+        f"Reproduced: the mean here is within {_limits(tolerances, 'reproduced')} of the printed number, or the 95 % "
+        f"interval of the difference contains 0. Close: within {_limits(tolerances, 'close')}. Inconclusive: the "
+        "interval, which includes the paper's own sampling error where known, reaches beyond what is close, but does "
+        "not lie beyond it as a whole. docs/comparison.md has the whole rule.",
         f"Times of the paper were measured on {' and '.join(HARDWARE.values())}.",
     ]
 
