@@ -227,7 +227,7 @@ def test_the_page_counts_first_and_gives_each_reason_once():
     assert f"|  | {verdicts} | by chance | p | ρ |\n" in page
     assert "| Table I: Single-concept attribution | 1 |  |  | 2 |  |  | 1.0 | 1.00 | – |\n" in page
     assert "| All | 1 | 0 | 0 | 3 | 0 | 0 | 1.0 | 1.00 | – |\n" in page
-    assert "1 numbers are reproduced or close, and 1.0 would be by chance" in page
+    assert "1 numbers are reproduced or close; 1.0 would be by chance" in page
     assert "## Table VII: Runtime" in page
     assert "Objects here: MODEL. Hardware here: A processor." in page
     assert "Intel i7-12700K and NVIDIA RTX 3090" in page

@@ -79,9 +79,9 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
         columns={"difference": Difference("First minus second, or their ratio", limits=(-math.inf, math.inf))},
         footnotes=(
             counted(verdicts),
-            "In brackets: the 95 % interval over the seeds, of differences of the same seed. A sentence is supported if "
-            "all of its comparisons are, and refuted if one is, by an interval that allows for their number. Not worse "
-            "and the same: the whole interval lies within the margin. docs/comparison.md has the whole rule.",
+            "In brackets: the 95 % interval over the seeds, of differences of the same seed. A sentence is supported "
+            "if all of its comparisons are, and refuted if one is, by an interval that allows for their number. Not "
+            "worse and the same: the whole interval lies within the margin. docs/comparison.md has the whole rule.",
             *(_not_run(row) for row in open_ones.itertuples()),
         ),
     )
