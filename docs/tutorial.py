@@ -1,7 +1,7 @@
 """A registration explained, step by step: a good one, bad ones, and what the model cannot judge.
 
-Run it with ``python docs/tutorial.py``, or cell by cell in an editor that knows ``# %%``. It needs no data, but a
-model: that of the variable ``GPCA_MODEL``, or one that the workflow made (docs/explain.md).
+Run it with ``python docs/tutorial.py``, or cell by cell in an editor that knows ``# %%``. It needs no data,
+and the model comes with the package (docs/explain.md).
 """
 
 # %% 1. Two clouds. The target is the reference, a whole figure of a cat in metres; the source is what a sensor saw of
