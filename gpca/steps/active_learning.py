@@ -17,12 +17,13 @@ from gpca.active_learning.stream import run_stream
 from gpca.arguments import SEED
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
-from gpca.errors import InputError
+from gpca.errors import require_known
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
+from gpca.steps import require_files
 
 PAPERS = ("random", "bald_kmeans")  # the paper's two strategies, which also meet a rare concept
 
@@ -42,13 +43,9 @@ def run(options: Namespace) -> None:
     """Run every strategy in every setting for every concept held out."""
     torch.set_num_threads(options.threads)
     check_settings(options.settings, "active_learning")
-    if len(options.out) != len(options.strategies):
-        raise InputError(
-            "--out", f"{len(options.out)} file(s) for {len(options.strategies)} strategies", "give one each"
-        )
-    if unknown := set(options.strategies) - {*STRATEGIES, *STREAMS}:
-        known = ", ".join((*STRATEGIES, *STREAMS))
-        raise InputError(f"strategy '{sorted(unknown)[0]}'", "unknown", f"known are {known}")
+    require_files(options, "out", len(options.strategies), "strategies")
+    for strategy in options.strategies:
+        require_known("strategy", strategy, (*STRATEGIES, *STREAMS))
     inputs = [options.registrations, options.embeddings, options.embeddings_without]
     axes = (options.source, options.seed)
     with record_provenance(options.out, inputs, options.settings, seed=options.seed):

@@ -11,14 +11,16 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
-from gpca.encoders.settings import encoder_settings
+from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import load_model, train_encoder
 from gpca.files import whole_file
 from gpca.frames.sample_file import read_instances_of
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
+from gpca.steps import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -35,7 +37,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Train, keeping a checkpoint beside the weights until they are written."""
     torch.set_num_threads(options.threads)
-    settings, icp = encoder_settings(options.settings)
+    given, of_icp = checked_with_icp(options.settings, "encoders", "*")
+    settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
     registrations = joined([Registrations.load(path) for path in options.registrations])
     instance_S = read_instances_of(options.poses, registrations) if options.poses else None
     start = load_model(options.start, settings).state_dict() if options.start else None
