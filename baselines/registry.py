@@ -13,7 +13,7 @@ from gpca.registry import Registry
 from gpca.settings import require_arguments
 
 CONCEPTS, CAUSES = "concepts", "causes"  # what explainers name: what was perturbed, or what is wrong
-EXPLAINERS: dict[str, Registry[ExplainerEntry]] = {
+REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
     CONCEPTS: Registry("explainer", baselines, "EXPLAINERS", first=("gpca.explainers.gpca",)),
     CAUSES: Registry("explainer", baselines.causes, "EXPLAINERS"),
 }
@@ -21,12 +21,12 @@ EXPLAINERS: dict[str, Registry[ExplainerEntry]] = {
 
 def explainers(kind: str = CONCEPTS) -> dict[str, ExplainerEntry]:
     """Return all explainers of a kind by name: GP-CA itself and those of every file in its folder."""
-    return EXPLAINERS[kind].entries()
+    return REGISTRIES[kind].entries()
 
 
 def explainer_entry(name: str, kind: str = CONCEPTS) -> ExplainerEntry:
     """Return the explainer of that name; an unknown one raises an InputError that lists the known."""
-    return EXPLAINERS[kind].entry(name)
+    return REGISTRIES[kind].entry(name)
 
 
 def require_settings(name: str, settings: Mapping[str, object], kind: str = CONCEPTS) -> None:
@@ -36,4 +36,4 @@ def require_settings(name: str, settings: Mapping[str, object], kind: str = CONC
 
 def explainer_module(name: str, kind: str = CONCEPTS) -> str:
     """Return the module that lists the explainer."""
-    return EXPLAINERS[kind].module(name)
+    return REGISTRIES[kind].module(name)

@@ -10,6 +10,7 @@ from gpca.__main__ import STEPS
 from .documents import ROOT
 
 PAGE = (ROOT / "docs/architecture.md").read_text()
+LONGEST = 300  # lines
 TOP = {
     *(
         "adam",
@@ -78,7 +79,12 @@ def test_at_the_top_is_only_what_everything_stands_on():
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_no_module_is_too_long_to_be_read_at_once(path):
-    assert len(path.read_text().splitlines()) <= 300
+    assert len(path.read_text().splitlines()) <= LONGEST
+
+
+def test_no_file_of_tests_is_too_long_either():
+    lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in (ROOT / "tests").rglob("*.py")}
+    assert [str(path) for path, count in lines.items() if count > LONGEST] == []
 
 
 def test_every_step_and_rule_file_has_its_stage():

@@ -19,7 +19,7 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.steps import checked_sections, require_files
 from gpca.uncertainty.settings import UncertaintySettings
@@ -69,11 +69,11 @@ def run(options: Namespace) -> None:
     ):
         registrations = Registrations.load(options.registrations)
         model = load_model(options.encoder, encoder)
-        embeddings = {PAPER: _embeddings(options.embeddings, registrations, "embed")}
+        embeddings = {PAPER: read_embedding(options.embeddings, registrations, logits=True)}
         for control, path in retrained.items():
             if not left_out(control, registrations, settings, encoder.backbone):
                 changed = variant(control, registrations, options.source, options.seed, settings, icp)
-                embeddings[control] = _embeddings(path, changed, "train_control")
+                embeddings[control] = read_embedding(path, changed, "train_control", logits=True)
         experiment = Experiment(
             source=options.source,
             seed=options.seed,
@@ -96,9 +96,3 @@ def _pairs(options: Namespace, names: str, files: str) -> dict[str, Path]:
     given = getattr(options, names)
     require_files(options, files, len(given), "name(s)")
     return dict(zip(given, getattr(options, files), strict=True))
-
-
-def _embeddings(path: Path, registrations: Registrations, step: str):
-    shapes = {"h": ("S", "d"), "head_logits": ("S", "C")}
-    arrays = load_embeddings(path, registrations, shapes, f"python -m gpca {step}")
-    return {"embedding": arrays["h"], "head_logits": arrays["head_logits"]}

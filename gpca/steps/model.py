@@ -20,7 +20,7 @@ from gpca.encoders.training import load_model
 from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
 from gpca.model.learning import Lessons, joined, learn
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
 from gpca.recovery.policy import RecoveryPolicy
@@ -105,6 +105,6 @@ def _lessons(causes_file: Path, descriptors_file: Path) -> Lessons:
 
 
 def _gpc(options: Namespace, registrations: Registrations, settings: GPCSettings) -> GPC:
-    h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
+    h_S_d = read_embedding(options.embeddings, registrations)["embedding"]
     train = registrations.rows("train")
     return GPC(CONCEPTS, settings, options.source, options.seed).fit(h_S_d[train], registrations.concept[train])

@@ -36,7 +36,7 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.explainers.pair_classifier import NormalisedDescriptors
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
@@ -107,8 +107,7 @@ class _Work:
         }
         self._cause_model = load_model(options.cause_encoder, self._cause_encoder, LABELS)
         causes = Causes.load(options.causes)
-        made_by = "python -m gpca train_on_causes"
-        h_S_d = load_embeddings(options.cause_embeddings, causes.registrations, {"h": ("S", "d")}, made_by)["h"]
+        h_S_d = read_embedding(options.cause_embeddings, causes.registrations, "train_on_causes")["embedding"]
         self._seen = _seen(causes, h_S_d, Descriptors.load(options.descriptors, causes.registrations))
         self._objects = ObjectClouds.load(options.objects)
 

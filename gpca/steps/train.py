@@ -13,9 +13,10 @@ import torch
 
 from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
+from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import write_tensors
 from gpca.encoders.training import load_model, train_encoder
-from gpca.files import whole_file
 from gpca.frames.sample_file import read_instances_of
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.reading import read_as
@@ -50,9 +51,6 @@ def run(options: Namespace) -> None:
         model, curve = train_encoder(
             seen, options.source, options.seed, settings, checkpoint, start=start, group_S=instance_S
         )
-        # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
-        with whole_file(options.out) as partial, partial.open("wb") as file:
-            torch.save(model.state_dict(), file)
-        with whole_file(options.curve) as partial:
-            pd.DataFrame(curve).to_csv(partial, index=False, float_format="%.6g", lineterminator="\n")
+        write_tensors(options.out, model.state_dict())
+        write_csv(options.curve, pd.DataFrame(curve), form="%.6g")
         checkpoint.unlink(missing_ok=True)

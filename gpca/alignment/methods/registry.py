@@ -15,8 +15,8 @@ from gpca.errors import InputError
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 
-METHODS: Registry[MethodEntry] = Registry("registration method", folder, "METHODS")  # those without their package too
-methods, method_entry, method_module = METHODS.entries, METHODS.entry, METHODS.module
+REGISTRY: Registry[MethodEntry] = Registry("registration method", folder, "METHODS")  # those without their package too
+methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
 def left_out(names: Iterable[str]) -> dict[str, str]:

@@ -12,8 +12,8 @@ from gpca.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import Estimate, EstimatorEntry, Example, FailedEstimate, RegisteredPair
 
-ESTIMATORS: Registry[EstimatorEntry] = Registry("estimator", folder, "ESTIMATORS")
-estimators, estimator_entry, estimator_module = ESTIMATORS.entries, ESTIMATORS.entry, ESTIMATORS.module
+REGISTRY: Registry[EstimatorEntry] = Registry("estimator", folder, "ESTIMATORS")
+estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
 def require_estimator_settings(name: str, settings: Mapping[str, object]) -> None:
