@@ -48,9 +48,9 @@ def _writable(folder: Path) -> bool:
 _set_cache_folder()  # numba reads the variable when it is imported
 
 import numba  # noqa: E402
-from numba import prange  # noqa: E402
+from numba import config, prange  # noqa: E402
 
-numba.config.CACHE_DIR = os.environ.get(VARIABLE, "")  # type: ignore[attr-defined]  # where it was imported before
+setattr(config, "CACHE_DIR", os.environ.get(VARIABLE, ""))  # noqa: B010 - numba declares it at run time; where it was imported before
 
 __all__ = ["INNER_LOOP", "njit", "prange"]
 
