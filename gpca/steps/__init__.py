@@ -51,7 +51,7 @@ def checked_sections(
 
 
 def checked_by_name(
-    given: Mapping[str, dict | None], section: str, names: Collection[str], require: Callable[[str, Mapping], None]
+    given: dict[str, Any], section: str, names: Collection[str], require: Callable[[str, Mapping], None]
 ) -> dict[str, dict]:
     """Return the settings of each of the names, none for those that a section of the config does not give.
 
@@ -60,7 +60,7 @@ def checked_by_name(
         require: raises an InputError unless a name is known and takes its settings.
     """
     given = given or dict.fromkeys(names)
-    check_settings(dict(given), section)
+    check_settings(given, section)
     for name in (*given, *names):
         require(name, given.get(name) or {})
     return {name: given.get(name) or {} for name in names}
