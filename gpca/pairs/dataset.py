@@ -202,7 +202,7 @@ def read_embedding(
     Raises:
         InputError: as :func:`load_embeddings`.
     """
-    shapes: dict[str, tuple[int | str, ...]] = {"h": ("S", "d")} | ({"head_logits": ("S", "C")} if logits else {})
+    shapes = {"h": ("S", "d")} | ({"head_logits": ("S", "C")} if logits else {})
     arrays = load_embeddings(path, registrations, shapes, f"python -m gpca {step}")
     return {"embedding": arrays["h"]} | ({"head_logits": arrays["head_logits"]} if logits else {})
 
