@@ -2,13 +2,22 @@
 
 It keeps that beside the modules, else in the user's cache, and does not compile at all where it can write in neither:
 in a read-only checkout, say, by a user without a home.
+
+What it keeps of a function is stale, too, once another module that the function's own imports has changed: numba alone
+looks at the function's own file, and would go on with what it once took from the others.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import Any
+
+from gpca.code_files import code_files
 
 VARIABLE = "NUMBA_CACHE_DIR"
 
@@ -38,8 +47,37 @@ def _writable(folder: Path) -> bool:
 
 _set_cache_folder()  # numba reads the variable when it is imported
 
-from numba import config, njit, prange  # noqa: E402
+import numba  # noqa: E402
+from numba import config, prange  # noqa: E402
 
 setattr(config, "CACHE_DIR", os.environ.get(VARIABLE, ""))  # noqa: B010 - numba declares it at run time; where it was imported before
 
-__all__ = ["njit", "prange"]
+__all__ = ["INNER_LOOP", "njit", "prange"]
+
+# Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
+# in the loops of ICP takes longer than the search. Functions compiled so cannot make arrays; they are given room to
+# work.
+INNER_LOOP: dict[str, Any] = {
+    "cache": True,
+    "_nrt": False,
+    "error_model": "numpy",
+    "fastmath": {"contract", "nsz", "nnan", "reassoc"},
+}
+
+
+def njit(**options: Any) -> Callable[[Callable], Any]:
+    """Return numba's decorator with these options; see above for what it keeps."""
+
+    def decorate(function: Callable) -> Any:
+        compiled = numba.njit(**options)(function)
+        if options.get("cache") and compiled is not function:  # as it is where NUMBA_DISABLE_JIT is set
+            compiled._cache._cache_file._source_stamp = _stamp(function.__module__)
+        return compiled
+
+    return decorate
+
+
+@cache
+def _stamp(module: str) -> str:
+    """Return the SHA-256 of all files that a module's code comes from."""
+    return hashlib.sha256(b"".join(Path(file).read_bytes() for file in code_files(module))).hexdigest()

@@ -78,7 +78,7 @@ def finite_number(subject: object, name: str, text: str, remedy: str = "make it 
     return value
 
 
-def write_csv(path: str | Path, frame: pd.DataFrame) -> None:
-    """Write a CSV file, whole or not at all, with six decimals."""
+def write_csv(path: str | Path, frame: pd.DataFrame, form: str | None = "%.6f") -> None:
+    """Write a CSV file, whole or not at all; `form` is that of numbers with decimals, None for all their digits."""
     with whole_file(path) as partial:
-        frame.to_csv(partial, index=False, float_format="%.6f", lineterminator="\n")
+        frame.to_csv(partial, index=False, float_format=form, lineterminator="\n")

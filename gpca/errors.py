@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 
@@ -17,6 +17,12 @@ class InputError(ValueError):
     def __init__(self, subject: object, fault: str, remedy: str = "") -> None:
         line = f"{subject}: {fault}" + (f"; {remedy}" if remedy else "")
         super().__init__(" ".join(line.split()))
+
+
+def require_known(kind: str, name: object, known: Collection[str]) -> None:
+    """Raise an InputError that lists the known names of a kind of thing unless this is one of them."""
+    if name not in known:
+        raise InputError(f"{kind} '{name}'", "unknown", f"known are {', '.join(known)}")
 
 
 @contextmanager

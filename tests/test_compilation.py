@@ -56,3 +56,24 @@ def test_a_missing_folder_for_temporary_files_is_no_fault(read_only):
 def test_elsewhere_numba_chooses_itself(tmp_path):
     assert imported(ROOT).stdout == "\n"
     assert imported(ROOT, NUMBA_CACHE_DIR=str(tmp_path)).stdout == f"{tmp_path}\n"
+
+
+def test_a_loop_is_compiled_anew_when_a_module_beneath_its_own_has_changed(tmp_path):
+    package = tmp_path / "gpca"
+    package.mkdir()
+    for name in ("__init__.py", "code_files.py", "compilation.py"):
+        shutil.copy(ROOT / "gpca" / name, package / name)
+    njit = "from gpca.compilation import njit\n"
+    upper = "from gpca.lower import lower\n@njit(cache=True)\ndef upper(x):\n    return 10 * lower(x)\n"
+    (package / "upper.py").write_text(njit + upper)
+    code = "from gpca.upper import upper; print(upper(1), *upper.stats.cache_hits.values())"
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    said = []
+    for added in (1, 1, 2):
+        (package / "lower.py").write_text(f"{njit}@njit(cache=True)\ndef lower(x):\n    return x + {added}\n")
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+        said.append(done.stdout.strip())
+    assert said == ["20", "20 1", "30"]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import require_known
 
 EXPANSION = 4  # K: BALD with k-means clusters the K·B most uncertain samples
 
@@ -53,8 +53,7 @@ class Strategy:
 
 def require_strategy(name: str) -> Strategy:
     """Return the strategy of that name; an unknown one raises an InputError that lists the known."""
-    if name not in STRATEGIES:
-        raise InputError(f"strategy '{name}'", "unknown", f"known are {', '.join(STRATEGIES)}")
+    require_known("strategy", name, STRATEGIES)
     return STRATEGIES[name]
 
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.icp import ICP, ICPSettings, require_cloud
-from gpca.alignment.icp_kernels import align_all, make_target, pull_all
+from gpca.alignment.icp_kernels import align_all, pull_all
+from gpca.alignment.icp_target import make_target
 
 
 class BatchedICP:

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.icp import ICPSettings, require_cloud
-from gpca.alignment.icp_kernels import CONVERGED, make_target, plane_all
+from gpca.alignment.icp_kernels import CONVERGED, plane_all
+from gpca.alignment.icp_target import make_target
 
 SINGULAR = 1e-10  # eigenvalue, in the largest, below which a step leaves its direction alone
 

@@ -1,267 +1,15 @@
-"""The inner loops of point-to-point ICP, compiled by numba: nearest neighbours, and the motion of least squares.
-
-All in one file, because numba takes a compiled function from its cache as long as the function's own file is unchanged,
-whatever else it calls.
-
-Space is cut into voxels. The first point that falls into one has the target points nearest to the voxel's centre
-listed; every later point there, in whichever iteration and from whichever initial pose, finds its neighbour among
-those. A list says how far it is complete; where that does not suffice, the point is searched by itself, so the
-neighbour is always the true one.
-"""
+"""The loops of ICP over poses and points, compiled by numba: point-to-point whole, and the sums of others at a pose."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
-from gpca.compilation import njit
+from gpca.alignment.icp_motion import move
+from gpca.alignment.icp_neighbours import nearest
+from gpca.alignment.icp_target import LISTED
+from gpca.compilation import INNER_LOOP, njit
 
 CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last iteration; Open3D's default
-LISTED = 16  # target points per voxel
-MOST_LISTS = 1 << 16  # beyond that, points in new voxels are searched by themselves
-
-# Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
-# in these loops takes longer than the search. Functions compiled so cannot make arrays; they are given room to work.
-OPTIONS: dict[str, Any] = {
-    "cache": True,
-    "_nrt": False,
-    "error_model": "numpy",
-    "fastmath": {"contract", "nsz", "nnan", "reassoc"},
-}
-
-
-class Target(NamedTuple):
-    """Points sorted into cubic cells, and the voxels' lists, which the searches fill.
-
-    Attributes:
-        points: (P, 3) in the order of their cells; a neighbour is a row of it.
-        starts: where each cell's points start, and where the last one's end.
-        low: (3,) corner of the cells; the voxels begin `distance` before it.
-        cell, cells: edge of a cell, number along each axis.
-        voxel, voxels: the same of the voxels.
-        list_of_voxel: row of its list, -1 before it has one.
-        listed, offsets: (lists, LISTED) points, (lists, 3, LISTED) their positions from the voxel's centre.
-        reach: every point that is not in the list is at least so far from the centre.
-        used: (1,) number of lists.
-        distance: farther points are no neighbours; unit of the points.
-    """
-
-    points: np.ndarray
-    starts: np.ndarray
-    low: np.ndarray
-    cell: float
-    cells: np.ndarray
-    voxel: float
-    voxels: np.ndarray
-    list_of_voxel: np.ndarray
-    listed: np.ndarray
-    offsets: np.ndarray
-    reach: np.ndarray
-    used: np.ndarray
-    distance: float
-
-
-def make_target(points: np.ndarray, distance: float) -> Target:
-    """Sort points (P, 3) for searches within `distance`, in the unit of the points."""
-    low, high = points.min(axis=0).astype(np.float64), points.max(axis=0)
-    extent = max(float((high - low).max()), 1e-9)
-    # The points lie on a surface: their number grows with the square of the extent, not with its cube.
-    spacing = extent / np.sqrt(len(points))
-    # A cell must not be far smaller than the distance, however small the cloud: the searches widen cell by cell.
-    cell = max(1.5 * spacing, distance / 128)
-    cells = np.floor((high - low) / cell).astype(np.int64) + 1
-    cell_P = np.ravel_multi_index(tuple(np.floor((points - low) / cell).astype(np.int64).T), tuple(cells))
-    order = np.argsort(cell_P, kind="stable")
-    voxel = max(1.5 * spacing, (extent + 2 * distance) / 128)
-    voxels = np.floor((high - low + 2 * distance) / voxel).astype(np.int64) + 1
-    lists = min(MOST_LISTS, int(np.prod(voxels)))
-    return Target(
-        points=np.ascontiguousarray(points[order], np.float64),
-        starts=np.searchsorted(cell_P[order], np.arange(np.prod(cells) + 1)),
-        low=low,
-        cell=cell,
-        cells=cells,
-        voxel=voxel,
-        voxels=voxels,
-        list_of_voxel=np.full(int(np.prod(voxels)), -1, np.int32),
-        listed=np.empty((lists, LISTED), np.int32),
-        offsets=np.empty((lists, 3, LISTED)),
-        reach=np.empty(lists),
-        used=np.zeros(1, np.int64),
-        distance=float(distance),
-    )
-
-
-@njit(forceinline=True, **OPTIONS)
-def nearest(
-    x,
-    y,
-    z,
-    room,
-    points,
-    starts,
-    low,
-    cell,
-    cells,
-    voxel,
-    voxels,
-    list_of_voxel,
-    listed,
-    offsets,
-    reach,
-    used,
-    distance,
-):
-    """Return the row of the target's point nearest to (x, y, z), -1 where none is within the distance, and a radius.
-
-    Nowhere within that radius around (x, y, z) is another point nearer, or, after -1, any point within the distance.
-    `room` (LISTED,) float64 is space to work in; the rest are the fields of :class:`Target`.
-    """
-    per = 1.0 / voxel
-    i_voxel = (x - low[0] + distance) * per
-    j_voxel = (y - low[1] + distance) * per
-    k_voxel = (z - low[2] + distance) * per
-    if (
-        not (i_voxel >= 0 and j_voxel >= 0 and k_voxel >= 0)
-        or i_voxel >= voxels[0]
-        or j_voxel >= voxels[1]
-        or k_voxel >= voxels[2]
-    ):
-        return -1, 0.0
-    i, j, k = int(i_voxel), int(j_voxel), int(k_voxel)
-    centre_x = low[0] - distance + (i + 0.5) * voxel
-    centre_y = low[1] - distance + (j + 0.5) * voxel
-    centre_z = low[2] - distance + (k + 0.5) * voxel
-    flat = (i * voxels[1] + j) * voxels[2] + k
-    row = list_of_voxel[flat]
-    if row < 0 and used[0] < len(listed):
-        row = used[0]
-        used[0] += 1
-        list_of_voxel[flat] = row
-        reach[row] = _list_nearest(
-            points,
-            starts,
-            low,
-            cell,
-            cells,
-            distance + voxel,
-            centre_x,
-            centre_y,
-            centre_z,
-            listed[row],
-            offsets[row],
-            room,
-        )
-    if row >= 0:
-        dx, dy, dz = x - centre_x, y - centre_y, z - centre_z
-        chosen, first_square, second_square = _two_closest(offsets, row, dx, dy, dz)
-        complete = reach[row] - np.sqrt(dx * dx + dy * dy + dz * dz)
-        # What is not listed may be the second nearest. The radius leaves room for rounding.
-        first, second = np.sqrt(first_square), min(np.sqrt(second_square), complete)
-        if first < distance and first <= complete:
-            return listed[row, chosen], max(0.0, 0.5 * (second - first) - 1e-9 * distance)
-        if min(first, complete) >= distance:
-            return -1, max(0.0, min(first, complete) - distance - 1e-9 * distance)
-    return _search(points, starts, low, cell, cells, distance, x, y, z), 0.0
-
-
-@njit(forceinline=True, **OPTIONS)
-def _two_closest(offsets, row, dx, dy, dz):
-    # Without a branch: which point is the nearest cannot be foreseen, and a wrong guess costs more than the rest.
-    first, second, chosen = np.inf, np.inf, 0
-    for slot in range(LISTED):
-        a, b, c = offsets[row, 0, slot] - dx, offsets[row, 1, slot] - dy, offsets[row, 2, slot] - dz
-        square = a * a + b * b + c * c
-        second = min(second, max(first, square))
-        chosen = slot if square < first else chosen
-        first = min(first, square)
-    return chosen, first, second
-
-
-@njit(**OPTIONS)
-def _list_nearest(points, starts, low, cell, cells, radius, x, y, z, listed, offsets, squares):
-    """List the points nearest to a voxel's centre; return how far the list is complete."""
-    window = 1
-    while True:
-        squares[:] = radius * radius
-        listed[:] = -1
-        i_low, i_high = _cells_around(x, low[0], cell, cells[0], window)
-        j_low, j_high = _cells_around(y, low[1], cell, cells[1], window)
-        k_low, k_high = _cells_around(z, low[2], cell, cells[2], window)
-        for i in range(i_low, i_high):
-            for j in range(j_low, j_high):
-                first, last = _points_of(starts, cells, i, j, k_low, k_high)
-                for p in range(first, last):
-                    square = _square(points, p, x, y, z)
-                    if square < squares[LISTED - 1]:
-                        slot = LISTED - 1
-                        while slot > 0 and squares[slot - 1] > square:
-                            squares[slot] = squares[slot - 1]
-                            listed[slot] = listed[slot - 1]
-                            slot -= 1
-                        squares[slot] = square
-                        listed[slot] = p
-        reached = _reached(low, cell, x, y, z, window)
-        if reached * reached >= squares[LISTED - 1]:
-            break
-        window += 1
-    for slot in range(LISTED):
-        p = listed[slot]
-        offsets[0, slot] = points[p, 0] - x if p >= 0 else np.inf
-        offsets[1, slot] = points[p, 1] - y if p >= 0 else np.inf
-        offsets[2, slot] = points[p, 2] - z if p >= 0 else np.inf
-    return np.sqrt(squares[LISTED - 1])
-
-
-@njit(**OPTIONS)
-def _search(points, starts, low, cell, cells, radius, x, y, z):
-    """Search the cells around a point, in a growing window."""
-    window = 1
-    while True:
-        best, index = radius * radius, -1
-        i_low, i_high = _cells_around(x, low[0], cell, cells[0], window)
-        j_low, j_high = _cells_around(y, low[1], cell, cells[1], window)
-        k_low, k_high = _cells_around(z, low[2], cell, cells[2], window)
-        for i in range(i_low, i_high):
-            for j in range(j_low, j_high):
-                first, last = _points_of(starts, cells, i, j, k_low, k_high)
-                for p in range(first, last):
-                    square = _square(points, p, x, y, z)
-                    if square < best:
-                        best, index = square, p
-        reached = _reached(low, cell, x, y, z, window)
-        if reached * reached >= best:
-            return index
-        window += 1
-
-
-@njit(forceinline=True, **OPTIONS)
-def _square(points, p, x, y, z):
-    return (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2
-
-
-@njit(**OPTIONS)
-def _cells_around(x, low, cell, cells, window):
-    i = int(np.floor((x - low) / cell))
-    return max(0, i - window), min(cells, i + window + 1)
-
-
-@njit(forceinline=True, **OPTIONS)
-def _points_of(starts, cells, i, j, k_low, k_high):
-    """Cells along the last axis follow each other, so their points are one piece."""
-    if k_low >= k_high:
-        return 0, 0
-    row = (i * cells[1] + j) * cells[2]
-    return starts[row + k_low], starts[row + k_high]
-
-
-@njit(**OPTIONS)
-def _reached(low, cell, x, y, z, window):
-    """Return how far away everything outside the window is at least: its cells, and the way to the own nearest wall."""
-    a, b, c = (x - low[0]) % cell, (y - low[1]) % cell, (z - low[2]) % cell
-    wall = min(min(min(a, cell - a), min(b, cell - b)), min(c, cell - c))
-    return window * cell + wall
 
 
 @njit(cache=True)
@@ -270,16 +18,15 @@ def align_all(source, target, poses, fitness, rmse, max_iterations):
     room = np.empty(LISTED)
     moments, matrices = np.empty((4, 4)), np.empty((8, 4))
     neighbour = np.empty(len(source), np.int64)
-    held = np.zeros(
-        (len(source), 4)
-    )  # where each point's neighbour was searched, and the square of the radius around it
+    # Where each point's neighbour was searched, and the square of the radius around it.
+    held = np.zeros((len(source), 4))
     for n in range(len(poses)):
         pose = poses[n]
         held[:, 3] = -1.0  # nothing was searched yet
         fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbour, held)
         for _ in range(max_iterations):
             if fitness[n] > 0:
-                _move(pose, moments, matrices)
+                move(pose, moments, matrices)
             old_fitness, old_rmse = fitness[n], rmse[n]
             fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbour, held)
             if abs(old_fitness - fitness[n]) < CONVERGED and abs(old_rmse - rmse[n]) < CONVERGED:
@@ -317,7 +64,7 @@ def plane_all(source, target, normals, poses, hessians, gradients, fitness, rmse
         fitness[n], rmse[n] = _plane_sums(source, target, normals, poses[n], hessian, gradient, room, row)
 
 
-@njit(**OPTIONS)
+@njit(**INNER_LOOP)
 def _plane_sums(source, target, normals, pose, hessian, gradient, room, row):
     points, starts, low, cell, cells, voxel, voxels, list_of_voxel, listed, offsets, reach, used, distance = target
     lists = (voxel, voxels, list_of_voxel, listed, offsets, reach, used, distance)
@@ -346,7 +93,7 @@ def _plane_sums(source, target, normals, pose, hessian, gradient, room, row):
     return count / len(source), np.sqrt(squares / max(count, 1))
 
 
-@njit(**OPTIONS)
+@njit(**INNER_LOOP)
 def _correspond(source, target, pose, moments, room, neighbour, held):
     """Return fitness and inlier RMSE at a pose, and in `moments` the mean of [q, 1] [p, 1]ᵀ over correspondences."""
     r00, r01, r02, t0 = pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3]
@@ -405,76 +152,3 @@ def _correspond(source, target, pose, moments, room, neighbour, held):
     moments[3, 0], moments[3, 1], moments[3, 2], moments[3, 3] = m30, m31, m32, count
     moments /= count
     return count / len(source), np.sqrt(squares / count)
-
-
-@njit(**OPTIONS)
-def _move(pose, moments, room):
-    """Apply the rigid motion of least squares between corresponding points to the pose (Horn 1987, by quaternions)."""
-    q0, q1, q2 = moments[0, 3], moments[1, 3], moments[2, 3]
-    p0, p1, p2 = moments[3, 0], moments[3, 1], moments[3, 2]
-    # Sums of Horn's notation: of the products of the source's first and the target's second coordinate.
-    xx, yx, zx = moments[0, 0] - q0 * p0, moments[0, 1] - q0 * p1, moments[0, 2] - q0 * p2
-    xy, yy, zy = moments[1, 0] - q1 * p0, moments[1, 1] - q1 * p1, moments[1, 2] - q1 * p2
-    xz, yz, zz = moments[2, 0] - q2 * p0, moments[2, 1] - q2 * p1, moments[2, 2] - q2 * p2
-    matrix, vectors = room[:4], room[4:]
-    matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3] = xx + yy + zz, yz - zy, zx - xz, xy - yx
-    matrix[1, 1], matrix[1, 2], matrix[1, 3] = xx - yy - zz, xy + yx, zx + xz
-    matrix[2, 2], matrix[2, 3], matrix[3, 3] = yy - xx - zz, yz + zy, zz - xx - yy
-    # Correspondences with one single point: what is left of the sums is rounding, and no rotation is better than any.
-    rounding = 1e-24 * (q0 * q0 + q1 * q1 + q2 * q2) * (p0 * p0 + p1 * p1 + p2 * p2)
-    if xx**2 + xy**2 + xz**2 + yx**2 + yy**2 + yz**2 + zx**2 + zy**2 + zz**2 <= rounding:
-        matrix[:] = 0.0
-    largest = _largest_eigenvector(matrix, vectors)
-    w, x, y, z = vectors[0, largest], vectors[1, largest], vectors[2, largest], vectors[3, largest]
-    r00, r01, r02 = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    r10, r11, r12 = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    r20, r21, r22 = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-    t0, t1, t2 = pose[0, 3] - p0, pose[1, 3] - p1, pose[2, 3] - p2
-    pose[0, 3] = r00 * t0 + r01 * t1 + r02 * t2 + q0
-    pose[1, 3] = r10 * t0 + r11 * t1 + r12 * t2 + q1
-    pose[2, 3] = r20 * t0 + r21 * t1 + r22 * t2 + q2
-    for j in range(3):
-        a, b, c = pose[0, j], pose[1, j], pose[2, j]
-        pose[0, j] = r00 * a + r01 * b + r02 * c
-        pose[1, j] = r10 * a + r11 * b + r12 * c
-        pose[2, j] = r20 * a + r21 * b + r22 * c
-
-
-@njit(**OPTIONS)
-def _largest_eigenvector(matrix, vectors):
-    """Diagonalise a symmetric 4×4 matrix (upper half) by Jacobi rotations; return the largest eigenvalue's column."""
-    for i in range(4):
-        for j in range(4):
-            vectors[i, j] = 1.0 if i == j else 0.0
-    for _ in range(30):
-        off = 0.0
-        for i in range(3):
-            for j in range(i + 1, 4):
-                off += matrix[i, j] * matrix[i, j]
-        if off < 1e-40:
-            break
-        for i in range(3):
-            for j in range(i + 1, 4):
-                if matrix[i, j] == 0.0:
-                    continue
-                theta = (matrix[j, j] - matrix[i, i]) / (2 * matrix[i, j])
-                t = 1 / (abs(theta) + np.sqrt(theta * theta + 1))
-                if theta < 0:
-                    t = -t
-                c = 1 / np.sqrt(t * t + 1)
-                s = t * c
-                matrix[i, i] -= t * matrix[i, j]
-                matrix[j, j] += t * matrix[i, j]
-                matrix[i, j] = 0.0
-                for k in range(4):
-                    if k != i and k != j:
-                        a, b = (min(k, i), max(k, i)), (min(k, j), max(k, j))
-                        u, v = matrix[a], matrix[b]
-                        matrix[a], matrix[b] = c * u - s * v, s * u + c * v
-                    u, v = vectors[k, i], vectors[k, j]
-                    vectors[k, i], vectors[k, j] = c * u - s * v, s * u + c * v
-    largest = 0
-    for i in range(1, 4):
-        if matrix[i, i] > matrix[largest, largest]:
-            largest = i
-    return largest

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import TIMING_COLUMNS, concepts_of, read_predictions, require_samples
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
 
 if TYPE_CHECKING:
@@ -218,10 +218,7 @@ def read_metrics(path: str | Path) -> pd.DataFrame:
 
 def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
     """Write tidy metrics as CSV; floats keep every digit, so that equal metrics give equal bytes."""
-    from gpca.files import whole_file
-
-    with whole_file(path) as partial:
-        metrics.to_csv(partial, index=False, lineterminator="\n")
+    write_csv(path, metrics, form=None)
 
 
 def source_method_seed(path: str | Path) -> tuple[str, str, int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
-from gpca.errors import InputError
+from gpca.errors import require_known
 from gpca.settings import Bounds, Count
 
 Kernel = Literal["rbf", "matern32", "polynomial"]
@@ -32,5 +32,4 @@ class GPCSettings:
     draws: Draws = 1000
 
     def __post_init__(self) -> None:
-        if self.kernel not in KERNELS:
-            raise InputError(f"kernel '{self.kernel}'", "unknown", f"known are {', '.join(KERNELS)}")
+        require_known("kernel", self.kernel, KERNELS)

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.encoders.tensor_file import read_tensors
-from gpca.files import whole_file
+from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.pairs.dataset import Registrations
 
 
@@ -36,8 +35,7 @@ def keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict])
     if checkpoint is None:
         return
     content = {name: part.state_dict() for name, part in state.items()}
-    with whole_file(checkpoint) as partial:
-        torch.save(content | {"identity": identity, "curve": curve}, partial)
+    write_tensors(checkpoint, content | {"identity": identity, "curve": curve})
 
 
 def resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:

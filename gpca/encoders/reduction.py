@@ -14,7 +14,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, require_known
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count
 
@@ -158,8 +158,7 @@ def make_reduction(name: str, settings: dict):
     Raises:
         InputError: unknown reduction, or a setting that it does not have.
     """
-    if name not in REDUCTIONS:
-        raise InputError(f"reduction '{name}'", "unknown", f"known are {', '.join(REDUCTIONS)}")
+    require_known("reduction", name, REDUCTIONS)
     reduction = REDUCTIONS[name]
     known = [field.name for field in fields(reduction)] if reduction else []
     if unknown := [key for key in settings if key not in known]:

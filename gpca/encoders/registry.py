@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
-from gpca.errors import InputError
+from gpca.errors import InputError, require_known
+from gpca.registry import load
 
 ENCODERS = {
     "dgcnn": "gpca.encoders.dgcnn:DGCNN",
@@ -22,17 +21,15 @@ def make_encoder(backbone: str, options: dict):
         InputError: unknown backbone, or an option that it does not have.
     """
     require_backbone(backbone)
-    module, name = ENCODERS[backbone].split(":")
     try:
-        return getattr(import_module(module), name)(**options)
+        return load(ENCODERS[backbone])(**options)
     except TypeError as fault:
         raise InputError(f"backbone '{backbone}'", str(fault), "see encoder.options in the config") from fault
 
 
 def require_backbone(backbone: str) -> None:
     """Raise an InputError that names the known backbones unless `backbone` is one of them."""
-    if backbone not in ENCODERS:
-        raise InputError(f"backbone '{backbone}'", "unknown", f"known are {', '.join(ENCODERS)}")
+    require_known("backbone", backbone, ENCODERS)
 
 
 def parameter_count(module) -> int:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
 from gpca.pairs.reading import Reading
-from gpca.settings import Bounds, Count, PositiveShare, Share, check_settings
+from gpca.settings import Bounds, Count, PositiveShare, Share
 
 OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of unlike sizes together
 
@@ -59,19 +57,6 @@ class EncoderSettings:
         if self.fewest_points > self.draw_points:
             fault = f"{self.fewest_points} is above draw_points, {self.draw_points}"
             raise InputError("encoder setting 'fewest_points'", fault, "lower it")
-
-
-def encoder_settings(settings: Mapping[str, Any]) -> tuple[EncoderSettings, ICPSettings]:
-    """Return what ``--settings`` say of an encoder and, under ``icp``, of the ICP before it.
-
-    Raises:
-        InputError: what :func:`gpca.settings.check_settings` refuses.
-    """
-    given = dict(settings)
-    icp = given.pop("icp", {})
-    check_settings(given, "encoders", "*")
-    check_settings(icp, "registrations", "icp")
-    return EncoderSettings(**given), ICPSettings(**icp)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Files of torch.save, read without trust: whole to the byte, no code, and only numbers that can be.
+"""Files of torch.save; they are read without trust: whole to the byte, no code, and only numbers that can be.
 
 torch itself takes a file in which a bit has flipped for a whole one: it reads no checksum.
 """
@@ -12,6 +12,7 @@ from typing import Any
 
 import torch
 
+from gpca.files import whole_file
 from gpca.limits import LARGEST_NUMBER
 
 
@@ -35,6 +36,13 @@ def read_tensors(path: str | Path) -> Any:
     for name, tensor in _tensors(content):
         _require_sound(name, tensor)
     return content
+
+
+def write_tensors(path: str | Path, content: object) -> None:
+    """Write a file, whole or not at all."""
+    # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
+    with whole_file(path) as partial, partial.open("wb") as file:
+        torch.save(content, file)
 
 
 def require_like(state: object, expected: Mapping[str, torch.Tensor], what: str) -> None:

@@ -10,16 +10,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import torch
 from torch import nn
 
 from gpca.alignment.icp import ICPSettings
 from gpca.classifier.gpc import GPC
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.tensor_file import read_tensors
+from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
-from gpca.files import whole_file
 from gpca.model.contents import require_possible
 from gpca.model.diagnoser import Diagnoser
 from gpca.model.familiarity import Familiarity
@@ -83,9 +81,7 @@ class Model:
         }
         if self.familiar is not None:
             content["familiar"] = {name: list(ends) for name, ends in self.familiar.ranges.items()}
-        # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
-        with whole_file(path) as partial, partial.open("wb") as file:
-            torch.save(content, file)
+        write_tensors(path, content)
 
     @classmethod
     def load(cls, path: str | Path) -> Model:

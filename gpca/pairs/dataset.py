@@ -191,6 +191,22 @@ def load_embeddings(
     return arrays
 
 
+def read_embedding(
+    path: str | Path, registrations: Registrations, step: str = "embed", logits: bool = False
+) -> dict[str, np.ndarray]:
+    """Read what is attached to the registrations of an encoder: ``embedding`` (S, d), if asked ``head_logits`` (S, C).
+
+    Args:
+        step: that makes the file.
+
+    Raises:
+        InputError: as :func:`load_embeddings`.
+    """
+    shapes = {"h": ("S", "d")} | ({"head_logits": ("S", "C")} if logits else {})
+    arrays = load_embeddings(path, registrations, shapes, f"python -m gpca {step}")
+    return {"embedding": arrays["h"]} | ({"head_logits": arrays["head_logits"]} if logits else {})
+
+
 CLOUDS = ("points", "offsets", "target_points", "target_offsets")
 REGISTRATION_COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in (*CLOUDS, "attached"))
 

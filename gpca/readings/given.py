@@ -9,7 +9,7 @@ from pathlib import Path
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.readings.settings import Reading
 from gpca.shift.sets import ShiftedSets
 from gpca.uncertainty.settings import UncertaintySettings
@@ -56,9 +56,8 @@ class Given:
     def embedded(self, source: str, method: str, seed: int) -> Registrations:
         """Return registrations with the embeddings of a ``{backbone}-{reduction}`` attached."""
         registrations = Registrations.load(self.registrations[source, seed])
-        path = self.embeddings[source, method, seed]
-        h_S_d = load_embeddings(path, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
-        return replace(registrations, attached={"embedding": h_S_d})
+        embedding = read_embedding(self.embeddings[source, method, seed], registrations)
+        return replace(registrations, attached=embedding)
 
 
 def by_source_and_seed(paths: Iterable[Path]) -> dict[tuple[str, int], Path]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 
 from gpca.readings import settings
+from gpca.registry import load
 
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
 
@@ -41,7 +41,7 @@ class Group:
 
     def function(self) -> Callable:
         """Return what runs it."""
-        return getattr(import_module(self.module), self.run.partition(":")[2])
+        return load(f"gpca.readings.{self.run}")
 
 
 _LEARNERS = ("gpca_paper", "learner_forest", "learner_linear_svm")

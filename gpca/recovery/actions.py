@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation
-from gpca.errors import InputError
+from gpca.errors import require_known
 from gpca.frames.shots import Shot, agreement, fuse
 from gpca.settings import require_arguments
 
@@ -177,7 +177,6 @@ def action_of(name: str, settings: Mapping[str, object]) -> Action:
     """Return the action of that name with its settings; InputError for an unknown name or setting."""
     from functools import partial
 
-    if name not in ACTIONS:
-        raise InputError(f"recovery action '{name}'", "unknown", f"known are {', '.join(ACTIONS)}")
+    require_known("recovery action", name, ACTIONS)
     require_arguments(f"recovery action '{name}'", ACTIONS[name], 3, settings)
     return partial(ACTIONS[name], **settings)

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
-from importlib import import_module
 from itertools import product
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+from gpca.registry import load
 from gpca.structured_text import load_own_yaml
 
 REGISTRY = Path(__file__).with_name("results.yaml")
@@ -210,12 +210,6 @@ def build(builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any]
     """
     given = {argument: _read(files, **reader) for argument, reader in readers.items()}
     return load(builder)(**given, **arguments)
-
-
-def load(function: str) -> Any:
-    """Return the function that ``module:function`` names."""
-    module, name = function.split(":")
-    return getattr(import_module(module), name)
 
 
 def _read(files: Mapping[str, Any], function: str, keywords: Mapping[str, str]) -> Any:

@@ -17,12 +17,13 @@ from gpca.active_learning.stream import run_stream
 from gpca.arguments import SEED
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
-from gpca.errors import InputError
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.errors import require_known
+from gpca.pairs.dataset import Registrations, load_embeddings, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
+from gpca.steps import require_files
 
 PAPERS = ("random", "bald_kmeans")  # the paper's two strategies, which also meet a rare concept
 
@@ -42,13 +43,9 @@ def run(options: Namespace) -> None:
     """Run every strategy in every setting for every concept held out."""
     torch.set_num_threads(options.threads)
     check_settings(options.settings, "active_learning")
-    if len(options.out) != len(options.strategies):
-        raise InputError(
-            "--out", f"{len(options.out)} file(s) for {len(options.strategies)} strategies", "give one each"
-        )
-    if unknown := set(options.strategies) - {*STRATEGIES, *STREAMS}:
-        known = ", ".join((*STRATEGIES, *STREAMS))
-        raise InputError(f"strategy '{sorted(unknown)[0]}'", "unknown", f"known are {known}")
+    require_files(options, "out", len(options.strategies), "strategies")
+    for strategy in options.strategies:
+        require_known("strategy", strategy, (*STRATEGIES, *STREAMS))
     inputs = [options.registrations, options.embeddings, options.embeddings_without]
     axes = (options.source, options.seed)
     with record_provenance(options.out, inputs, options.settings, seed=options.seed):
@@ -75,14 +72,13 @@ def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tup
     """Yield setting, task and the GPC that knows two concepts: for each concept held out, and for a rare one."""
     registrations = Registrations.load(options.registrations)
     held_out = options.settings.get("held_out", CONCEPTS)
-    seen = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")
+    seen_S_d = read_embedding(options.embeddings, registrations)["embedding"]
     shapes = {f"h_{c}": ("S", "d") for c in held_out}
     unseen = load_embeddings(options.embeddings_without, registrations, shapes, "python -m gpca without")
     rare_share = options.settings.get("rare_share")
-    chosen = [("pretrained", c, seen["h"], None) for c in held_out] + [
-        ("unseen", c, unseen[f"h_{c}"], None) for c in held_out
-    ]
-    chosen += [("rare", c, seen["h"], rare_share) for c in held_out if rare_share and c == "overlap"]
+    chosen = [("pretrained", c, seen_S_d, None) for c in held_out]
+    chosen += [("unseen", c, unseen[f"h_{c}"], None) for c in held_out]
+    chosen += [("rare", c, seen_S_d, rare_share) for c in held_out if rare_share and c == "overlap"]
     axes = (options.source, options.seed)
     for setting, concept, h_S_d, share in chosen:
         attached = replace(registrations, attached={"embedding": h_S_d})

@@ -11,7 +11,7 @@ from gpca.arguments import SEED
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
@@ -87,7 +87,5 @@ def _load(
 def _with_embedding(registrations: Registrations, path: Path | None, explainer: str) -> Registrations:
     if path is None:
         raise InputError(f"explainer '{explainer}'", "reads embeddings", "give them with --embeddings")
-    shapes = {"h": ("S", "d"), "head_logits": ("S", "C")}
-    arrays = load_embeddings(path, registrations, shapes, "python -m gpca embed")
-    own = {"embedding": arrays["h"], "head_logits": arrays["head_logits"]}
+    own = read_embedding(path, registrations, logits=True)
     return replace(registrations, attached={**registrations.attached, **own})

@@ -11,7 +11,7 @@ from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import CauseSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
+from gpca.steps import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -26,10 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Draw candidates, measure their causes, keep a balanced set."""
-    given = dict(options.settings)
-    icp = given.pop("icp", {})
-    check_settings(given, "causes")
-    check_settings(icp, "registrations", "icp")
+    given, icp = checked_with_icp(options.settings, "causes")
     settings = CauseSettings.from_dict(given, icp)
     objects = ObjectClouds.load(options.objects)
     outputs = [options.out, options.candidates, options.timings]

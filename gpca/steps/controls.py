@@ -19,9 +19,9 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections
+from gpca.steps import checked_sections, require_files
 from gpca.uncertainty.settings import UncertaintySettings
 
 SECTIONS = {
@@ -53,9 +53,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Let every explainer learn and explain under the paper's protocol and under each control."""
     torch.set_num_threads(options.threads)
-    given = dict(options.settings)
-    rivals = make_rivals(given.pop("explainers", {}), options.source, options.seed)
-    given = checked_sections(given, SECTIONS)
+    given = checked_sections(options.settings, SECTIONS, by_name=("explainers",))
+    rivals = make_rivals(given["explainers"], options.source, options.seed)
     settings, encoder = ControlSettings.from_dict(given["controls"]), EncoderSettings(**given["encoder"])
     icp = ICPSettings(**given["icp"])
     runs = {name: value for name, value in given["uncertainty"].items() if name != "samples"}
@@ -70,11 +69,11 @@ def run(options: Namespace) -> None:
     ):
         registrations = Registrations.load(options.registrations)
         model = load_model(options.encoder, encoder)
-        embeddings = {PAPER: _embeddings(options.embeddings, registrations, "embed")}
+        embeddings = {PAPER: read_embedding(options.embeddings, registrations, logits=True)}
         for control, path in retrained.items():
             if not left_out(control, registrations, settings, encoder.backbone):
                 changed = variant(control, registrations, options.source, options.seed, settings, icp)
-                embeddings[control] = _embeddings(path, changed, "train_control")
+                embeddings[control] = read_embedding(path, changed, "train_control", logits=True)
         experiment = Experiment(
             source=options.source,
             seed=options.seed,
@@ -94,16 +93,6 @@ def run(options: Namespace) -> None:
 
 
 def _pairs(options: Namespace, names: str, files: str) -> dict[str, Path]:
-    given, paths = getattr(options, names), getattr(options, files)
-    if len(given) != len(paths):
-        option = f"--{files.replace('_', '-')}"
-        raise InputError(
-            option, f"{len(paths)} file(s) for {len(given)} name(s)", "give one for each, in the same order"
-        )
-    return dict(zip(given, paths, strict=True))
-
-
-def _embeddings(path: Path, registrations: Registrations, step: str):
-    shapes = {"h": ("S", "d"), "head_logits": ("S", "C")}
-    arrays = load_embeddings(path, registrations, shapes, f"python -m gpca {step}")
-    return {"embedding": arrays["h"], "head_logits": arrays["head_logits"]}
+    given = getattr(options, names)
+    require_files(options, files, len(given), "name(s)")
+    return dict(zip(given, getattr(options, files), strict=True))

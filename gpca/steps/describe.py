@@ -12,7 +12,7 @@ from gpca.causes.dataset import Causes
 from gpca.descriptors.dataset import describe_all
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
+from gpca.steps import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -27,10 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Describe every pair."""
-    given = dict(options.settings)
-    icp = given.pop("icp", {})
-    check_settings(given, "diagnosis", "descriptors")
-    check_settings(icp, "registrations", "icp")
+    given, icp = checked_with_icp(options.settings, "diagnosis", "descriptors")
     outputs = [options.out, options.timings]
     with record_provenance(outputs, [options.causes, options.causes_timings], options.settings, seed=options.seed):
         causes = Causes.load(options.causes)

@@ -17,7 +17,7 @@ from gpca.causes.truth import BORDERLINE
 from gpca.descriptors.dataset import Descriptors
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
@@ -69,9 +69,7 @@ def _observed(registrations: Registrations) -> Registrations:
 
 def _with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path: Path) -> Registrations:
     if entry.reads == "embeddings":
-        shapes = {"h": ("S", "d"), "head_logits": ("S", "C")}
-        arrays = load_embeddings(path, registrations, shapes, "python -m gpca embed")
-        read = {"embedding": arrays["h"], "head_logits": arrays["head_logits"]}
+        read = read_embedding(path, registrations, logits=True)
     else:
         read = dict(Descriptors.load(path, registrations).groups)
     return replace(registrations, attached={**registrations.attached, **read})

@@ -8,14 +8,16 @@ from time import perf_counter
 
 import torch
 
+from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
 from gpca.arrays import save_arrays
 from gpca.attribution.predictions import read_timings, write_timings
-from gpca.encoders.settings import encoder_settings
+from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
+from gpca.steps import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -32,7 +34,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Embed every cloud."""
     torch.set_num_threads(options.threads)
-    settings, icp = encoder_settings(options.settings)
+    given, of_icp = checked_with_icp(options.settings, "encoders", "*")
+    settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
     inputs = [options.registrations, options.encoder]
     with record_provenance([options.out, options.timings], inputs, options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)

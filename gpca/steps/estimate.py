@@ -9,18 +9,16 @@ from gpca.alignment.methods.registry import require_local
 from gpca.arguments import SEED
 from gpca.causes.dataset import Causes
 from gpca.csv_file import write_csv
-from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
-from gpca.steps import per_seed
+from gpca.steps import checked_by_name, checked_sections, per_seed, require_files
 from gpca.trials.covariances import REFERENCE, ReferenceSamples
 from gpca.trials.estimation import try_estimators
 from gpca.trials.judge import Judges
 from gpca.trials.settings import EstimatorPairSettings
 from gpca.uncertainty.estimators.registry import require_estimator_settings
 
-SECTIONS = ("estimator_pairs", "estimators")
+SECTIONS = {"estimator_pairs": ("estimator_pairs",)}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -40,23 +38,14 @@ def run(options: Namespace) -> None:
     import torch
 
     torch.set_num_threads(options.threads)
-    if unknown := sorted(set(options.settings) - set(SECTIONS)):
-        raise InputError(f"setting {unknown[0]}", "unknown", f"known are {', '.join(SECTIONS)}")
-    pairs = options.settings.get("estimator_pairs", {})
-    check_settings(pairs, "estimator_pairs")
-    settings = EstimatorPairSettings(**pairs)
+    given = checked_sections(options.settings, SECTIONS, by_name=("estimators",))
+    settings = EstimatorPairSettings(**given["estimator_pairs"])
     for name in settings.methods:
         require_local(name)
-    own = options.settings.get("estimators", dict.fromkeys(options.estimators))
-    check_settings(own, "estimators")
-    for name in (*own, *options.estimators):
-        require_estimator_settings(name, own.get(name) or {})
-    estimators = {name: own.get(name) or {} for name in options.estimators}
-    wanted = len((REFERENCE, *estimators)) * len(options.seeds)
+    estimators = checked_by_name(given["estimators"], "estimators", options.estimators, require_estimator_settings)
     for option in ("out", "timings"):
-        if (given := len(getattr(options, option))) != wanted:
-            remedy = "give one for the reference and each estimator, per seed"
-            raise InputError(f"--{option}", f"{given} file(s), not {wanted}", remedy)
+        wanted = len((REFERENCE, *estimators)) * len(options.seeds)
+        require_files(options, option, wanted, "pair(s) of reference or estimator and seed")
     judges = Judges(ObjectClouds.load(options.objects), f"objects of {options.source}")
     for i, (seed, path, samples) in enumerate(per_seed(options, "causes", "samples")):
         of_seed = slice(i, None, len(options.seeds))

@@ -20,13 +20,12 @@ from gpca.exchange.settings import ExchangeSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
-from gpca.steps import checked_sections, per_seed
+from gpca.steps import checked_by_name, checked_sections, per_seed
 from gpca.trials.judge import Judges
 from gpca.uncertainty.estimators.registry import require_estimator_settings
 from gpca.uncertainty.settings import UncertaintySettings
 
-OF_NAMES = ("methods", "estimators")  # name -> settings; what is not in them has none
+BY_NAME = ("methods", "estimators", "explainers")  # name -> settings; what is not in them has none
 SECTIONS = {
     "exchange": ("exchange",),
     "uncertainty": ("uncertainty", DESIGN),
@@ -35,7 +34,7 @@ SECTIONS = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` holds `SECTIONS` and `OF_NAMES` of the config, and `explainers`."""
+    """Declare files and names; ``--settings`` holds `SECTIONS` and `BY_NAME` of the config."""
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--objects", required=True, type=Path)
@@ -47,26 +46,16 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Let every explainer learn and explain with each method and each estimator beneath it, seed by seed."""
     torch.set_num_threads(options.threads)
-    given = dict(options.settings)
-    explainers = given.pop("explainers", {})
-    for name in explainers:
+    given = checked_sections(options.settings, SECTIONS, BY_NAME)
+    for name in given["explainers"]:
         require_exchangeable(name)
-    own = {section: given.pop(section, {}) for section in OF_NAMES}
-    for section, of_names in own.items():
-        if of_names:
-            check_settings(of_names, section)
-    given = checked_sections(given, SECTIONS)
     settings, encoder = ExchangeSettings.from_dict(given["exchange"]), EncoderSettings(**given["encoder"])
-    methods = {name: own["methods"].get(name) or {} for name in settings.methods}
-    for name, of_method in methods.items():
-        require_settings(name, of_method)
-    estimators = {name: own["estimators"].get(name) or {} for name in settings.estimators}
-    for name, of_estimator in estimators.items():
-        require_estimator_settings(name, of_estimator)
+    methods = checked_by_name(given["methods"], "methods", settings.methods, require_settings)
+    estimators = checked_by_name(given["estimators"], "estimators", settings.estimators, require_estimator_settings)
     runs = {name: value for name, value in given["uncertainty"].items() if name != "samples"}
     objects = ObjectClouds.load(options.objects)
     for seed, registrations_path, weights, out in per_seed(options, "registrations", "encoders", "out"):
-        rivals = make_rivals(explainers, options.source, seed)
+        rivals = make_rivals(given["explainers"], options.source, seed)
         inputs = [options.objects, registrations_path, weights]
         with record_provenance([out], inputs, options.settings, seed=seed):
             exchange = Exchange(

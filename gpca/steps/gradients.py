@@ -20,7 +20,7 @@ from gpca.errors import InputError
 from gpca.gradients.saliency import deletions
 from gpca.gradients.settings import GradientSettings
 from gpca.gradients.tcav import tcav
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
@@ -54,8 +54,7 @@ def run(options: Namespace) -> None:
         inputs, outputs = paths[:3], paths[3:]
         with record_provenance(outputs, inputs, options.settings, seed=seed):
             plain = Registrations.load(inputs[0])
-            arrays = load_embeddings(inputs[2], plain, {"h": ("S", "d")}, "python -m gpca embed")
-            registrations = replace(plain, attached={"embedding": arrays["h"]})
+            registrations = replace(plain, attached=read_embedding(inputs[2], plain))
             train, test = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
             gpc = GPC(CONCEPTS, GPCSettings(**given["gpc"]), options.source, seed)
             gpc.fit(train.embedding, train.concept)

@@ -10,7 +10,7 @@ import torch
 
 from gpca.arguments import SEED
 from gpca.classifier.kernel_grid import KernelGrid, evaluate_grid, write_grid
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
@@ -34,6 +34,5 @@ def run(options: Namespace) -> None:
     for seed, registrations, embeddings, out in per_seed(options, "registrations", "embeddings", "out"):
         with record_provenance([out], [registrations, embeddings], options.settings, seed=seed):
             loaded = Registrations.load(registrations)
-            h_S_d = load_embeddings(embeddings, loaded, {"h": ("S", "d")}, "python -m gpca embed")["h"]
-            loaded = replace(loaded, attached={"embedding": h_S_d})
+            loaded = replace(loaded, attached=read_embedding(embeddings, loaded))
             write_grid(out, evaluate_grid(loaded, grid, options.source, seed))

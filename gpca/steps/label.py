@@ -22,7 +22,7 @@ from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.files import require_outputs
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
 from gpca.reporting.figures.query import draw_query
@@ -75,8 +75,7 @@ def run(options: Namespace) -> None:
 
 def _load(options: Namespace) -> tuple[Registrations, np.ndarray]:
     registrations = Registrations.load(options.registrations)
-    arrays = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")
-    return registrations, arrays["h"]
+    return registrations, read_embedding(options.embeddings, registrations)["embedding"]
 
 
 def _start(registrations: Registrations, keys: list, options: Namespace) -> dict:

@@ -15,6 +15,7 @@ from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.shift.learners import predict_sets
 from gpca.shift.sets import ShiftedSets
+from gpca.steps import per_seed, require_files
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -28,10 +29,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Fit every learner and let it explain, seed by seed."""
-    if len(options.sets) != len(options.seeds):
-        raise InputError("--sets", f"{len(options.sets)} file(s) for {len(options.seeds)} seed(s)", "give one for each")
-    if len(options.out) != (wanted := len(options.learners) * len(options.seeds)):
-        raise InputError("--out", f"{len(options.out)} file(s), not {wanted}", "give one per learner and seed")
+    sets_of_seeds = per_seed(options, "sets")
+    require_files(options, "out", len(options.learners) * len(options.seeds), "pair(s) of learner and seed")
     for learner in options.learners:
         settings = options.settings.get(learner) or {}
         require_settings(learner, settings)
@@ -41,7 +40,7 @@ def run(options: Namespace) -> None:
     import torch
 
     torch.set_num_threads(options.threads)
-    for i, (seed, path) in enumerate(zip(options.seeds, options.sets, strict=True)):
+    for i, (seed, path) in enumerate(sets_of_seeds):
         sets = ShiftedSets.load(path)
         outputs = options.out[i :: len(options.seeds)]
         title = f"learners on {options.source}, seed {seed}"

@@ -17,15 +17,14 @@ from gpca.descriptors.dataset import Descriptors
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import load_model
-from gpca.errors import InputError
 from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
 from gpca.model.learning import Lessons, joined, learn
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
 from gpca.recovery.policy import RecoveryPolicy
-from gpca.steps import checked_sections
+from gpca.steps import checked_sections, require_files
 
 SECTIONS = {
     "encoder": ("encoders", "*"),
@@ -64,9 +63,7 @@ def run(options: Namespace) -> None:
     """Fit both classifiers and write them with the encoder and the policy."""
     torch.set_num_threads(options.threads)
     given = checked_sections(options.settings, SECTIONS)
-    if len(options.causes) != len(options.descriptors):
-        found = f"{len(options.descriptors)} file(s) for {len(options.causes)} of causes"
-        raise InputError("--descriptors", found, "give one for each, in the same order")
+    require_files(options, "descriptors", len(options.causes), "of causes")
     inputs = [options.registrations, options.encoder, options.embeddings, *options.causes, *options.descriptors]
     with record_provenance([options.out], inputs, options.settings, seed=options.seed):
         icp, own = given["registrations"].get("icp", {}), given["model"]
@@ -108,6 +105,6 @@ def _lessons(causes_file: Path, descriptors_file: Path) -> Lessons:
 
 
 def _gpc(options: Namespace, registrations: Registrations, settings: GPCSettings) -> GPC:
-    h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
+    h_S_d = read_embedding(options.embeddings, registrations)["embedding"]
     train = registrations.rows("train")
     return GPC(CONCEPTS, settings, options.source, options.seed).fit(h_S_d[train], registrations.concept[train])

@@ -34,14 +34,13 @@ from gpca.descriptors.registered import describe_registrations
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, load_model
-from gpca.errors import InputError
 from gpca.explainers.pair_classifier import NormalisedDescriptors
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections
+from gpca.steps import checked_sections, require_files
 
 SECTIONS = {
     "new_concepts": ("new_concepts",),
@@ -75,11 +74,8 @@ def run(options: Namespace) -> None:
     torch.set_num_threads(options.threads)
     given = checked_sections(options.settings, SECTIONS)
     own = NewConceptSettings.from_dict(given["new_concepts"])
-    for several, single in (("out", "strategies"), ("encoders", "encoders_of")):
-        files, names = getattr(options, several), getattr(options, single)
-        if len(files) != len(names):
-            option = f"--{single.replace('_', '-')}"
-            raise InputError(f"--{several}", f"{len(files)} file(s) for {len(names)} of {option}", "give one each")
+    require_files(options, "out", len(options.strategies), "of --strategies")
+    require_files(options, "encoders", len(options.encoders_of), "of --encoders-of")
     inputs = [options.registrations, *options.encoders, options.objects, options.causes, options.descriptors]
     inputs += [options.cause_encoder, options.cause_embeddings]
     with record_provenance(options.out, inputs, options.settings, seed=options.seed):
@@ -111,8 +107,7 @@ class _Work:
         }
         self._cause_model = load_model(options.cause_encoder, self._cause_encoder, LABELS)
         causes = Causes.load(options.causes)
-        made_by = "python -m gpca train_on_causes"
-        h_S_d = load_embeddings(options.cause_embeddings, causes.registrations, {"h": ("S", "d")}, made_by)["h"]
+        h_S_d = read_embedding(options.cause_embeddings, causes.registrations, "train_on_causes")["embedding"]
         self._seen = _seen(causes, h_S_d, Descriptors.load(options.descriptors, causes.registrations))
         self._objects = ObjectClouds.load(options.objects)
 

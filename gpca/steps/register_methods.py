@@ -8,16 +8,14 @@ from pathlib import Path
 from gpca.alignment.methods.registry import require_settings
 from gpca.arguments import SEED
 from gpca.csv_file import write_csv
-from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
-from gpca.steps import per_seed
+from gpca.steps import checked_by_name, checked_sections, per_seed, require_files
 from gpca.trials.settings import PairSettings
 from gpca.trials.trial import try_methods
 
-SECTIONS = ("method_pairs", "methods")
+SECTIONS = {"method_pairs": ("method_pairs",)}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -33,19 +31,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Register by every method, seed by seed."""
-    if unknown := sorted(set(options.settings) - set(SECTIONS)):
-        raise InputError(f"setting {unknown[0]}", "unknown", f"known are {', '.join(SECTIONS)}")
-    pairs = options.settings.get("method_pairs", {})
-    check_settings(pairs, "method_pairs")
-    own = options.settings.get("methods", dict.fromkeys(options.methods))
-    check_settings(own, "methods")
-    for name in (*own, *options.methods):
-        require_settings(name, own.get(name) or {})
-    methods = {name: own.get(name) or {} for name in options.methods}
-    wanted = len(methods) * len(options.seeds)
+    given = checked_sections(options.settings, SECTIONS, by_name=("methods",))
+    settings = PairSettings(**given["method_pairs"])
+    methods = checked_by_name(given["methods"], "methods", options.methods, require_settings)
     for option in ("out", "timings"):
-        if (given := len(getattr(options, option))) != wanted:
-            raise InputError(f"--{option}", f"{given} file(s), not {wanted}", "give one per method and seed")
+        require_files(options, option, len(methods) * len(options.seeds), "pair(s) of method and seed")
     objects = ObjectClouds.load(options.objects)
     for i, (seed, path) in enumerate(per_seed(options, "registrations")):
         of_seed = slice(i, None, len(options.seeds))
@@ -53,7 +43,7 @@ def run(options: Namespace) -> None:
         inputs = [options.objects, path]
         with record_provenance([*outputs[0], *outputs[1]], inputs, options.settings, seed=seed):
             registrations = Registrations.load(path)
-            trials = try_methods(registrations, objects, options.source, seed, methods, PairSettings(**pairs))
+            trials = try_methods(registrations, objects, options.source, seed, methods, settings)
             for rows, out, timings in zip(trials.values(), *outputs, strict=True):
                 write_csv(out, rows.drop(columns="seconds"))
                 write_csv(timings, rows[["sample", "start", "seconds"]])

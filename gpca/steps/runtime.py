@@ -14,7 +14,7 @@ from gpca.arguments import SEED
 from gpca.csv_file import write_csv
 from gpca.model.file import Model
 from gpca.model.runtime import measure
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
@@ -40,8 +40,8 @@ def run(options: Namespace) -> None:
     with record_provenance([options.out], inputs, options.settings, seed=options.seed):
         model = Model.load(options.model)
         registrations = Registrations.load(options.registrations)
-        h_S_d = load_embeddings(options.embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
+        embedded = replace(registrations, attached=read_embedding(options.embeddings, registrations))
         settings = ActiveLearningSettings.from_dict(learning)
-        task = make_task(replace(registrations, attached={"embedding": h_S_d}), "overlap", settings, *axes)
+        task = make_task(embedded, "overlap", settings, *axes)
         repeats = runtime.get("repeats", 100)
         write_csv(options.out, measure(model, registrations, task, settings, repeats, options.threads, *axes))

@@ -12,7 +12,7 @@ from gpca.arguments import SEED
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import load_model
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.shift.samples import make_sets
 from gpca.shift.settings import ShiftSettings
@@ -48,8 +48,7 @@ def run(options: Namespace) -> None:
         inputs = [path for path in (options.objects, own, other, embeddings, weights) if path]
         with record_provenance([out], inputs, options.settings, seed=seed):
             registrations = Registrations.load(own)
-            h_S_d = load_embeddings(embeddings, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"]
-            registrations = replace(registrations, attached={"embedding": h_S_d})
+            registrations = replace(registrations, attached=read_embedding(embeddings, registrations))
             others = Registrations.load(other) if other else None
             model = load_model(weights, encoder_settings)
             sets = make_sets(objects, registrations, others, model, encoder_settings, options.source, seed, settings)

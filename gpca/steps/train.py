@@ -11,14 +11,17 @@ from pathlib import Path
 import pandas as pd
 import torch
 
+from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
-from gpca.encoders.settings import encoder_settings
+from gpca.csv_file import write_csv
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import write_tensors
 from gpca.encoders.training import load_model, train_encoder
-from gpca.files import whole_file
 from gpca.frames.sample_file import read_instances_of
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
+from gpca.steps import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -35,7 +38,8 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Train, keeping a checkpoint beside the weights until they are written."""
     torch.set_num_threads(options.threads)
-    settings, icp = encoder_settings(options.settings)
+    given, of_icp = checked_with_icp(options.settings, "encoders", "*")
+    settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
     registrations = joined([Registrations.load(path) for path in options.registrations])
     instance_S = read_instances_of(options.poses, registrations) if options.poses else None
     start = load_model(options.start, settings).state_dict() if options.start else None
@@ -47,9 +51,6 @@ def run(options: Namespace) -> None:
         model, curve = train_encoder(
             seen, options.source, options.seed, settings, checkpoint, start=start, group_S=instance_S
         )
-        # Where torch.save gets a path, it writes the path's name into the file; here that is the temporary one.
-        with whole_file(options.out) as partial, partial.open("wb") as file:
-            torch.save(model.state_dict(), file)
-        with whole_file(options.curve) as partial:
-            pd.DataFrame(curve).to_csv(partial, index=False, float_format="%.6g", lineterminator="\n")
+        write_tensors(options.out, model.state_dict())
+        write_csv(options.curve, pd.DataFrame(curve), form="%.6g")
         checkpoint.unlink(missing_ok=True)

@@ -14,8 +14,8 @@ from gpca.arrays import save_arrays
 from gpca.controls.encoding import encode, nothing
 from gpca.controls.settings import RETRAINED, TRAININGS, ControlSettings
 from gpca.controls.variants import left_out
+from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
-from gpca.files import whole_file
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
 from gpca.steps import checked_sections
@@ -49,7 +49,5 @@ def run(options: Namespace) -> None:
             axes = (options.source, options.seed, settings, encoder, checkpoint)
             arrays, curve = encode(options.control, registrations, *axes)
         save_arrays(options.out, arrays)
-        with whole_file(options.curve) as partial:
-            frame = pd.DataFrame(curve, columns=list(CURVE))
-            frame.to_csv(partial, index=False, float_format="%.6g", lineterminator="\n")
+        write_csv(options.curve, pd.DataFrame(curve, columns=list(CURVE)), form="%.6g")
         checkpoint.unlink(missing_ok=True)

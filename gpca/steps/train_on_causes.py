@@ -14,9 +14,10 @@ from gpca.arrays import save_arrays
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, with_label
+from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import write_tensors
 from gpca.encoders.training import embed, train_encoder
-from gpca.files import whole_file
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
@@ -50,10 +51,8 @@ def run(options: Namespace) -> None:
         started = perf_counter()
         h_S_d, logits_S_C = embed(model, registrations, *axes, settings)
         seconds = (perf_counter() - started) / len(h_S_d)
-        with whole_file(options.weights) as partial, partial.open("wb") as file:
-            torch.save(model.state_dict(), file)
-        with whole_file(options.curve) as partial:
-            pd.DataFrame(curve).to_csv(partial, index=False, float_format="%.6g", lineterminator="\n")
+        write_tensors(options.weights, model.state_dict())
+        write_csv(options.curve, pd.DataFrame(curve), form="%.6g")
         arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
         save_arrays(options.out, arrays)
         write_timings(options.timings, registrations, seconds_S + seconds, icp_seconds_S)

@@ -9,8 +9,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
-from gpca.settings import check_settings
-from gpca.steps import per_seed
+from gpca.steps import checked_with_icp, per_seed
 from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.evaluation import design_rows, evaluate_design
 from gpca.uncertainty.outcomes import write_seconds
@@ -30,10 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> None:
     """Run the design's conditions for the registrations that it covers, seed by seed."""
-    given = dict(options.settings)
-    icp = given.pop("icp", {})
-    check_settings(given, "uncertainty", "*")
-    check_settings(icp, "registrations", "icp")
+    given, icp = checked_with_icp(options.settings, "uncertainty", "*")
     samples = given.pop("samples", None)
     settings = UncertaintySettings(**given, icp=ICPSettings(**icp))
     for seed, registrations_path, out, table, timings in per_seed(options, "registrations", "out", "tables", "timings"):

@@ -104,7 +104,7 @@ def test_an_explainer_that_learns_is_untaught_by_an_estimator_that_failed_in_tra
     registrar = Registrar(registrations, "tiny", 100, UNCERTAINTY)
     asked = {next(registrar.under(row, OBSERVED)).pair.seed for row in registrations.rows("test")[:3]}
     entries = {"m": {"late": EstimatorEntry("Late", of_test_pairs)}}
-    monkeypatch.setattr(estimator_registry, "_by_module", lambda: entries)
+    monkeypatch.setattr(estimator_registry.REGISTRY, "by_module", lambda: entries)
     rows = exchange(estimators=("late",)).run(registrations, judges).set_index("explainer")
     assert set(rows.loc["residuals_logistic", "failure"]) == {UNTAUGHT}
     assert rows.loc["residuals_logistic", "abstained"].all()
@@ -159,7 +159,7 @@ def test_each_method_is_learnt_from_and_asked_about_and_a_failed_registration_co
         raise FailedRegistration("no match")
 
     entries = {"point_to_point": registry.method_entry("point_to_point"), "blind": MethodEntry("Blind", fails)}
-    monkeypatch.setattr(registry, "_by_module", lambda: {"m": entries})
+    monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": entries})
     rows = exchange(methods=tuple(entries), rivals={"by_place": Rival(ByPlace, "embeddings")}).run(
         registrations, judges
     )

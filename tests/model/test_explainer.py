@@ -1,37 +1,15 @@
-import json
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gpca import CanonicalFrame, Explainer
+from gpca import CanonicalFrame
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.methods.interface import Pair
-from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
 from gpca.code_files import ROOT
 from gpca.errors import InputError
-from gpca.model.explanation import WORDS
-from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
-from gpca.uncertainty.settings import UncertaintySettings
-
-
-@pytest.fixture(scope="module")
-def explainer(model):
-    return Explainer(model, device="cpu")
-
-
-@pytest.fixture(scope="module")
-def pair(registrations):
-    """Source before ICP and target of a pose sample, in metres, the target's centre far from the origin."""
-    row = next(i for i in registrations.rows("test") if registrations.concept[i] == "pose")
-    T_source_target = inverse(registrations.T_target_source("icp", row))
-    scale = registrations.diameter_m[row]
-    source = transform(T_source_target, registrations.cloud(row).astype(float)) * scale
-    return source, registrations.target(row).astype(float) * scale
 
 
 def scores(explanation):
@@ -112,128 +90,6 @@ def test_more_points_than_in_the_training_are_left_out_and_said_so(explainer, pa
     assert explanation.scores == again.scores
 
 
-@pytest.mark.parametrize("method", ["point_to_plane", "generalized"])
-def test_other_kinds_of_icp_estimate_the_normals(model, pair, method):
-    source, target = pair
-    explanation = Explainer(replace(model, icp=ICPSettings(method=method)), device="cpu").explain(source, target)
-    assert explanation.fitness > 0
-
-
-def test_a_method_finds_the_pose_and_the_scores_are_those_at_it(explainer, model, pair):
-    source, target = pair
-    frame = CanonicalFrame.of(target)
-    explanation = explainer.explain(source, target, method="gicp")
-    own = Pair(frame.coordinates(source), frame.coordinates(target)).with_normals()
-    expected = make_method("gicp")(own).T_target_source
-    np.testing.assert_allclose(explanation.T_target_source, frame.pose_outside(expected), atol=1e-9)
-    np.testing.assert_allclose(
-        scores(explanation), model.gpc.attribute(explainer.embed(transform(expected, own.source)))[0][0], atol=1e-6
-    )
-    assert explanation.method == "gicp"
-    assert explainer.explain(source, target).method == "point_to_point"
-
-
-def test_a_global_method_needs_no_initial_pose_and_gives_the_same_numbers_again(explainer, pair):
-    source, target = pair
-    first, second = (explainer.explain(source, target, method="fpfh_ransac") for _ in range(2))
-    assert np.array_equal(first.T_target_source, second.T_target_source)
-    assert first.scores == second.scores
-
-
-def test_a_failed_registration_is_noted(explainer, pair):
-    source, target = pair
-    lost = explainer.explain(source + 5, target, method="point_to_plane")
-    assert lost.notes[0].startswith("point_to_plane failed: no source point has a target point within 0.1 diameters")
-    assert any("so the scores mean nothing" in warning for warning in lost.warnings)
-    assert lost.fitness == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"method": "icp"}, "registration method 'icp': unknown"),
-        ({"method": ""}, "registration method '': unknown"),
-        ({"uncertainty": UncertaintySettings(), "estimator": "gauss"}, "estimator 'gauss': unknown"),
-        ({"uncertainty": UncertaintySettings(), "estimator": "cello"}, "'cello': learns from registrations"),
-    ],
-)
-def test_a_method_that_cannot_be_asked_is_refused(explainer, pair, arguments, message):
-    with pytest.raises(InputError, match=message):
-        explainer.explain(*pair, **arguments)
-
-
-def test_the_spread_of_the_pose_is_measured_where_it_is_asked_for(explainer, pair):
-    source, target = pair
-    explanation = explainer.explain(1e3 * source, 1e3 * target, unit="mm", uncertainty=UncertaintySettings(starts=13))
-    assert explainer.explain(source, target).spread is None
-    assert explanation.spread.covariance_6_6.shape == (6, 6)
-    assert 0 <= explanation.spread.rotation_deg < 60
-    assert 0 <= explanation.spread.translation < 100
-    assert "uncertainty" in explanation.seconds
-
-
-def test_an_estimator_says_how_uncertain_the_pose_of_a_method_is(explainer, pair):
-    asked = {"uncertainty": UncertaintySettings(starts=13, icp_points=64), "method": "gicp", "estimator": "brossard"}
-    explanation = explainer.explain(*pair, **asked)
-    spread = explanation.spread
-    assert np.linalg.eigvalsh(spread.covariance_6_6).min() > 0
-    assert spread.translation == pytest.approx(spread.diameter * np.sqrt(np.trace(spread.covariance_6_6[3:, 3:])))
-    assert "(root mean square by brossard)" in explanation.text()
-    assert explanation.as_dict()["spread"]["estimator"] == "brossard"
-    assert explanation.as_dict()["spread"]["starts"] is None
-
-
-def test_an_estimator_that_cannot_tell_leaves_a_note(explainer, pair):
-    asked = {"uncertainty": UncertaintySettings(icp_points=64), "estimator": "bonnabel"}
-    explanation = explainer.explain(*pair, **asked)
-    assert explanation.spread is None
-    assert [note for note in explanation.notes if note.startswith("bonnabel gives no covariance: the Hessian is no")]
-
-
-def test_an_explanation_is_json_and_text(explainer, pair):
-    explanation = explainer.explain(*pair, uncertainty=UncertaintySettings(starts=13))
-    plain = json.loads(json.dumps(explanation.as_dict()))
-    assert plain["scores"] == explanation.scores
-    assert np.array(plain["T_target_source"]).shape == (4, 4)
-    assert plain["spread"]["starts"] == 13
-    text = explanation.text()
-    for word in (explanation.diagnosis.state, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
-        assert word in text
-    assert plain["diagnosis"]["state"] == explanation.diagnosis.state
-    stages = ["preparation", "icp", "diagnosis", "embedding", "attribution", "familiarity", "uncertainty"]
-    assert list(plain["seconds"]) == [*stages, "total"]
-    assert plain["seconds"]["total"] >= sum(plain["seconds"][stage] for stage in stages)
-
-
-def test_the_inverse_of_the_initial_pose_is_found_out(explainer, pair):
-    source, target = pair
-    T_source_seen = exp(np.array([[1.0, -2.0, 0.5, 0.03, 0.04, -0.1]]))[0]
-    seen = transform(inverse(T_source_seen), source)
-    doubt = "the inverse of the initial pose fits far better: is it T_source_target?"
-    assert doubt in explainer.explain(seen, target, inverse(T_source_seen)).warnings
-    assert doubt not in explainer.explain(seen, target, T_source_seen).warnings
-
-
-def test_what_is_unlike_the_training_is_said_in_text_and_in_json(model, pair):
-    source, target = pair
-    said = Explainer(model, device="cpu").explain(3 * source, target)
-    [line] = [line for line in said.warnings if "are both in the same unit and scale?" in line]
-    assert f"warning   {line}" in said.text()
-    assert said.as_dict()["warnings"] == list(said.warnings)
-    older = Explainer(replace(model, familiar=None), device="cpu").explain(3 * source, target)
-    assert line not in older.warnings
-
-
-def test_a_pair_far_from_all_that_the_diagnosis_learnt_is_said_to_be(explainer, pair, monkeypatch):
-    from gpca.explainers.pair_classifier import PairClassifier
-
-    for unlike, words in ((1.7, ["1.7"]), (0.9, [])):
-        monkeypatch.setattr(PairClassifier, "unlikeness", lambda self, inputs, unlike=unlike: np.array([unlike]))
-        said = explainer.explain(*pair)
-        assert [line.split()[3] for line in said.warnings if "that the diagnosis was learnt from" in line] == words
-        assert said.diagnosis.unlikeness == unlike
-
-
 def test_many_are_explained_as_one_by_one_and_a_fault_names_its_pair(explainer, pair):
     source, target = pair
     T_init = exp(np.array([[0.1, 0, 0, 0, 0, 0]]))[0]
@@ -246,47 +102,6 @@ def test_many_are_explained_as_one_by_one_and_a_fault_names_its_pair(explainer, 
         np.testing.assert_array_equal(many.T_target_source, one.T_target_source)
     with pytest.raises(InputError, match="pair 1: source: holds 10 points"):
         list(explainer.explain_many([(source, target), (source[:10], target)], diagnose=False))
-
-
-def with_threshold(model, threshold, policy=None):
-    return Explainer(replace(model, diagnoser=replace(model.diagnoser, threshold=threshold)), policy, device="cpu")
-
-
-def test_nothing_is_done_about_what_is_fine(model, pair):
-    said = with_threshold(model, 2.0).explain(*pair)
-    assert (said.diagnosis.state, said.diagnosis.named) == ("nominal", ())
-    assert (said.action, said.reason) == (NOTHING, "nothing is wrong")
-    assert "state     nominal: nothing is wrong" in said.text()
-    assert "action    none (nothing is wrong)" in said.text()
-
-
-def test_what_failed_is_treated_by_its_causes(model, pair):
-    said = with_threshold(model, 0.0).explain(*pair)
-    found = said.diagnosis
-    assert found.state == "failed"
-    decision = model.policy.decide(np.array(list(found.causes.values())), found.bald)
-    assert (said.action, said.reason) == (decision.action, decision.reason)
-    assert f"state     failed: {' and '.join(found.named)}" in said.text()
-    in_mm = with_threshold(model, 0.0).explain(*(1e3 * cloud for cloud in pair), unit="mm")
-    assert in_mm.diagnosis.expected_error == pytest.approx(1e3 * found.expected_error, rel=0.1)
-
-
-def test_gpca_alone_decides_where_nothing_is_diagnosed(explainer, model, pair):
-    said = explainer.explain(*pair, diagnose=False)
-    assert said.diagnosis is None
-    assert "state" not in said.text()
-    assert said.as_dict()["diagnosis"] is None
-    decision = model.policy.decide(scores(said), said.bald)
-    assert (said.action, said.reason) == (decision.action, decision.reason)
-    assert said.action == model.policy.treatments[said.concept]
-    assert f"{WORDS[said.action]} ({said.reason})" in said.text()
-
-
-@pytest.mark.parametrize("thresholds", [Thresholds(uncertain=0.0), Thresholds(dominant=0.999)])
-def test_a_policy_of_ones_own_queues_what_it_finds_uncertain(model, pair, thresholds):
-    said = with_threshold(model, 0.0, RecoveryPolicy(thresholds)).explain(*pair)
-    assert said.action == QUEUE
-    assert WORDS[QUEUE] in said.text()
 
 
 def changed(**changes):

@@ -3,6 +3,7 @@ import json
 
 import pytest
 
+from gpca.registry import load
 from gpca.reporting import registry
 from gpca.reporting.page.page import rendered_caption
 from gpca.reporting.registry import (
@@ -10,7 +11,6 @@ from gpca.reporting.registry import (
     Result,
     build,
     by_section,
-    load,
     registered,
     results_of,
     targets,

@@ -25,8 +25,12 @@ FAULTS = [
     (untouched, pairs(methods={"icp": 3}), r"registration method 'icp': unknown"),
     (untouched, pairs(methods={"point_to_point": 0}), r"setting methods.point_to_point: 0 is less than the minimum"),
     (untouched, {"--estimators": ["gauss"]}, r"estimator 'gauss': unknown"),
-    (untouched, {"--out": ["a.csv"]}, r"--out: 1 file\(s\), not 3; give one for the reference and each estimator"),
-    (untouched, {"--seeds": [0, 1]}, r"--out: 3 file\(s\), not 6"),
+    (
+        untouched,
+        {"--out": ["a.csv"]},
+        r"--out: 1 file\(s\) for 3 pair\(s\) of reference or estimator and seed",
+    ),
+    (untouched, {"--seeds": [0, 1]}, r"--out: 3 file\(s\) for 6 pair"),
     (untouched, {"--samples": ["causes.npz"]}, r"causes.npz"),
 ]
 

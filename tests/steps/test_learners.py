@@ -16,7 +16,7 @@ FAULTS = [
     (untouched, settings("learners", gpca={"iteration": 5}), r"explainer 'gpca': .*iteration|setting iteration"),
     (untouched, {"--learners": ["gpca", "learner_oracle"]}, r"explainer 'learner_oracle': unknown"),
     (untouched, {"--learners": ["gpca", "residuals_forest"]}, r"'residuals_forest': does not read embeddings"),
-    (untouched, {"--learners": ["gpca"]}, r"--out: 2 file\(s\), not 1; give one per learner and seed"),
+    (untouched, {"--learners": ["gpca"]}, r"--out: 2 file\(s\) for 1 pair\(s\) of learner and seed; give one for each"),
     (untouched, {"--seeds": [0, 1]}, r"--sets: 1 file\(s\) for 2 seed\(s\)"),
 ]
 

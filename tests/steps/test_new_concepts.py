@@ -22,8 +22,8 @@ FAULTS = [
     (untouched, changed("new_concepts", errors=[1]), r"setting errors.0: 1 is greater than or equal to the maximum"),
     (untouched, changed("new_concepts", erring=["other_samples"]), r"'other_samples' is none of the embeddings; cho"),
     (untouched, changed("active_learning", initial=18), r"leaves no pool of 18 training samples; lower active_lear"),
-    (untouched, {"--encoders": None}, r"--encoders: 0 file\(s\) for 1 of --encoders-of; give one each"),
-    (untouched, {"--strategies": ["random"]}, r"--out: 2 file\(s\) for 1 of --strategies; give one each"),
+    (untouched, {"--encoders": None}, r"--encoders: 0 file\(s\) for 1 of --encoders-of; give one for each"),
+    (untouched, {"--strategies": ["random"]}, r"--out: 2 file\(s\) for 1 of --strategies; give one for each"),
 ]
 
 

@@ -33,8 +33,8 @@ FAULTS = [
     (untouched, pairs(global_start="teaser"), r"global_start: 'teaser' is not among the methods"),
     (untouched, pairs(global_start="point_to_point"), r"'point_to_point': needs an initial pose itself"),
     (untouched, {"--methods": ["fgr", "icp"]}, r"registration method 'icp': unknown"),
-    (untouched, {"--out": ["a.csv"]}, r"--out: 1 file\(s\), not 2; give one per method and seed"),
-    (untouched, {"--seeds": [0, 1]}, r"--out: 2 file\(s\), not 4"),
+    (untouched, {"--out": ["a.csv"]}, r"--out: 1 file\(s\) for 2 pair\(s\) of method and seed; give one for each"),
+    (untouched, {"--seeds": [0, 1]}, r"--out: 2 file\(s\) for 4 pair"),
     (untouched, {"--out": ["a.csv", "registrations.npz"]}, r"registrations.npz"),
 ]
 

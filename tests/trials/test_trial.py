@@ -55,7 +55,7 @@ def test_a_success_is_near_the_truth_and_says_so(rows):
 
 def test_the_true_pose_is_the_initial_one_but_for_pose_errors(registrations, objects, monkeypatch):
     still = MethodEntry("Still", lambda pair: Outcome.at(pair, pair.T_target_source_init, 0.1))
-    monkeypatch.setattr(registry, "_by_module", lambda: {"m": {"still": still, "blind": BLIND}})
+    monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": {"still": still, "blind": BLIND}})
     rows = tried(registrations, objects, {"still": {}, "blind": {}}, global_start="blind")["still"]
     first = rows[rows["start"] == "initial"]
     off = first["concept"] == "pose"
@@ -73,7 +73,7 @@ BLIND = MethodEntry("Blind", no_match, is_global=True)
 
 def test_what_starts_at_a_failure_fails_with_its_reason(registrations, objects, monkeypatch):
     local = registry.method_entry("point_to_point")
-    monkeypatch.setattr(registry, "_by_module", lambda: {"m": {"blind": BLIND, "point_to_point": local}})
+    monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": {"blind": BLIND, "point_to_point": local}})
     rows = tried(registrations, objects, {"point_to_point": {}, "blind": {}}, global_start="blind")
     assert set(rows["blind"]["failure"]) == {"no match"}
     assert not rows["blind"]["success"].any()

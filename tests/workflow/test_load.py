@@ -3,7 +3,7 @@ import re
 
 import pytest
 
-from gpca.reporting.registry import load
+from gpca.registry import load
 
 from .conftest import ROOT
 

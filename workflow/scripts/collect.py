@@ -1,7 +1,7 @@
 """Files of all sources, methods and seeds -> one tidy CSV, by the collector that the rule names."""
 
 from gpca.attribution.metrics import write_metrics
-from gpca.reporting.registry import load
+from gpca.registry import load
 from gpca.reporting.script import data_of, job
 
 with job(snakemake):

@@ -9,6 +9,7 @@ from gpca.comparison.readings import judge_readings, with_readings
 from gpca.comparison.reasons import read_reasons
 from gpca.comparison.values import measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
+from gpca.csv_file import write_csv
 from gpca.files import whole_file
 from gpca.reporting.script import job
 from gpca.reporting.tables.comparison import comparison_markdown
@@ -32,7 +33,6 @@ with job(snakemake):
     claims = judge(read_claims(), results, params.objects, given.predictions)
     out = snakemake.output
     for frame, path in ((comparison, out.csv), (claims, out.claims), (judged, out.readings)):
-        with whole_file(path) as partial:
-            frame.to_csv(partial, index=False, lineterminator="\n")
+        write_csv(path, frame, form=None)
     with whole_file(snakemake.output.md) as partial:
         partial.write_text(comparison_markdown(comparison, tolerances), encoding="utf-8")

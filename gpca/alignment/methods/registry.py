@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable, Iterable, Mapping
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Literal, get_args, get_origin, get_type_hints
 
@@ -14,26 +12,11 @@ import gpca.alignment.methods as folder
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.environment import require_open3d
 from gpca.errors import InputError
+from gpca.registry import Registry
 from gpca.settings import require_arguments
 
-
-def methods() -> dict[str, MethodEntry]:
-    """Return all methods by name, those whose package is missing too."""
-    return {name: entry for entries in _by_module().values() for name, entry in entries.items()}
-
-
-def method_entry(name: str) -> MethodEntry:
-    """Return the method of that name; an unknown one raises an InputError that lists the known."""
-    found = methods()
-    if name not in found:
-        raise InputError(f"registration method '{name}'", "unknown", f"known are {', '.join(found)}")
-    return found[name]
-
-
-def method_module(name: str) -> str:
-    """Return the module that lists the method."""
-    method_entry(name)
-    return next(module for module, entries in _by_module().items() if name in entries)
+REGISTRY: Registry[MethodEntry] = Registry("registration method", folder, "METHODS")  # those without their package too
+methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
 def left_out(names: Iterable[str]) -> dict[str, str]:
@@ -102,8 +85,3 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Call
         return outcome
 
     return register
-
-
-def _by_module() -> dict[str, dict[str, MethodEntry]]:
-    names = sorted(f"{folder.__name__}.{module.name}" for module in pkgutil.iter_modules(folder.__path__))
-    return {name: getattr(import_module(name), "METHODS", {}) for name in names}

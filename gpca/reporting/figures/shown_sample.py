@@ -15,7 +15,7 @@ from gpca.causes.settings import Limits
 from gpca.causes.truth import FAILED
 from gpca.csv_file import numbers
 from gpca.errors import InputError
-from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.concepts import severity_text
@@ -60,7 +60,7 @@ class Stages:
             InputError: an unusable file, or files of different samples; predictions without variances or BALD.
         """
         registrations = Registrations.load(registrations_npz)
-        arrays = load_embeddings(embeddings_npz, registrations, {"h": ("S", "d")}, "python -m gpca embed")
+        h_S_d = read_embedding(embeddings_npz, registrations)["embedding"]
         predictions = read_predictions(predictions_csv)
         named = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
         if named != list(zip(predictions["split"], predictions["sample"], strict=True)):
@@ -72,7 +72,7 @@ class Stages:
                 raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
             predictions[column] = numbers(predictions_csv, predictions, column)
         u_S, _ = observed_uncertainties(uncertainty_csv, registrations)
-        return cls(registrations, arrays["h"], predictions, u_S, Limits(**limits))
+        return cls(registrations, h_S_d, predictions, u_S, Limits(**limits))
 
     def choose(self, concept: str, path: str | Path) -> int:
         """Return the row that is shown, a test sample of the concept named right after a failed registration.

@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
 
 import numpy as np
 
 import gpca.uncertainty.estimators as folder
 from gpca.errors import InputError
+from gpca.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import Estimate, EstimatorEntry, Example, FailedEstimate, RegisteredPair
 
-
-def estimators() -> dict[str, EstimatorEntry]:
-    """Return all estimators by name."""
-    return {name: entry for entries in _by_module().values() for name, entry in entries.items()}
-
-
-def estimator_entry(name: str) -> EstimatorEntry:
-    """Return the estimator of that name; an unknown one raises an InputError that lists the known."""
-    found = estimators()
-    if name not in found:
-        raise InputError(f"estimator '{name}'", "unknown", f"known are {', '.join(found)}")
-    return found[name]
-
-
-def estimator_module(name: str) -> str:
-    """Return the module that lists the estimator."""
-    estimator_entry(name)
-    return next(module for module, entries in _by_module().items() if name in entries)
+REGISTRY: Registry[EstimatorEntry] = Registry("estimator", folder, "ESTIMATORS")
+estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
 def require_estimator_settings(name: str, settings: Mapping[str, object]) -> None:
@@ -84,8 +67,3 @@ def make_estimator(
         return Estimate((covariance_6_6 + covariance_6_6.T) / 2)
 
     return told
-
-
-def _by_module() -> dict[str, dict[str, EstimatorEntry]]:
-    names = sorted(f"{folder.__name__}.{module.name}" for module in pkgutil.iter_modules(folder.__path__))
-    return {name: getattr(import_module(name), "ESTIMATORS", {}) for name in names}

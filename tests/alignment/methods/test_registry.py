@@ -147,7 +147,7 @@ def test_a_pose_that_is_not_finite_is_a_failure(objects, monkeypatch):
 
     pair, T_true = small_motion(objects)
     broken = MethodEntry("Broken", lambda pair: replace(Outcome.at(pair, T_true, 0.1), T_target_source=T_true * np.nan))
-    monkeypatch.setattr(registry, "_by_module", lambda: {"broken": {"broken": broken}})
+    monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"broken": {"broken": broken}})
     outcome = make_method("broken")(pair)
     assert outcome.failure == "the pose is not finite"
     assert np.array_equal(outcome.T_target_source, np.eye(4))

@@ -1,141 +1,17 @@
-"""The page of a small folder of results: its HTML by a parser, and what a real browser makes of it."""
+"""The page of a small folder of results: its HTML by a parser, and what is refused."""
 
 import json
 import re
-import shutil
-import subprocess
-from html.parser import HTMLParser
 
-import numpy as np
 import pytest
 
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.processor import describe
-from gpca.provenance import record_provenance
-from gpca.reporting.figures.style import save_figure, use_style
-from gpca.reporting.page.findings import Titles
-from gpca.reporting.page.page import Run, Shown, read_provenance, write_page
-from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.page.page import read_provenance, write_page
 
+from .small_run import FIGURES, TABLES, Page, results, run_of
 from .test_comparison import HEAD, LINES
-from .test_findings import write_metrics
-
-TABLES = ["table2_per_concept", "table1_single_baselines", "table4_mine"]
-FIGURES = ["objects_bricks", "reliability"]
-SECTIONS = {"IV-A Datasets": FIGURES[:1], "IV-B Accuracy": TABLES, "IV-D Ablations": FIGURES[1:]}
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: install it to test the page in a browser")
-
-
-class Page(HTMLParser):
-    """What a page refers to, by the kinds that the tests ask for."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.text, self.ids, self.links, self.sources, self.stack = text, [], [], [], []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        attributes = dict(attributes)
-        self.ids += [attributes["id"]] if "id" in attributes else []
-        self.links += [attributes["href"]] if attributes.get("href") else []
-        self.sources += [attributes["src"]] if "src" in attributes else []
-        if tag not in ("meta", "link", "img", "br"):
-            self.stack.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.stack.pop() == tag
-
-
-@pytest.fixture(scope="module")
-def folder(registrations, predicted, tmp_path_factory):
-    """A results folder with all that the page needs."""
-    folder = tmp_path_factory.mktemp("results") / "tiny"
-    for name in TABLES:
-        table = Table(
-            name=name,
-            caption="Accuracy (%) of <GP-CA> & co., by `gpca`",
-            row_heads={"source": "Dataset"},
-            rows=((("bricks", "Bricks"),), (("cones", "Cones"),)),
-            column_head="explainer",
-            columns={"gpca": Column("GP-CA"), "shap": Column("SHAP")},
-            cells={(0, "gpca"): Cell(97.7, 0.4, 3, 270), (0, "shap"): Cell(33.3, 2.0, 3, 270)},
-            compared=([(0, "gpca"), (0, "shap")],),
-            footnotes=("A footnote.",),
-        )
-        files = [folder / f"tables/{name}.{suffix}" for suffix in ("csv", "md", "tex")]
-        with record_provenance(files, [], {}):
-            table.write(*files)
-    use_style()
-    import matplotlib.pyplot as plt
-
-    for name in FIGURES:
-        figure, panel = plt.subplots()
-        panel.plot(np.arange(5))
-        save_figure(figure, folder / f"figures/{name}.pdf", folder / f"figures/{name}.png")
-    (folder / "comparison.csv").write_text(HEAD + "".join(LINES))
-    write_metrics(folder / "metrics.csv", [("bricks", "gpca", "accuracy", 0.9), ("cones", "gpca", "accuracy", 0.75)])
-    predicted(registrations, folder)
-    write_page(folder, run_of(folder))
-    return folder
-
-
-def results(captions=()):
-    """All tables and figures by section, with a caption of its own where one is given."""
-    return [
-        Shown(
-            name=name,
-            kind="tables" if name in TABLES else "figures",
-            section=section,
-            title=f"Title of {name}",
-            caption=dict(captions).get(name, f"What ``{name}`` shows."),
-        )
-        for section, names in SECTIONS.items()
-        for name in names
-    ]
-
-
-def run_of(folder, **changes):
-    entries = {
-        "name": "tiny",
-        "seeds": [0, 7],
-        "sources": {
-            "bricks": {"title": "Bricks <b>", "stand_in": True},
-            "cones": {"title": "Cones", "stand_in": False},
-        },
-        "results": results(),
-        "samples": {
-            "bricks": {
-                "registrations": folder / "registrations/bricks/seed0.npz",
-                "predictions": folder / "predictions/bricks/gpca/seed0.csv",
-            }
-        },
-        "titles": Titles({"gpca": {"title": "GP-CA", "oracle": False}}, {}, 3),
-        "reference": None,
-        "config": {
-            "run": "tiny",
-            "note": "</script><script>alert(1)</script>",
-            "causes": {"limits": {"nominal": 0.02, "failed": 0.03}},
-        },
-        "command": "snakemake -j2 results/tiny/index.html",
-    }
-    return Run(**entries | changes)
-
-
-@pytest.fixture(scope="module")
-def page(folder):
-    return Page((folder / "index.html").read_text())
-
-
-@pytest.fixture
-def copied(folder, tmp_path):
-    """A copy of the folder, to be damaged, and its run."""
-    shutil.copytree(folder.parent, tmp_path / "results")
-    copy = tmp_path / "results/tiny"
-    (copy / "index.html").unlink()
-    return copy, run_of(copy)
-
 
 # --- the HTML ---
 
@@ -299,69 +175,3 @@ def test_a_fault_in_a_caption_is_named(copied, caption):
     with pytest.raises(InputError, match="caption of reliability: is no reStructuredText"):
         write_page(folder, run_of(folder, results=results({"reliability": caption})))
     assert not (folder / "index.html").exists()
-
-
-# --- in a browser ---
-
-# Notes on speed that a software renderer gives.
-SPEED = ("Canvas2D: Multiple readback", "GL Driver Message")
-# What a reader does: hide a verdict, choose a table; look at the last sample in its initial pose.
-READER = """<script>
-addEventListener("load", () => {
-  document.querySelector('#verdict-filters [data-verdict="close"]').click();
-  const table = document.getElementById("table-filter");
-  table.value = "I";
-  table.dispatchEvent(new Event("change"));
-  document.querySelector('[data-pose="initial"]').click();
-  const sample = document.getElementById("sample");
-  sample.value = "5";
-  sample.dispatchEvent(new Event("change"));
-});
-</script></body>"""
-
-
-def chromium(path, profile, *options):
-    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader"]
-    command += ["--enable-unsafe-swiftshader", f"--user-data-dir={profile}", "--virtual-time-budget=10000"]
-    command += ["--hide-scrollbars", "--enable-logging=stderr", "--v=0", *options, path.as_uri()]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
-    assert [line for line in said if not any(note in line for note in SPEED)] == []
-    return done.stdout
-
-
-@in_a_browser
-def test_a_browser_draws_both_clouds_and_has_nothing_to_complain_about(folder, tmp_path):
-    from PIL import Image
-
-    chromium(folder / "index.html", tmp_path, f"--screenshot={tmp_path / 'page.png'}", "--window-size=1000,5000")
-    with Image.open(tmp_path / "page.png") as image:
-        pixels = np.asarray(image.convert("RGB")).astype(int)
-    for colour in ((213, 94, 0), (0, 114, 178)):  # of target and source
-        of_colour = (np.abs(pixels - colour).max(axis=2) < 12).sum(axis=1)
-        assert (of_colour > 0).sum() > 100  # rows of pixels: a cloud, not the key below it
-
-
-@in_a_browser
-def test_verdicts_tables_samples_and_poses_can_be_chosen(copied, tmp_path):
-    folder, run = copied
-    write_page(folder, run)
-    driven = folder / "driven.html"
-    driven.write_text((folder / "index.html").read_text().replace("</body>", READER))
-    shown = chromium(driven, tmp_path, "--dump-dom", "--window-size=400,800")
-    assert 'data-shown="5 initial"' in shown
-    assert "WebGL is not supported" not in shown
-    assert re.search(r'<div id="clouds"[^>]*>.*<canvas', shown, flags=re.DOTALL)
-    assert "1 of 4 numbers" in shown
-    assert re.findall(r'<tr data-verdict="([^"]*)" data-table="[^"]*">', shown) == ["reproduced"]
-    assert "True cause: overlap" in shown
-
-
-@in_a_browser
-def test_without_its_script_the_view_says_what_is_missing(copied, tmp_path):
-    folder, run = copied
-    write_page(folder, run)
-    alone = tmp_path / "index.html"
-    alone.write_text(re.sub(r'<script src="[^"]*" defer></script>', "", (folder / "index.html").read_text()))
-    assert "needs page/plotly.min.js beside this page" in chromium(alone, tmp_path, "--dump-dom")

@@ -1,0 +1,56 @@
+"""What is found by its name: entries that the modules of a folder list, and functions written ``module:name``."""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
+from typing import Any, Generic, TypeVar
+
+from gpca.errors import require_known
+
+Entry = TypeVar("Entry")
+
+
+class Registry(Generic[Entry]):
+    """All entries of a kind: registration methods, say. A file that is new in the folder is found at the next call.
+
+    Args:
+        kind: what an entry is, as messages call it.
+        folder: the package whose modules list them.
+        variable: of a module, its entries by name; a module without it lists none.
+        first: modules elsewhere, whose entries come before those of the folder.
+    """
+
+    def __init__(self, kind: str, folder: ModuleType, variable: str, first: Sequence[str] = ()) -> None:
+        self.kind = kind
+        self._folder = folder
+        self._variable = variable
+        self._first = first
+
+    def entries(self) -> dict[str, Entry]:
+        """Return all entries by name."""
+        return {name: entry for of_module in self.by_module().values() for name, entry in of_module.items()}
+
+    def entry(self, name: str) -> Entry:
+        """Return the entry of that name; an unknown one raises an InputError that lists the known."""
+        found = self.entries()
+        require_known(self.kind, name, found)
+        return found[name]
+
+    def module(self, name: str) -> str:
+        """Return the module that lists the entry of that name."""
+        self.entry(name)
+        return next(module for module, entries in self.by_module().items() if name in entries)
+
+    def by_module(self) -> dict[str, dict[str, Entry]]:
+        """Return the entries of each module."""
+        names = sorted(f"{self._folder.__name__}.{each.name}" for each in pkgutil.iter_modules(self._folder.__path__))
+        return {name: getattr(import_module(name), self._variable, {}) for name in (*self._first, *names)}
+
+
+def load(name: str) -> Any:
+    """Return the function or class that ``module:name`` names."""
+    module, _, member = name.partition(":")
+    return getattr(import_module(module), member)

@@ -1,0 +1,99 @@
+"""What an explanation says: as text and JSON, its warnings, and what is to be done."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca import Explainer
+from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.twist import exp
+from gpca.model.explanation import WORDS
+from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
+from gpca.uncertainty.settings import UncertaintySettings
+
+
+def test_an_explanation_is_json_and_text(explainer, pair):
+    explanation = explainer.explain(*pair, uncertainty=UncertaintySettings(starts=13))
+    plain = json.loads(json.dumps(explanation.as_dict()))
+    assert plain["scores"] == explanation.scores
+    assert np.array(plain["T_target_source"]).shape == (4, 4)
+    assert plain["spread"]["starts"] == 13
+    text = explanation.text()
+    for word in (explanation.diagnosis.state, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
+        assert word in text
+    assert plain["diagnosis"]["state"] == explanation.diagnosis.state
+    stages = ["preparation", "icp", "diagnosis", "embedding", "attribution", "familiarity", "uncertainty"]
+    assert list(plain["seconds"]) == [*stages, "total"]
+    assert plain["seconds"]["total"] >= sum(plain["seconds"][stage] for stage in stages)
+
+
+def test_the_inverse_of_the_initial_pose_is_found_out(explainer, pair):
+    source, target = pair
+    T_source_seen = exp(np.array([[1.0, -2.0, 0.5, 0.03, 0.04, -0.1]]))[0]
+    seen = transform(inverse(T_source_seen), source)
+    doubt = "the inverse of the initial pose fits far better: is it T_source_target?"
+    assert doubt in explainer.explain(seen, target, inverse(T_source_seen)).warnings
+    assert doubt not in explainer.explain(seen, target, T_source_seen).warnings
+
+
+def test_what_is_unlike_the_training_is_said_in_text_and_in_json(model, pair):
+    source, target = pair
+    said = Explainer(model, device="cpu").explain(3 * source, target)
+    [line] = [line for line in said.warnings if "are both in the same unit and scale?" in line]
+    assert f"warning   {line}" in said.text()
+    assert said.as_dict()["warnings"] == list(said.warnings)
+    older = Explainer(replace(model, familiar=None), device="cpu").explain(3 * source, target)
+    assert line not in older.warnings
+
+
+def test_a_pair_far_from_all_that_the_diagnosis_learnt_is_said_to_be(explainer, pair, monkeypatch):
+    from gpca.explainers.pair_classifier import PairClassifier
+
+    for unlike, words in ((1.7, ["1.7"]), (0.9, [])):
+        monkeypatch.setattr(PairClassifier, "unlikeness", lambda self, inputs, unlike=unlike: np.array([unlike]))
+        said = explainer.explain(*pair)
+        assert [line.split()[3] for line in said.warnings if "that the diagnosis was learnt from" in line] == words
+        assert said.diagnosis.unlikeness == unlike
+
+
+def with_threshold(model, threshold, policy=None):
+    return Explainer(replace(model, diagnoser=replace(model.diagnoser, threshold=threshold)), policy, device="cpu")
+
+
+def test_nothing_is_done_about_what_is_fine(model, pair):
+    said = with_threshold(model, 2.0).explain(*pair)
+    assert (said.diagnosis.state, said.diagnosis.named) == ("nominal", ())
+    assert (said.action, said.reason) == (NOTHING, "nothing is wrong")
+    assert "state     nominal: nothing is wrong" in said.text()
+    assert "action    none (nothing is wrong)" in said.text()
+
+
+def test_what_failed_is_treated_by_its_causes(model, pair):
+    said = with_threshold(model, 0.0).explain(*pair)
+    found = said.diagnosis
+    assert found.state == "failed"
+    decision = model.policy.decide(np.array(list(found.causes.values())), found.bald)
+    assert (said.action, said.reason) == (decision.action, decision.reason)
+    assert f"state     failed: {' and '.join(found.named)}" in said.text()
+    in_mm = with_threshold(model, 0.0).explain(*(1e3 * cloud for cloud in pair), unit="mm")
+    assert in_mm.diagnosis.expected_error == pytest.approx(1e3 * found.expected_error, rel=0.1)
+
+
+def test_gpca_alone_decides_where_nothing_is_diagnosed(explainer, model, pair):
+    said = explainer.explain(*pair, diagnose=False)
+    assert said.diagnosis is None
+    assert "state" not in said.text()
+    assert said.as_dict()["diagnosis"] is None
+    decision = model.policy.decide(np.array(list(said.scores.values())), said.bald)
+    assert (said.action, said.reason) == (decision.action, decision.reason)
+    assert said.action == model.policy.treatments[said.concept]
+    assert f"{WORDS[said.action]} ({said.reason})" in said.text()
+
+
+@pytest.mark.parametrize("thresholds", [Thresholds(uncertain=0.0), Thresholds(dominant=0.999)])
+def test_a_policy_of_ones_own_queues_what_it_finds_uncertain(model, pair, thresholds):
+    said = with_threshold(model, 0.0, RecoveryPolicy(thresholds)).explain(*pair)
+    assert said.action == QUEUE
+    assert WORDS[QUEUE] in said.text()

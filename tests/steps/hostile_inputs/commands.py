@@ -1,0 +1,21 @@
+"""The step that reads each kind of file."""
+
+COMMON = ["--source", "s"]
+COMMANDS = {
+    "objects.npz": ["registrations", *COMMON, "--seed", 0, "--objects", "objects.npz", "--out", "new.npz",
+                    "--timings", "new.csv"],
+    "registrations.npz": ["train", *COMMON, "--seed", 0, "--registrations", "registrations.npz", "--out", "new.pt",
+                          "--curve", "new.csv"],
+    "embeddings.npz": ["reduce", *COMMON, "--reduction", "none", "--seeds", 0, "--embeddings", "embeddings.npz",
+                       "--out", "new.npz"],
+    "uncertainty.npz": ["attribute", *COMMON, "--explainer", "shap_removal", "--seeds", 0, "--registrations",
+                        "registrations.npz", "--uncertainty", "uncertainty.npz", "--uncertainty-timings",
+                        "conditions.csv", "--input-timings", "seconds.csv", "--predictions", "new.csv", "--timings",
+                        "new_seconds.csv"],
+    "shifted.npz": ["learners", *COMMON, "--learners", "learner_nearest", "--seeds", 0, "--sets", "shifted.npz",
+                    "--out", "new.csv"],
+    "seconds.csv": ["attribute", *COMMON, "--explainer", "gpca", "--seeds", 0, "--registrations", "registrations.npz",
+                    "--embeddings", "embeddings.npz", "--input-timings", "seconds.csv", "--predictions", "new.csv",
+                    "--timings", "new_seconds.csv"],
+}  # fmt: skip
+COMMANDS["conditions.csv"] = COMMANDS["uncertainty.npz"]

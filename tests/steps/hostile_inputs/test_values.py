@@ -1,0 +1,113 @@
+"""Arrays of an earlier step with values that cannot be."""
+
+import numpy as np
+import pytest
+
+from ...hostile import refusal
+from .commands import COMMANDS
+
+
+def change_arrays(path, **changes):
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    for name, change in changes.items():
+        arrays[name] = change(arrays[name])
+    np.savez(path, **arrays)
+
+
+def at(*index, value):
+    def change(array):
+        array = array.astype(np.result_type(array.dtype, np.asarray(value).dtype)) if value is not None else array
+        array[index] = value
+        return array
+
+    return change
+
+
+def same(array):
+    return np.broadcast_to(array[:1], array.shape).copy()
+
+
+VALUES = {
+    # What cannot be of objects
+    ("objects.npz", "negative diameter", "diameter"): {"diameters_m": lambda d: -d},
+    ("objects.npz", "diameter of nothing", "diameter"): {"diameters_m": at(1, value=0.0)},
+    ("objects.npz", "diameter in millimetres", "diameter"): {"diameters_m": lambda d: 1e3 * d},
+    ("objects.npz", "huge diameter", "diameters_m"): {"diameters_m": lambda d: 1e300 * d},
+    ("objects.npz", "diameter of another object", "span"): {"diameters_m": at(0, value=5.0)},
+    ("objects.npz", "points in millimetres", "span"): {"points_m": lambda p: 1e3 * p},
+    ("objects.npz", "huge points", "points_m"): {"points_m": lambda p: p.astype(float) * 1e200},
+    ("objects.npz", "one huge point", "span"): {"points_m": at(7, 0, value=1e9)},
+    ("objects.npz", "all points equal", "span 0 m"): {"points_m": same},
+    ("objects.npz", "complex points", "complex"): {"points_m": lambda p: p + 1j},
+    ("objects.npz", "points of text", "type <U"): {"points_m": lambda p: p.astype(str)},
+    ("objects.npz", "points of dates", "type datetime"): {"points_m": lambda p: p.astype("datetime64[s]")},
+    ("objects.npz", "points far from the origin", "centred"): {"points_m": lambda p: p + 5},
+    ("objects.npz", "normals of no length", "normal"): {"normals": lambda n: 0 * n},
+    ("objects.npz", "long normals", "normal"): {"normals": lambda n: 2 * n},
+    ("objects.npz", "two of one name", "one name"): {"names": lambda n: n[[0, 0, 2]]},
+    ("objects.npz", "names of numbers", "names"): {"names": lambda n: np.arange(len(n))},
+    ("objects.npz", "offsets of halves", "offsets"): {"offsets": lambda o: o + 0.0},
+    ("objects.npz", "offsets that fall", "fit together"): {"offsets": lambda o: o[[0, 2, 1, 3]]},
+    ("objects.npz", "no objects", "fit together"): {
+        "names": lambda n: n[:0], "diameters_m": lambda d: d[:0], "offsets": lambda o: o[:1],
+        "points_m": lambda p: p[:0], "normals": lambda n: n[:0],
+    },
+    # of registrations
+    ("registrations.npz", "clouds in millimetres", "'points'"): {"points": lambda p: p * 1e6},
+    ("registrations.npz", "huge targets", "target_points"): {"target_points": lambda p: p.astype(float) * 1e200},
+    ("registrations.npz", "complex clouds", "complex"): {"points": lambda p: p + 1j},
+    ("registrations.npz", "negative diameters", "diameter_m"): {"diameter_m": lambda d: -d},
+    ("registrations.npz", "a fitness above 1", "fitness"): {"fitness": lambda f: f + 1.5},
+    ("registrations.npz", "a negative RMSE", "inlier_rmse"): {"inlier_rmse": lambda r: r - 9},
+    ("registrations.npz", "a mirrored pose", "T_target_source_icp"): {"T_target_source_icp": at(0, 0, value=-1.0)},
+    ("registrations.npz", "a scaled pose", "T_target_source_true"): {"T_target_source_true": lambda T: 2 * T},
+    ("registrations.npz", "a pose far away", "T_target_source_init"): {"T_target_source_init": at(3, 0, 3, value=1e9)},
+    ("registrations.npz", "a sample twice", "sample"): {"sample": lambda s: 0 * s},
+    ("registrations.npz", "a negative sample", "sample"): {"sample": at(0, value=-1)},
+    ("registrations.npz", "an object before the first", "object_index"): {"object_index": at(0, value=-1)},
+    ("registrations.npz", "a negative severity", "severity_noise"): {"severity_noise": lambda s: s - 1},
+    ("registrations.npz", "names of numbers", "concept"): {"concept": lambda c: np.arange(len(c))},
+    ("registrations.npz", "offsets of halves", "offsets"): {"offsets": lambda o: o + 0.5},
+    # of embeddings
+    ("embeddings.npz", "complex numbers", "complex"): {"h": lambda h: h + 1j},
+    ("embeddings.npz", "huge numbers", "above 1e+15"): {"h": lambda h: h * 1e200},
+    ("embeddings.npz", "infinity", "infinity"): {"h": at(3, 3, value=np.inf)},
+    ("embeddings.npz", "no samples", "no training"): {
+        "h": lambda h: h[:0], "head_logits": lambda h: h[:0], "sample": lambda s: s[:0], "split": lambda s: s[:0],
+    },
+    ("embeddings.npz", "samples of halves", "sample"): {"sample": lambda s: s + 0.5},
+    # of outcomes
+    ("uncertainty.npz", "negative variances", "covariance"): {"covariance": lambda c: -c},
+    ("uncertainty.npz", "complex uncertainty", "complex"): {"uncertainty": lambda u: u + 1j},
+    ("uncertainty.npz", "negative calls", "icp_calls"): {"icp_calls": lambda c: c - 5},
+    ("uncertainty.npz", "doubtful degeneracy", "degenerate"): {"degenerate": lambda d: d + 0.5},
+    ("uncertainty.npz", "other samples", "conditions.csv: holds other samples"): {"sample": lambda s: s + 1000},
+    ("uncertainty.npz", "other conditions", "conditions"): {
+        name: lambda a: a[:, :2] for name in ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
+    },
+    # of shifted sets
+    ("shifted.npz", "negative distances", "negative"): {"distance": lambda d: -d},
+    ("shifted.npz", "unknown sets", "unknown set"): {"set": lambda s: np.full_like(s, "x")},
+    ("shifted.npz", "no training samples", "training"): {"split": lambda s: np.full_like(s, "test")},
+    ("shifted.npz", "complex embeddings", "complex"): {"h": lambda h: h + 1j},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", VALUES, ids=lambda case: f"{case[0]}: {case[1]}")
+def test_values_that_cannot_be_are_refused(case, folder):
+    name, _, word = case
+    change_arrays(folder / name, **VALUES[case])
+    line = refusal(COMMANDS[name], folder, word)
+    assert ".npz" in line or ".csv" in line
+
+
+@pytest.mark.parametrize("explainer", ["shap_removal", "sa_prcc_additive", "residuals_logistic"])
+def test_outcomes_of_another_design_are_refused(explainer, folder):
+    names = ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
+    change_arrays(folder / "uncertainty.npz", **{name: lambda array: array[:, :2] for name in names})
+    head, *lines = (folder / "conditions.csv").read_text().splitlines()
+    kept = [line for line in lines if int(line.split(",")[2]) < 2]
+    (folder / "conditions.csv").write_text("\n".join([head, *kept, ""]))
+    command = [explainer if word == "shap_removal" else word for word in COMMANDS["uncertainty.npz"]]
+    refusal(command, folder, "uncertainty.npz", "2 conditions are not those of design")
