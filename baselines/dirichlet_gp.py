@@ -54,33 +54,31 @@ class DirichletGP:
         from sklearn.preprocessing import StandardScaler
 
         from gpca.adam import Adam
-        from gpca.classifier.covariances import squared_distances
 
         known_concepts(registrations.concept)
         h_N_d = attached(registrations, "embedding", None)
         self._scaler = StandardScaler().fit(h_N_d)
-        self._inputs_N_d = self._scaled(h_N_d)
-        squared_N_N = squared_distances(self._inputs_N_d, self._inputs_N_d)
+        self._inputs_N_d = self._scaler.transform(h_N_d)
+        squared_N_N = _squared_distances(self._inputs_N_d, self._inputs_N_d)
         targets_N = torch.tensor([CONCEPTS.index(concept) for concept in registrations.concept])
         likelihood = DirichletClassificationLikelihood(
             targets_N, alpha_epsilon=self._alpha, num_classes=len(CONCEPTS), dtype=torch.float64
         )
         values_C_N = likelihood.transformed_targets
         noise_C_N = likelihood.noise_covar.noise.detach()
-        median = float(squared_N_N.median()) ** 0.5
+        median = float(torch.from_numpy(squared_N_N).median()) ** 0.5
         self._log_lengthscale_C = torch.full((len(CONCEPTS),), np.log(median if median > 0 else 1.0)).double()
         self._log_scale_C = values_C_N.var(dim=1).log()
         self._mean_C = values_C_N.mean(dim=1)
         parameters = [self._log_lengthscale_C, self._log_scale_C, self._mean_C]
-        optimiser = Adam([each.requires_grad_() for each in parameters], self._learning_rate)
+        optimiser = Adam(parameters, self._learning_rate)
+        data = [(c, squared_N_N, values_C_N[c].numpy(), noise_C_N[c].numpy()) for c in range(len(CONCEPTS))]
         for _ in range(self._iterations):
-            cholesky_C_N_N, whitened_C_N_1 = self._factor(squared_N_N, values_C_N, noise_C_N)
-            log_determinants = cholesky_C_N_N.diagonal(dim1=1, dim2=2).log().sum()
-            optimiser.zero_grad()
-            ((0.5 * whitened_C_N_1.square().sum() + log_determinants) / len(targets_N)).backward()
+            gradient_C_3 = np.array([self._gradient(*of_concept) for of_concept in data]) / len(targets_N)
+            for parameter, gradient_C in zip(parameters, gradient_C_3.T, strict=True):
+                parameter.grad = torch.from_numpy(gradient_C.copy())
             optimiser.step()
-        with torch.no_grad():
-            self._cholesky_C_N_N, self._whitened_C_N_1 = self._factor(squared_N_N, values_C_N, noise_C_N)
+        self._factors = [self._factor(*of_concept)[1:] for of_concept in data]
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Draw from the posterior at every embedding and summarise, as GP-CA does."""
@@ -91,37 +89,60 @@ class DirichletGP:
         attribution = Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds)
         return replace(attribution, variances_N_C=variances_N_C, bald_N=bald_N)
 
-    def _factor(self, squared_N_N, values_C_N, noise_C_N):
-        """Return the Cholesky factors L of the noisy covariances and L⁻¹ of the centred targets."""
-        import torch
+    def _gradient(
+        self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray
+    ) -> tuple[float, float, float]:
+        """Return the slope of the negative log marginal likelihood in log lengthscale, log scale and mean.
 
-        K_C_N_N = self._covariance(squared_N_N) + torch.diag_embed(noise_C_N + JITTER)
-        cholesky_C_N_N = torch.linalg.cholesky(K_C_N_N)
-        centred_C_N_1 = (values_C_N - self._mean_C[:, None])[:, :, None]
-        return cholesky_C_N_N, torch.linalg.solve_triangular(cholesky_C_N_N, centred_C_N_1, upper=False)
+        By a parameter of the covariance it is Σ (K⁻¹ - ααᵀ) ∂K / 2 with α = K⁻¹ (y - m) (Rasmussen & Williams 2006,
+        Eq. 5.9): a third of the work of following it back through the Cholesky factor.
+        """
+        from scipy.linalg import solve_triangular
+        from scipy.linalg.lapack import dpotri
 
-    def _covariance(self, squared_A_B):
-        scaled_C_A_B = squared_A_B * (-0.5 * (-2 * self._log_lengthscale_C).exp())[:, None, None]
-        return self._log_scale_C.exp()[:, None, None] * scaled_C_A_B.exp()
+        K_N_N, cholesky_N_N, whitened_N = self._factor(c, squared_N_N, values_N, noise_N)
+        alpha_N = solve_triangular(cholesky_N_N, whitened_N, lower=True, trans="T")
+        lower_N_N = np.tril(dpotri(cholesky_N_N, lower=True)[0])
+        inverse_N_N = lower_N_N + np.tril(lower_N_N, -1).T
+        slope_N_N = 0.5 * (inverse_N_N - np.outer(alpha_N, alpha_N)) * K_N_N
+        by_lengthscale = (slope_N_N * squared_N_N).sum() * np.exp(-2 * self._log_lengthscale_C[c].item())
+        return by_lengthscale, slope_N_N.sum(), -alpha_N.sum()
+
+    def _factor(
+        self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the covariance, the Cholesky factor L of the noisy one, and L⁻¹ of the centred targets."""
+        from scipy.linalg import cholesky, solve_triangular
+
+        K_N_N = self._covariance(c, squared_N_N)
+        cholesky_N_N = cholesky(K_N_N + np.diag(noise_N + JITTER), lower=True)
+        return K_N_N, cholesky_N_N, solve_triangular(cholesky_N_N, values_N - self._mean_C[c].item(), lower=True)
+
+    def _covariance(self, c: int, squared_A_B: np.ndarray) -> np.ndarray:
+        inverse_square = np.exp(-2 * self._log_lengthscale_C[c].item())
+        return np.exp(self._log_scale_C[c].item()) * np.exp(squared_A_B * (-0.5 * inverse_square))
 
     def _posterior(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation (N, C) of the latents."""
-        import torch
+        from scipy.linalg import solve_triangular
 
-        from gpca.classifier.covariances import squared_distances
+        inputs_N_d = self._scaler.transform(attached(registrations, "embedding", None))
+        squared_T_N = _squared_distances(self._inputs_N_d, inputs_N_d)
+        means, deviations = [], []
+        for c, (cholesky_T_T, whitened_T) in enumerate(self._factors):
+            weights_T_N = solve_triangular(cholesky_T_T, self._covariance(c, squared_T_N), lower=True)
+            variance_N = np.exp(self._log_scale_C[c].item()) - np.square(weights_T_N).sum(axis=0)
+            means.append(self._mean_C[c].item() + (weights_T_N * whitened_T[:, None]).sum(axis=0))
+            deviations.append(np.sqrt(np.maximum(variance_N, 0)))
+        return np.column_stack(means), np.column_stack(deviations)
 
-        inputs_N_d = self._scaled(attached(registrations, "embedding", None))
-        with torch.no_grad():
-            K_C_T_N = self._covariance(squared_distances(self._inputs_N_d, inputs_N_d))
-            weights_C_T_N = torch.linalg.solve_triangular(self._cholesky_C_N_N, K_C_T_N, upper=False)
-            mean_C_N = self._mean_C[:, None] + (weights_C_T_N * self._whitened_C_N_1).sum(dim=1)
-            variance_C_N = self._log_scale_C.exp()[:, None] - weights_C_T_N.square().sum(dim=1)
-        return mean_C_N.numpy().T, variance_C_N.clamp_min(0).sqrt().numpy().T
 
-    def _scaled(self, h_N_d: np.ndarray):
-        import torch
+def _squared_distances(a_A_d: np.ndarray, b_B_d: np.ndarray) -> np.ndarray:
+    import torch
 
-        return torch.from_numpy(self._scaler.transform(h_N_d))
+    from gpca.classifier.covariances import squared_distances
+
+    return squared_distances(torch.from_numpy(a_A_d), torch.from_numpy(b_B_d)).numpy()
 
 
 EXPLAINERS = {"learner_dirichlet_gp": ExplainerEntry("Dirichlet exact GP", DirichletGP, reads="embeddings")}

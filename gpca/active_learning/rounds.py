@@ -184,9 +184,9 @@ def step_of(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -
 def accuracies(task: Task[Projection], classifier) -> tuple[float, float]:
     """Return the accuracy over all test samples and over those of the concept held out; NaN of none.
 
-    The classifier is a GPC, or what has its ``classes`` and ``attribute``.
+    The classifier is a GPC, or what has its ``classes`` and ``scores``.
     """
-    scores_N_C = classifier.attribute(task.test.h)[0]
+    scores_N_C = classifier.scores(task.test.h)
     right_N = np.array(classifier.classes)[scores_N_C.argmax(axis=1)] == task.test.concept_N
     new_N = task.test.concept_N == task.held_out
     return float(right_N.mean()), float(right_N[new_N].mean()) if new_N.any() else float("nan")

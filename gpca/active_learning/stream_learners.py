@@ -32,6 +32,9 @@ class StreamLearner(Protocol):
     def attribute(self, h: Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores (N, C), their variances (N, C), and how much each sample (N,) is worth a label."""
 
+    def scores(self, h: Projection) -> np.ndarray:
+        """Return the scores alone."""
+
     def update(self, h: Projection, labels: np.ndarray, iterations: int, tolerance: float) -> int:
         """Learn further labels."""
 
@@ -50,8 +53,12 @@ class MondrianLearner:
 
     def attribute(self, h: Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores, no variances, and the entropy of the scores."""
-        scores_N_C = self._forest.scores(h.inputs_N_d)
+        scores_N_C = self.scores(h)
         return scores_N_C, np.full(scores_N_C.shape, np.nan), entropy(scores_N_C)
+
+    def scores(self, h: Projection) -> np.ndarray:
+        """Return the scores."""
+        return self._forest.scores(h.inputs_N_d)
 
     def update(self, h: Projection, labels: np.ndarray, *_passes: float) -> int:
         """Let every tree grow."""
@@ -78,6 +85,10 @@ class LayerLearner:
         """Return scores, their variances, and one minus the largest score."""
         scores_N_C, variances_N_C, _ = self._layer.attribute(h.inputs_N_d, self._normal_M_C)
         return scores_N_C, variances_N_C, 1 - scores_N_C.max(axis=1)
+
+    def scores(self, h: Projection) -> np.ndarray:
+        """Return the scores."""
+        return self.attribute(h)[0]
 
     def update(self, h: Projection, labels: np.ndarray, *_passes: float) -> int:
         """Make the belief before the prior of the one after."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,15 +100,36 @@ def summarise_marginals(
     All N points share the M·C numbers, so a point's result does not depend on the others. Blocks of points small
     enough for the processor's cache are summarised one after the other.
     """
+    parts = [_summarise(logits_C_N_M) for logits_C_N_M in _drawn(mean_N_C, deviation_N_C, normal_M_C, block)]
+    scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return scores_N_C, variances_N_C, bald_N
+
+
+def score_marginals(
+    mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int = 16
+) -> np.ndarray:
+    """Return the scores (N, C) of :func:`summarise_marginals` alone, in two thirds of its time."""
+    drawn = _drawn(mean_N_C, deviation_N_C, normal_M_C, block)
+    return np.concatenate([_probabilities(logits_C_N_M)[0].mean(axis=2).T for logits_C_N_M in drawn])
+
+
+def _drawn(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int) -> Iterator[np.ndarray]:
+    """Yield the draws (C, n, M) of each block of points."""
     normal_C_1_M = np.ascontiguousarray(normal_M_C.T)[:, None]
-    parts = []
     for start in range(0, max(len(mean_N_C), 1), block):
         rows = slice(start, start + block)
         logits_C_N_M = normal_C_1_M * deviation_N_C[rows].T[:, :, None]
         logits_C_N_M += mean_N_C[rows].T[:, :, None]
-        parts.append(_summarise(logits_C_N_M))
-    scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return scores_N_C, variances_N_C, bald_N
+        yield logits_C_N_M
+
+
+def _probabilities(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return softmax(f) and Σ exp f (N, M) of the logits, which are lowered so that the largest is 0."""
+    logits_C_N_M -= logits_C_N_M.max(axis=0)
+    p_C_N_M = np.exp(logits_C_N_M)
+    total_N_M = p_C_N_M.sum(axis=0)
+    p_C_N_M /= total_N_M
+    return p_C_N_M, total_N_M
 
 
 def _summarise(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -116,10 +138,7 @@ def _summarise(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     New arrays would take most of the time. Classes come first, as sums over three neighbours are several times as slow
     as sums of three arrays, and draws last, so that a point's sums do not depend on how many others there are.
     """
-    logits_C_N_M -= logits_C_N_M.max(axis=0)
-    p_C_N_M = np.exp(logits_C_N_M)
-    total_N_M = p_C_N_M.sum(axis=0)
-    p_C_N_M /= total_N_M
+    p_C_N_M, total_N_M = _probabilities(logits_C_N_M)
     scores_C_N = p_C_N_M.mean(axis=2)
     # H[softmax(f)] = log Σ exp f - Σ p f: one logarithm per draw instead of one per class.
     logits_C_N_M *= p_C_N_M

@@ -17,7 +17,7 @@ from sklearn.cluster import KMeans
 from sklearn.preprocessing import StandardScaler
 
 from gpca.adam import Adam
-from gpca.attribution.scores import summarise_marginals
+from gpca.attribution.scores import score_marginals, summarise_marginals
 from gpca.classifier.covariances import make_covariance
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
@@ -159,8 +159,14 @@ class GPC:
         All points share the same M·C standard normal numbers, so a point's result does not depend on the others;
         per-point marginals suffice, because none of the three uses correlations between points.
         """
-        normal_M_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
-        return summarise_marginals(*self.posterior(h_N_d), normal_M_C)
+        return summarise_marginals(*self.posterior(h_N_d), self._draws())
+
+    def scores(self, h_N_d: np.ndarray | Projection) -> np.ndarray:
+        """Return the scores_N_C of :meth:`attribute` alone."""
+        return score_marginals(*self.posterior(h_N_d), self._draws())
+
+    def _draws(self) -> np.ndarray:
+        return generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
 
     def state(self) -> dict[str, object]:
         """Return all that was learnt as tensors, numbers and names, for :meth:`from_state`."""

@@ -46,7 +46,7 @@ def resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
         content = read_tensors(checkpoint)
     except Exception:  # whatever a damaged file makes torch raise, training from the start is right
         return []
-    if not isinstance(content, dict) or content.get("identity") != identity:
+    if not isinstance(content, dict) or content.get("identity") != identity or not set(state) <= set(content):
         return []
     for name, part in state.items():
         part.load_state_dict(content[name])

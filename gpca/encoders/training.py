@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from gpca.adam import Adam, OneCycle
 from gpca.encoders.checkpoint import fingerprint, fingerprint_of, keep, resume
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
@@ -95,7 +96,7 @@ def train_encoder(
     model = (with_head(make(), settings, classes) if make else make_model(settings, classes)).to(device)
     if start is not None:
         model.load_state_dict(start)
-    optimiser = torch.optim.AdamW(model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay)
+    optimiser = Adam(model.parameters(), settings.learning_rate, settings.weight_decay)
     rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
     if len(rows) < 2:
         raise InputError(f"registrations of {source}, seed {seed}", "hold no training samples", "raise their number")
@@ -104,12 +105,9 @@ def train_encoder(
     else:
         wanted_S = torch.from_numpy(targets_S_C.astype(np.float32))
     batches = -(-len(rows) // settings.batch_size)
-    # At least 5 steps long: of a length of 4, a quarter of which rises, torch divides by zero.
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimiser, settings.learning_rate, total_steps=max(5, settings.epochs * batches), pct_start=0.25
-    )
+    schedule = OneCycle(optimiser, settings.learning_rate, max(5, settings.epochs * batches))
     best = deepcopy(model) if len(held_out) else model
-    state = {"model": model, "optimiser": optimiser, "schedule": schedule} | ({"best": best} if len(held_out) else {})
+    state = {"model": model, "adam": optimiser, "cycle": schedule} | ({"best": best} if len(held_out) else {})
     identity = repr((source, seed, asdict(settings), fingerprint(registrations, targets_S_C), fingerprint_of(start)))
     curve = resume(checkpoint, identity, state)
 
@@ -137,7 +135,7 @@ def train_encoder(
         curve.append(
             {
                 "epoch": epoch + 1,
-                "learning_rate": schedule.get_last_lr()[0],
+                "learning_rate": optimiser.learning_rate,
                 "loss": loss_sum / len(rows),
                 "accuracy": correct / len(rows),
             }

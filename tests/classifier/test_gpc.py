@@ -64,6 +64,10 @@ def test_a_result_does_not_depend_on_the_other_samples(gpc, rows):
         assert np.abs(whole[rows] - part).max() < 1e-6
 
 
+def test_scores_alone_are_those_of_the_attribution(gpc):
+    assert gpc.scores(H_TEST).tobytes() == gpc.attribute(H_TEST)[0].tobytes()
+
+
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0]])
 def test_one_labelled_sample_of_each_class_is_enough_to_tell_them_apart(order):
     # As many samples as classes: gpytorch's own likelihood would read them transposed.

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from .command_lines import arrays_changed, lines_kept, refused, removed, settings, untouched, written
+from baselines import analytical
+from gpca.__main__ import main
+from gpca.attribution.predictions import write_timings
+
+from .command_lines import arguments, arrays_changed, lines_kept, refused, removed, settings, untouched, written
 
 SHAP = {
     "--explainer": "shap_removal", "--settings": {}, "--embeddings": None, "--uncertainty": "uncertainty.npz",
@@ -35,3 +39,19 @@ FAULTS = [
 @pytest.mark.parametrize("fault", range(len(FAULTS)))
 def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
     refused(folder, capsys, "attribute", *FAULTS[fault])
+
+
+def test_an_explainer_measures_each_registration_once(registrations, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    registrations.save("registrations.npz")
+    write_timings("icp.csv", registrations, *np.zeros((2, len(registrations))))
+    measured, measure = [], analytical.analytical_features
+
+    def counted(asked, *axes, **given):
+        measured.extend(zip(asked.split, asked.sample, strict=True))
+        return measure(asked, *axes, **given)
+
+    monkeypatch.setattr(analytical, "analytical_features", counted)
+    changes = {"--explainer": "analytical_gpc", "--embeddings": None, "--input-timings": "icp.csv"}
+    assert main(arguments("attribute", changes)) == 0
+    assert measured == list(zip(registrations.split, registrations.sample, strict=True))
