@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 
@@ -47,6 +48,6 @@ def finish_panels(
     save_figure(figure, pdf_path, png_path)
 
 
-def in_lines(title: str) -> str:
-    """Return the title with what stands in brackets in a line of its own."""
-    return title.replace(" (", "\n(")
+def in_lines(title: str, letters: int = 26) -> str:
+    """Return the title with what stands in brackets in a line of its own, and no line much longer than `letters`."""
+    return "\n".join(line for part in title.replace(" (", "\n(").split("\n") for line in wrap(part, letters))
