@@ -70,7 +70,11 @@ def draw_kernel_curves(
                     panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
             for (kernel, rate, iterations), value in printed_accuracies(numbers, source).items():
                 if measure == "accuracy" and (kernel, rate, iterations) in means.index:
-                    filled = {"marker": PRINTED_MARKERS[rate < rates[0]], "color": COLOURS[kernel], "markersize": 3.5}
+                    filled = {
+                        "marker": PRINTED_MARKERS[int(rate < rates[0])],
+                        "color": COLOURS[kernel],
+                        "markersize": 3.5,
+                    }
                     panel.plot(BESIDE[kernel] * iterations, value, linestyle="", clip_on=False, **filled)
             panel.set_xscale("log")
             panel.set_xticks(ticks, [f"{tick}" for tick in ticks])

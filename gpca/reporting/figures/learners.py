@@ -35,9 +35,9 @@ from gpca.shift.sets import DISTANCES
 
 SETS = {  # those whose ρ Table V has, alone and under shift
     "in_distribution": "like the training",
-    with_training_like("severity"): "and stronger",
-    with_training_like("source"): "and another source",
-    with_training_like("objects"): "and unseen objects",
+    with_training_like("severity"): "+ stronger severities",
+    with_training_like("source"): "+ another source",
+    with_training_like("objects"): "+ unseen objects",
 }
 Titles = Mapping[str, str]
 COVERAGES = np.linspace(0.02, 1, 99)
@@ -70,7 +70,7 @@ def draw_coverage_risk(
     axes[0, 0].set_ylim(bottom=0)
     axes[0, 0].set_ylabel("risk: errors among the covered (%)")
     _write_legend(figure, shown, learners)
-    figure.tight_layout(rect=(0, 0.24 / height_in, 1, 1), pad=0.4)
+    figure.tight_layout(rect=(0, 0.24 / height_in, 1, 1), pad=0.4, w_pad=1.5)
     save_figure(figure, pdf_path, png_path)
 
 
@@ -92,7 +92,7 @@ def draw_reliability(
         panel.set_title(f"{learners[learner]}\nECE {gap:.3f}", fontsize=SMALL_PT)
     handles, labels = panels[0].get_legend_handles_labels()
     title = ", ".join(sources[name] for name in columns)
-    finish_panels(figure, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
+    finish_panels(figure, panels, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
 
 
 def draw_uncertainty_vs_distance(

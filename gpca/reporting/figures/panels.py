@@ -25,6 +25,7 @@ def small_panels(count: int, panel_height_in: float):
 
 def finish_panels(
     figure,
+    panels: list,
     title: str,
     handles: list,
     labels: list[str],
@@ -35,11 +36,10 @@ def finish_panels(
 ) -> None:
     """Label the outer panels, set a title above all and a legend below, and write the figure."""
     height_in = figure.get_size_inches()[1]
-    shown = [panel for panel in figure.axes if panel.get_visible()]
-    for i, panel in enumerate(shown):
+    for i, panel in enumerate(panels):
         if i % PANELS_PER_ROW == 0:
             panel.set_ylabel(up)
-        if i + PANELS_PER_ROW >= len(shown):
+        if i + PANELS_PER_ROW >= len(panels):
             panel.set_xlabel(across)
             panel.tick_params(labelbottom=True)
     figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)

@@ -37,8 +37,8 @@ from gpca.reporting.words import object_in_words
 if TYPE_CHECKING:
     import pandas as pd
 
-CONCEPT = "overlap"  # The sample shown is of this concept, if a registration of it failed.
-HELD_OUT = (CONCEPT, *CONCEPTS)  # The new concept of the lower half is the first of these that the run held out.
+# Above stands a sample of the first of these of which a registration failed, below the first that was held out.
+ORDER = ("overlap", "pose", "noise")
 TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # The figure draws the curves of these strategies.
 THUMBNAILS = 6  # The figure shows this many clouds of the pool.
 
@@ -61,7 +61,7 @@ def draw_pipeline(
 
     Args:
         registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
-            sample that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns, first of `CONCEPT`.
+            sample that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns for `ORDER`.
         uncertainty_csv: The uncertainties of the design ``causal``.
         limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
@@ -76,7 +76,7 @@ def draw_pipeline(
         InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
-    row = stages.choose(CONCEPT, registrations_npz, *CONCEPTS)
+    row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])
     files = list(curve_files)
     new, curves = _curves(files)
     source, _, seed = source_method_seed(files[0])
@@ -98,7 +98,7 @@ def draw_pipeline(
 
 def _curves(files: list[str | Path]) -> tuple[str, dict[str, pd.DataFrame]]:
     """Return the concept that was new, and the learning curves of that experiment by strategy."""
-    for concept in HELD_OUT:
+    for concept in ORDER:
         curves = {name: one for (_, name, setting), one in mean_curves(files, [concept]).items() if setting == SETTING}
         if any(name in curves for name in TITLES):
             return concept, curves

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
 PANEL_IN = 1.88  # The three pictures are square.
-AROUND = (3.0, 1.2)  # The first picture, and the two others, show so many times the object's extent.
+SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
+AROUND = (2.5, 1.2)  # The first picture, and the two others, show so many times the object's extent.
 
 
 def draw_real_world_example(
@@ -94,7 +95,8 @@ def draw_real_world_example(
     panels[0].add_patch(region)
     for panel in panels[:3]:
         _shade(panel, covered(own_px, seen["init", "source"], image.shape[:2]))
-    looks = {"model": {"color": TARGET_COLOUR, "s": 0.7}, "source": {"color": SOURCE_COLOUR, "s": 1.1}}
+    large = float(np.clip(2000 / len(observed_m), 1.1, 5))  # Few points are drawn larger.
+    looks = {"model": {"color": TARGET_COLOUR, "s": 0.7}, "source": {"color": SOURCE_COLOUR, "s": large}}
     for panel, pose in ((panels[1], "init"), (panels[2], "icp")):
         for name, look in looks.items():
             panel.scatter(*seen[pose, name].T, linewidths=0, **look)
@@ -144,14 +146,18 @@ def covered(own_P_2: np.ndarray, kept_P_2: np.ndarray, shape: tuple[int, int]) -
 
     A sample has at most so many points, drawn at random: what lies between those that it kept counts as kept.
     """
-    from scipy.ndimage import binary_closing
+    from scipy.ndimage import binary_closing, label
 
     own, kept = np.zeros(shape, bool), np.zeros(shape, bool)
     for mask, pixels_P_2 in ((own, own_P_2), (kept, np.rint(kept_P_2).astype(int))):
         inside = (pixels_P_2 >= 0).all(axis=1) & (pixels_P_2 < shape[::-1]).all(axis=1)
         mask[tuple(pixels_P_2[inside, ::-1].T)] = True
+    own = binary_closing(np.pad(own, 2), iterations=2)[2:-2, 2:-2]  # Single pixels were not measured.
     gap_px = int(np.ceil(1.5 * np.sqrt(own.sum() / max(kept.sum(), 1))))
-    return own & ~binary_closing(np.pad(kept, gap_px), iterations=gap_px)[gap_px:-gap_px, gap_px:-gap_px]
+    parts, _ = label(own & ~binary_closing(np.pad(kept, gap_px), iterations=gap_px)[gap_px:-gap_px, gap_px:-gap_px])
+    sizes = np.bincount(parts.ravel(), minlength=1)
+    sizes[0] = 0
+    return (sizes >= SMALLEST_PART * own.sum())[parts]
 
 
 class _Camera:

@@ -55,7 +55,7 @@ def draw_nominal_reliability(
     handles, labels = panels[0].get_legend_handles_labels()
     drawn = {source for source, own, _ in judged if own in shown}
     title = ", ".join(title for name, title in sources.items() if name in drawn)
-    finish_panels(figure, title, handles, labels, 'score of "nominal"', "share", pdf_path, png_path)
+    finish_panels(figure, panels, title, handles, labels, 'score of "nominal"', "share", pdf_path, png_path)
 
 
 def draw_reliability_panel(
@@ -83,7 +83,8 @@ def draw_reliability_panel(
     counts.set_yscale("log")
     most = 10 ** np.ceil(np.log10(counts_B.max()))
     counts.set_ylim(0.8, 0.8 * (most / 0.8) ** HEADROOM)
-    counts.set_yticks([10.0**power for power in range(int(np.log10(most)) + 1)])
+    counts.set_yticks([10**power for power in range(int(np.log10(most)) + 1)])
+    counts.yaxis.set_major_formatter("{x:g}")
     counts.minorticks_off()
     counts.tick_params(colors=GREY, length=2, pad=1)
     counts.set_zorder(panel.get_zorder() - 1)

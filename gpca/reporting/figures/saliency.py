@@ -87,4 +87,4 @@ def _draw_map(panel, target_Q_3: np.ndarray, points_N_3: np.ndarray, saliency_N:
     order = np.argsort(saliency_N, kind="stable")
     ranks = np.linspace(0, 1, len(order))
     panel.scatter(points[order, 0], points[order, 1], s=5, c=ranks, cmap=blues(), vmin=PALEST, vmax=1, linewidths=0)
-    panel.set_aspect("equal", anchor="N")
+    panel.set_aspect("equal", adjustable="datalim")
