@@ -38,13 +38,12 @@ def object_in_words(name: object, dataset: str = "") -> str:
     """
     if numbered := re.fullmatch(r"obj_0*(\d+)", str(name)):
         number, names = int(numbered[1]), BOP_NAMES.get(dataset, ())
-        return (
-            names[number - 1]
-            if 0 < number <= len(names)
-            else f"object {number}" + (f" of {dataset}" if dataset else "")
-        )
-    _, one, kind = re.fullmatch(r"((?:ycb_|linemod_)?\d+(?:-([a-z]))?_)?(.*)", str(name)).groups()
-    return in_words(kind) + (f" ({one})" if one else "")
+        if 0 < number <= len(names):
+            return names[number - 1]
+        return f"object {number} of {dataset}" if dataset else f"object {number}"
+    if listed := re.match(r"(?:ycb_|linemod_)?\d+(?:-([a-z]))?_", str(name)):
+        return in_words(str(name)[listed.end() :]) + (f" ({listed[1]})" if listed[1] else "")
+    return in_words(name)
 
 
 def object_of_frames(name: object) -> str:

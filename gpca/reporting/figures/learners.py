@@ -12,7 +12,7 @@ The learners of the paper have a colour, as everywhere, and all others are grey:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +140,7 @@ def draw_uncertainty_vs_distance(
     save_figure(figure, pdf_path, png_path)
 
 
-def distance_curve(of_seeds: Iterable) -> tuple[np.ndarray, np.ndarray]:
+def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray]:
     """Return median distance and mean of 1 - largest score of `DISTANCE_BINS` bins of equally many samples."""
     distance_S, score_S = (
         np.concatenate([rows[name].to_numpy(float) for rows in of_seeds]) for name in (DISTANCES[0], "max_score")
