@@ -179,7 +179,7 @@ def names_of_backbones(frames: Mapping) -> list[str]:
 
 def _dataset_of(entry: Mapping) -> str:
     """Return what the BOP benchmark calls the dataset that a source's objects are of; empty for other sources."""
-    return PurePath(entry["location"] or "").name if entry.get("kind") == "bop" else ""
+    return PurePath(entry.get("location") or "").name if entry.get("kind") == "bop" else ""
 
 
 def _title_of_pose(settings: Mapping) -> str:
