@@ -6,6 +6,7 @@ The registry of results (:mod:`gpca.reporting.registry`) refers to both by name,
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import PurePath
 from typing import Any
 
 from baselines.registry import CAUSES, explainer_entry
@@ -82,6 +83,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     """Return what tables and figures show besides numbers: titles by name, and conditions of the protocol."""
     frames, recovery, learning = config["real_world"], config["recovery"], config["active_learning"]
     shown = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
+    datasets = {name: _dataset_of(entry) for name, entry in sources.items()}
     of_grid = {name: entry for name, entry in shown.items() if name in config["kernel_grid"]["sources"]}
     of_frames = {"title": frames["title"], "stand_in": not frames["datasets"]}
     of_model = {**shown, REAL_WORLD: of_frames}[config["model"]["source"]]
@@ -98,6 +100,9 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "compared_titles": learners | strategies | explainers,
         "source_titles": {name: title_of(entry) for name, entry in shown.items()},
         "shown_title": title_of(shown[config["figures"]["source"]]),
+        "source_datasets": datasets,
+        "shown_dataset": datasets[config["figures"]["source"]],
+        "recovery_dataset": datasets[recovery["objects"]],
         "frames": of_frames,
         "frame_conditions": {
             REAL_WORLD: _title_of_pose(frames["initial_pose"]),
@@ -146,7 +151,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
             "test": config["registrations"]["test"],
         },
         "target": learning["target"],
-        "batch": learning["batch"],
         "test_samples": config["registrations"]["test"],
         "kernel_sources": of_grid,
         "kernel_source_titles": {name: title_of(entry) for name, entry in of_grid.items()},
@@ -171,6 +175,11 @@ def installed_methods(names: Iterable[str]) -> list[str]:
 def names_of_backbones(frames: Mapping) -> list[str]:
     """Return the rows of Table VI that read embeddings: every encoder with every reduction."""
     return [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
+
+
+def _dataset_of(entry: Mapping) -> str:
+    """Return what the BOP benchmark calls the dataset that a source's objects are of; empty for other sources."""
+    return PurePath(entry.get("location") or "").name if entry.get("kind") == "bop" else ""
 
 
 def _title_of_pose(settings: Mapping) -> str:

@@ -4,6 +4,22 @@ from __future__ import annotations
 
 import re
 
+_LINEMOD = (
+    *("ape", "benchvise", "bowl", "camera", "can", "cat", "cup", "driller", "duck", "eggbox", "glue", "holepuncher"),
+    *("iron", "lamp", "phone"),
+)
+BOP_NAMES = {  # what datasets of the BOP benchmark call their objects, from number 1 on
+    "lm": _LINEMOD,
+    "lmo": _LINEMOD,
+    "ycbv": (
+        *("master chef can", "cracker box", "sugar box", "tomato soup can", "mustard bottle", "tuna fish can"),
+        *("pudding box", "gelatin box", "potted meat can", "banana", "pitcher base", "bleach cleanser", "bowl", "mug"),
+        *("power drill", "wood block", "scissors", "large marker", "large clamp", "extra large clamp", "foam brick"),
+    ),
+    "icbin": ("coffee cup", "juice carton"),
+    "visp": ("toy cube", "dragon"),
+}
+
 
 def plural(count: int | str, noun: str) -> str:
     """Return e.g. ``1 seed``, ``5 seeds`` or ``2 to 3 seeds``."""
@@ -15,13 +31,22 @@ def in_words(name: object) -> str:
     return str(name).replace("_", " ")
 
 
-def object_of_frames(name: object) -> str:
-    """Return what a reader calls an object of depth frames, whose files name it by dataset and model.
+def object_in_words(name: object, dataset: str = "") -> str:
+    """Return what a reader calls an object: ``mug`` for ``ycb_025_mug``, ``cat`` for ``obj_000006`` of ``lmo``.
 
-    ``master chef can`` for ``scenes 002_master_chef_can``; a number alone says nothing without its dataset, so that it
-    is ``object 6 of lmo`` for ``lmo obj_000006``.
+    A number alone says nothing without its dataset, so that it is ``object 6 of mine`` where the names are not known.
     """
+    if numbered := re.fullmatch(r"obj_0*(\d+)", str(name)):
+        number, names = int(numbered[1]), BOP_NAMES.get(dataset, ())
+        if 0 < number <= len(names):
+            return names[number - 1]
+        return f"object {number} of {dataset}" if dataset else f"object {number}"
+    if listed := re.match(r"(?:ycb_|linemod_)?\d+(?:-([a-z]))?_", str(name)):
+        return in_words(str(name)[listed.end() :]) + (f" ({listed[1]})" if listed[1] else "")
+    return in_words(name)
+
+
+def object_of_frames(name: object) -> str:
+    """Return what a reader calls an object of depth frames, whose files name it by dataset and model."""
     dataset, _, model = str(name).partition(" ")
-    if numbered := re.fullmatch(r"obj_0*(\d+)", model):
-        return f"object {numbered[1]} of {dataset}"
-    return in_words(re.sub(r"^\d+_", "", model or dataset))
+    return object_in_words(model, dataset) if model else object_in_words(dataset)

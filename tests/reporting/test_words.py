@@ -1,6 +1,6 @@
 import pytest
 
-from gpca.reporting.words import in_words, object_of_frames, plural
+from gpca.reporting.words import in_words, object_in_words, object_of_frames, plural
 
 
 @pytest.mark.parametrize(
@@ -19,10 +19,29 @@ def test_a_name_is_read_as_words():
     [
         ("scenes 002_master_chef_can", "master chef can"),
         ("scenes big red_mug", "big red mug"),
-        ("lmo obj_000006", "object 6 of lmo"),
-        ("ycbv obj_000020", "object 20 of ycbv"),
+        ("lmo obj_000006", "cat"),
+        ("ycbv obj_000020", "extra large clamp"),
+        ("ycbv obj_000022", "object 22 of ycbv"),
+        ("mine obj_000006", "object 6 of mine"),
         ("brick", "brick"),
     ],
 )
-def test_an_object_of_frames_is_called_by_its_name_alone_and_a_number_by_its_dataset_too(name, words):
+def test_an_object_of_frames_is_called_by_its_name_alone_or_by_number_and_dataset(name, words):
     assert object_of_frames(name) == words
+
+
+@pytest.mark.parametrize(
+    ("name", "dataset", "words"),
+    [
+        ("obj_000010", "ycbv", "banana"),
+        ("obj_000010", "lm", "eggbox"),
+        ("obj_000010", "", "object 10"),
+        ("040_large_marker", "", "large marker"),
+        ("ycb_025_mug", "", "mug"),
+        ("065-h_cups", "", "cups (h)"),
+        ("tapered_mug_3", "", "tapered mug 3"),
+        ("25", "", "25"),
+    ],
+)
+def test_an_object_has_the_name_that_a_reader_knows(name, dataset, words):
+    assert object_in_words(name, dataset) == words

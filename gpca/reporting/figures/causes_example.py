@@ -20,7 +20,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
 from gpca.reporting.figures.style import GREY, SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
-from gpca.reporting.words import in_words
+from gpca.reporting.words import object_in_words
 
 PANEL_IN = 1.02
 HEAD_IN = 0.3
@@ -39,6 +39,7 @@ def draw_causes_example(
     title: str,
     pdf_path: str | Path,
     png_path: str | Path,
+    dataset: str = "",
 ) -> None:
     """Draw the counterfactuals on the left, and on the right the measured shares and the scores of every explainer.
 
@@ -51,6 +52,7 @@ def draw_causes_example(
         predictions_csv: One file per explainer, of the same source and seed.
         settings: The config's section ``causes`` with ``icp``.
         explainers: The title of each name, in order; those that name no cause are left out.
+        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
         InputError: an unusable file, files that do not belong together, or no failed test sample.
@@ -88,7 +90,7 @@ def draw_causes_example(
     bottom = (height_in - HEAD_IN - 0.2 - rows_in) / height_in
     panel = figure.add_axes((left, bottom, table_in / TEXT_WIDTH_IN, rows_in / height_in))
     _draw_scores(panel, names, scores_R_4)
-    object_name = in_words(causes.registrations.object_name[row])
+    object_name = object_in_words(causes.registrations.object_name[row], dataset)
     write_title(figure, f"{title}: {object_name}. Mean error in % of the diameter with each subset of the causes")
     legend_of_clouds(figure, "model", "observed", gap=0.2)
     save_figure(figure, pdf_path, png_path)

@@ -12,7 +12,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
-from gpca.reporting.words import in_words
+from gpca.reporting.words import object_in_words
 
 TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
 SEVERITIES = {
@@ -29,11 +29,13 @@ def draw_concepts_figure(
     pdf_path: str | Path,
     png_path: str | Path,
     object_name: str | None = None,
+    dataset: str = "",
 ) -> None:
     """Draw target (vermilion) and perturbed source in its initial pose (blue) in one panel per concept.
 
     The figure shows test samples of one object: `object_name`, or the object whose samples come nearest to the medium
-    severity. One view serves all panels, and shows the pose error and the cut from the side.
+    severity. One view serves all panels, and shows the pose error and the cut from the side. The object's name in words
+    follows from its `dataset` of the BOP benchmark.
 
     Raises:
         InputError: an unusable file, or no (such) object with a test sample of each concept.
@@ -66,7 +68,7 @@ def draw_concepts_figure(
         severity = severity_text(registrations, samples[concept], concept)
         panel.set_title(f"({letter}) {TITLES[concept]}: {severity}", y=0, pad=-4, va="top")
     legend_of_clouds(figure, "target", "perturbed source, before ICP", gap=0.2)
-    write_title(figure, f"{title}: {in_words(name)}")
+    write_title(figure, f"{title}: {object_in_words(name, dataset)}")
     save_figure(figure, pdf_path, png_path)
 
 

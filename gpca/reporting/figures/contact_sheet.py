@@ -11,7 +11,7 @@ import numpy as np
 from gpca.objects.canonical import ObjectClouds
 from gpca.reporting.figures.cloud_views import view_from
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
-from gpca.reporting.words import in_words
+from gpca.reporting.words import object_in_words
 
 VIEW = (math.radians(-55), math.radians(32))  # Azimuth and elevation of the eye, z up: it sees front, right and top.
 BASE_COLOUR = np.array([0.62, 0.70, 0.80])
@@ -141,13 +141,16 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
-def draw_contact_sheet(objects_npz: str | Path, title: str, pdf_path: str | Path, png_path: str | Path) -> None:
+def draw_contact_sheet(
+    objects_npz: str | Path, title: str, pdf_path: str | Path, png_path: str | Path, dataset: str = ""
+) -> None:
     """Draw all objects of one source in a grid, each filling its tile, with its name and diameter below.
 
     Args:
         objects_npz: The clouds as `gpca objects` writes them.
         title: The line on top, which says so when the objects are stand-ins.
         pdf_path, png_path: The two files to write.
+        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
         InputError: the npz is missing, unreadable or not of that format.
@@ -161,7 +164,7 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, pdf_path: str | Path
     rows = math.ceil(count / columns)
     tile = TEXT_WIDTH_IN / columns
     size_pt = min(7.0, max(4.5, 7.0 * tile))
-    captions = [_caption(name, tile * 72, size_pt) for name in objects.names]
+    captions = [_caption(object_in_words(name, dataset), tile * 72, size_pt) for name in objects.names]
     line = size_pt * 1.2 / 72
     caption_height = line * (max(caption.count("\n") for caption in captions) + 2) + 0.08
     title_height = 0.28
@@ -191,6 +194,6 @@ def _columns(count: int) -> int:
 
 
 def _caption(name: str, width_pt: float, size_pt: float) -> str:
-    """Break a name at its underscores into lines that fit the tile; letters are about half as wide as high."""
+    """Break a name into lines that fit the tile; letters are about half as wide as high."""
     letters = max(4, int(0.96 * width_pt / (0.5 * size_pt)))
-    return "\n".join(textwrap.wrap(in_words(name), letters))
+    return "\n".join(textwrap.wrap(name, letters))

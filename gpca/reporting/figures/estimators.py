@@ -97,15 +97,15 @@ def draw_estimators(
     limits = _limits([pooled[name] for name in told])
     for i, name in enumerate([REFERENCE, *(name for name in told if name != REFERENCE)][:8]):
         panel = figure.add_subplot(of_scatter[i // 4, i % 4])
-        _draw_scatter(panel, pooled[name], titles[name], limits, i % 4 == 0, i >= 4)
+        _draw_scatter(panel, pooled[name], titles[name], _style(name)[0], limits, i % 4 == 0, i >= 4)
     figure.text(0.37, 0.005, "predicted spread (% of the diameter)", ha="center", va="bottom", fontsize=SMALL_PT)
     figure.text(0.003, 0.31, "error (% of the diameter)", ha="left", va="center", rotation=90, fontsize=SMALL_PT)
     _draw_coverage(figure.add_axes((0.74, 0.075, 0.245, 0.47)), pooled, names)
     handles = [plt.Line2D([], [], color=_style(n)[0], linestyle=_style(n)[1], label=titles[n]) for n in names]
     handles.append(plt.Line2D([], [], color=BLACK, marker="*", linestyle="", label="true pose"))
     handles += [
-        plt.Line2D([], [], color=colour, marker=marker, linestyle="", markerfacecolor="none", markersize=3, label=label)
-        for label, marker, colour in (("succeeded", "o", BLUE), ("failed", "x", VERMILION))
+        plt.Line2D([], [], color=BLACK, marker=marker, linestyle="", markerfacecolor="none", markersize=3, label=label)
+        for label, marker in (("succeeded", "o"), ("failed", "x"))
     ]
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.972), ncols=6, columnspacing=1.2)
     write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over the reference's results; below, all datasets")
@@ -181,12 +181,12 @@ def _draw_ellipses(panel, samples: ReferenceSamples, place: int, said: Mapping, 
     panel.tick_params(pad=1.5, length=2)
 
 
-def _draw_scatter(panel, rows: pd.DataFrame, title: str, limits, left: bool, below: bool) -> None:
+def _draw_scatter(panel, rows: pd.DataFrame, title: str, colour: str, limits, left: bool, below: bool) -> None:
     """Draw errors over predicted spreads; on the diagonal the prediction is right on average."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
     panel.plot(limits, limits, color=GREY, linewidth=0.6, zorder=1)
-    for failed, marker, colour in ((False, "o", BLUE), (True, "x", VERMILION)):
+    for failed, marker in ((False, "o"), (True, "x")):
         of_kind = rows[rows["failed"] == failed]
         face = {"facecolors": "none", "edgecolors": colour} if marker == "o" else {"color": colour}
         where = 100 * np.maximum(of_kind["spread"], 1e-5), 100 * of_kind["add_relative"]

@@ -24,7 +24,7 @@ from gpca.reporting.figures.style import (
     save_figure,
     write_title,
 )
-from gpca.reporting.words import in_words
+from gpca.reporting.words import object_in_words
 
 CONCEPT = "pose"  # The sample shown is of this concept, since before and after ICP differ to the eye.
 CAPTIONS = {"init": "initial", "icp": "aligned"}
@@ -41,6 +41,7 @@ def draw_overview(
     treatments: Mapping[str, str],
     pdf_path: str | Path,
     png_path: str | Path,
+    dataset: str = "",
 ) -> None:
     """Draw what the stages make of one registration, from its clouds to what follows.
 
@@ -57,6 +58,7 @@ def draw_overview(
         encoder: The name that the figure gives the encoder.
         treatments: The action of recovery for each concept.
         pdf_path, png_path: The two files to write.
+        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
         InputError: an unusable file, files of different samples, or a concept without a treatment.
@@ -100,7 +102,7 @@ def draw_overview(
     canvas.box(0.02, 1.08, 1.9, 0.37, "Ask a person for the concept\nof a few such cases", GREY, dashed=True)
     canvas.arrow((1.92, 1.265), (2.22, 1.265), words="retrain")
 
-    write_title(canvas.figure, f"{title}: {in_words(sample['object'])}")
+    write_title(canvas.figure, f"{title}: {object_in_words(sample['object'], dataset)}")
     for x_in, colour, words in ((0.06, TARGET_COLOUR, "target"), (0.5, SOURCE_COLOUR, "source")):
         canvas.dot(x_in, 2.74, colour, words)
     save_figure(canvas.figure, pdf_path, png_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 
@@ -24,6 +25,7 @@ def small_panels(count: int, panel_height_in: float):
 
 def finish_panels(
     figure,
+    panels: list,
     title: str,
     handles: list,
     labels: list[str],
@@ -34,11 +36,10 @@ def finish_panels(
 ) -> None:
     """Label the outer panels, set a title above all and a legend below, and write the figure."""
     height_in = figure.get_size_inches()[1]
-    shown = [panel for panel in figure.axes if panel.get_visible()]
-    for i, panel in enumerate(shown):
+    for i, panel in enumerate(panels):
         if i % PANELS_PER_ROW == 0:
             panel.set_ylabel(up)
-        if i + PANELS_PER_ROW >= len(shown):
+        if i + PANELS_PER_ROW >= len(panels):
             panel.set_xlabel(across)
             panel.tick_params(labelbottom=True)
     figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
@@ -47,6 +48,6 @@ def finish_panels(
     save_figure(figure, pdf_path, png_path)
 
 
-def in_lines(title: str) -> str:
-    """Return the title with what stands in brackets in a line of its own."""
-    return title.replace(" (", "\n(")
+def in_lines(title: str, letters: int = 26) -> str:
+    """Return the title with what stands in brackets in a line of its own, and no line much longer than `letters`."""
+    return "\n".join(line for part in title.replace(" (", "\n(").split("\n") for line in wrap(part, letters))

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.active_learning import STYLES, mean_curves
 from gpca.reporting.figures.cloud_views import draw_clouds, thinned
 from gpca.reporting.figures.diagram import Canvas
-from gpca.reporting.figures.label_round import Round, next_round
+from gpca.reporting.figures.label_round import SETTING, Round, first_round
 from gpca.reporting.figures.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
 from gpca.reporting.figures.style import (
     BLACK,
@@ -29,10 +32,13 @@ from gpca.reporting.figures.style import (
     save_figure,
     write_title,
 )
-from gpca.reporting.words import in_words
+from gpca.reporting.words import object_in_words
 
-CONCEPT = "overlap"  # The sample shown is of this concept.
-SETTING = "pretrained"  # In the learning curves, the encoder knows all concepts and the classifier all but one.
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Above stands a sample of the first of these of which a registration failed, below the first that was held out.
+ORDER = ("overlap", "pose", "noise")
 TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # The figure draws the curves of these strategies.
 THUMBNAILS = 6  # The figure shows this many clouds of the pool.
 
@@ -46,46 +52,57 @@ def draw_pipeline(
     curve_files: Iterable[str | Path],
     title: str,
     encoder: str,
-    batch: int,
+    active_learning: Mapping,
     pdf_path: str | Path,
     png_path: str | Path,
+    dataset: str = "",
 ) -> None:
     """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
 
     Args:
         registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
-            sample of the concept `CONCEPT` that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns.
+            sample that :meth:`gpca.reporting.figures.shown_sample.Stages.choose` returns for `ORDER`.
         uncertainty_csv: The uncertainties of the design ``causal``.
         limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
             :func:`gpca.reporting.figures.active_learning.draw_learning_curves`.
         title: The title of the source.
         encoder: The name that the figure gives the encoder.
-        batch: The number B of labels per round.
+        active_learning: The config's section; the figure repeats the first round of the run.
         pdf_path, png_path: The two files to write.
+        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
         InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
-    row = stages.choose(CONCEPT, registrations_npz)
-    curves = {name: curve for (_, name, setting), curve in mean_curves(curve_files).items() if setting == SETTING}
-    if not any(name in curves for name in TITLES):
-        raise InputError("active learning", f"holds no curve of {' or '.join(TITLES)}", "run one of these strategies")
-    asked = next_round(stages, batch)
+    row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])
+    files = list(curve_files)
+    new, curves = _curves(files)
+    source, _, seed = source_method_seed(files[0])
+    asked = first_round(stages, new, ActiveLearningSettings.from_dict(dict(active_learning)), source, seed)
     canvas = Canvas(TEXT_WIDTH_IN, 3.5)
     canvas.box(0.03, 1.9, 7.1, 1.4, colour=LIGHT_GREY)
     canvas.box(0.03, 0.03, 7.1, 1.6, colour=LIGHT_GREY)
     _draw_inference(canvas, stages, row, encoder, asked)
-    _draw_active_learning(canvas, stages, asked, curves, batch)
+    _draw_active_learning(canvas, stages, asked, new, curves)
     canvas.arrow((6.4, 1.97), (6.4, 1.63))
     canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
     canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
-    write_title(canvas.figure, f"{title}: {in_words(stages.predictions['object'][row])}")
+    write_title(canvas.figure, f"{title}: {object_in_words(stages.predictions['object'][row], dataset)}")
     canvas.dot(6.15, 3.4, TARGET_COLOUR, r"target $\mathcal{Q}$", gap_in=0.05)
     canvas.dot(6.63, 3.4, SOURCE_COLOUR, r"source $\mathcal{P}$", gap_in=0.05)
     save_figure(canvas.figure, pdf_path, png_path)
+
+
+def _curves(files: list[str | Path]) -> tuple[str, dict[str, pd.DataFrame]]:
+    """Return the concept that was new, and the learning curves of that experiment by strategy."""
+    for concept in ORDER:
+        curves = {name: one for (_, name, setting), one in mean_curves(files, [concept]).items() if setting == SETTING}
+        if any(name in curves for name in TITLES):
+            return concept, curves
+    raise InputError("active learning", f"holds no curve of {' or '.join(TITLES)}", "run one of these strategies")
 
 
 def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, asked: Round) -> None:
@@ -95,7 +112,7 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, aske
     canvas.text(0.1, 3.27, "Online inference", ha="left", va="top", fontweight="bold")
     seen = stages.seen(row)
     corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
-    captions = {"init": "initial pose $T_0$: ", "icp": r"aligned $\hat{T}\mathcal{P}$: "}
+    captions = {"init": "initial pose $T_0$:\n", "icp": r"aligned $\hat{T}\mathcal{P}$: "}
     for left_in, (which, pair) in zip((0.12, 1.56), seen.items(), strict=True):
         draw_clouds(canvas.panel(left_in, 2.2, 1.06, 0.94), *pair, 1.0, (corners.min(axis=0), corners.max(axis=0)))
         canvas.text(left_in + 0.53, captions_in, captions[which] + stages.words(row, which), va="top")
@@ -131,7 +148,7 @@ def _draw_labelled(axes, stages: Stages, row: int, asked: Round) -> None:
     axes.set_axis_off()
 
 
-def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: Mapping, batch: int) -> None:
+def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str, curves: Mapping) -> None:
     """Draw pool, score, diversify, annotate, retrain from right to left: the way back of the loop."""
     heads_in = 1.58
     captions_in = 0.08
@@ -139,7 +156,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: 
     canvas.text(0.1, heads_in, "Active learning", ha="left", va="top", fontweight="bold")
 
     canvas.text(6.4, heads_in, r"Unlabelled pool $\mathcal{D}_U$", va="top")
-    canvas.text(6.4, captions_in, f"{len(asked.rows_N)} test samples", va="bottom")
+    canvas.text(6.4, captions_in, f"{len(asked.rows_N)} training samples", va="bottom")
     for place, of_pool in enumerate(thinned(asked.rows_N, THUMBNAILS)):
         corner = (5.9 + 0.36 * (place % 3), 0.86 - 0.56 * (place // 3))
         _draw_thumbnail(canvas.panel(*corner, 0.34, 0.5), stages, of_pool)
@@ -147,16 +164,17 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: 
 
     canvas.text(5.04, heads_in, "Score: BALD", va="top")
     panel = canvas.panel(4.5, 0.36, 1.08, 1.02)
-    bald_N = stages.predictions["bald"].to_numpy()[asked.rows_N]
+    bald_N = asked.bald_N
     points_N_2 = asked.map_S_2[asked.rows_N]
     order = np.argsort(bald_N, kind="stable")
+    panel.scatter(*asked.map_S_2[asked.labelled].T, s=5, marker="x", color=GREY, linewidths=0.5)
     panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GREY, linewidths=0.3)
     panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
     panel.set_axis_off()
     canvas.text(
         5.04,
         captions_in,
-        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats;\n$B K$ = {len(asked.candidates)} ringed",
+        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(asked.candidates)}\nringed; ×: labelled before",
         va="bottom",
     )
     canvas.arrow((4.46, middle_in), (4.24, middle_in))
@@ -178,7 +196,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, curves: 
         canvas.text(corner[0] + 0.2, corner[1] - 0.01, concept, va="top")
     canvas.arrow((1.92, middle_in), (1.72, middle_in))
 
-    canvas.text(1.4, heads_in, "Retrain", va="top")
+    canvas.text(1.4, heads_in, f"Retrain: {new} is new", va="top")
     panel = canvas.panel(0.5, 0.38, 1.18, 1.0)
     for name in reversed(TITLES):
         if name in curves:

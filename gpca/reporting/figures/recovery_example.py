@@ -22,7 +22,7 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
-from gpca.reporting.words import in_words
+from gpca.reporting.words import in_words, object_in_words
 
 SILHOUETTES = ("mask", "true", "placed")
 SHAPES: dict[str, tuple[int | str, ...]] = {
@@ -41,10 +41,13 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
 }
 
 
-def draw_recovery_example(title: str, example_npz: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
+def draw_recovery_example(
+    title: str, example_npz: str | Path, pdf_path: str | Path, png_path: str | Path, dataset: str = ""
+) -> None:
     """Draw (a) the first view, (b) the concept scores, (c) the viewpoints to choose from, (d) the new view.
 
-    Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit.
+    Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
+    object's name in words follows from its `dataset` of the BOP benchmark.
 
     Raises:
         InputError: an unusable file.
@@ -74,7 +77,7 @@ def draw_recovery_example(title: str, example_npz: str | Path, pdf_path: str | P
     )
     for centre, caption in zip((0.14, 0.385, 0.585, 0.86), captions, strict=True):
         figure.text(centre, 0.02, caption, ha="center", va="bottom")
-    name = in_words(found["object"])
+    name = object_in_words(found["object"], dataset)
     write_title(figure, f"{title}: {name}; outlines: where it is (yellow), where ICP put it (red)")
     save_figure(figure, pdf_path, png_path)
 

@@ -13,10 +13,10 @@ from gpca.gradients.metrics import DELETION_COLUMNS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
-from gpca.reporting.figures.style import LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, save_figure, use_style, write_title
+from gpca.reporting.figures.style import LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
 
 HEIGHT_IN = 2.75
-COLOURS = "viridis"
+PALEST = -0.25  # White, which no point has, is so far below the least rank.
 
 
 def draw_saliency(
@@ -51,6 +51,7 @@ def draw_saliency(
     use_style()
     import matplotlib.pyplot as plt
     from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     below_title = ConstrainedLayoutEngine(rect=(0, 0, 1, 1 - 0.2 / HEIGHT_IN))
@@ -63,7 +64,9 @@ def draw_saliency(
             _draw_map(panel, registrations.target(test[sample]), *of_sample)
             score = rows.loc[rows["sample"] == str(sample), ["named", "before"]].iloc[0]
             panel.set_title(f"{concept}: named {score['named']}, {score['before']:.2f}", fontsize=SMALL_PT + 1)
-    bar = figure.colorbar(ScalarMappable(cmap=COLOURS), ax=axes, shrink=0.75, pad=0.01, ticks=[0, 0.5, 1])
+    ranked = ScalarMappable(Normalize(PALEST, 1), blues())
+    bar = figure.colorbar(ranked, ax=axes, shrink=0.75, pad=0.01, ticks=[0, 0.5, 1])
+    bar.ax.set_ylim(0, 1)
     bar.set_label("rank of the point's saliency", fontsize=SMALL_PT)
     bar.ax.set_yticklabels(["least", "median", "most"], fontsize=SMALL_PT)
     write_title(figure, f"{title}: points that GP-CA's score reacts to")
@@ -83,5 +86,5 @@ def _draw_map(panel, target_Q_3: np.ndarray, points_N_3: np.ndarray, saliency_N:
     panel.scatter(target[:, 0], target[:, 1], s=0.6, c=LIGHT_GREY, linewidths=0)
     order = np.argsort(saliency_N, kind="stable")
     ranks = np.linspace(0, 1, len(order))
-    panel.scatter(points[order, 0], points[order, 1], s=5, c=ranks, cmap=COLOURS, vmin=0, vmax=1, linewidths=0)
-    panel.set_aspect("equal")
+    panel.scatter(points[order, 0], points[order, 1], s=5, c=ranks, cmap=blues(), vmin=PALEST, vmax=1, linewidths=0)
+    panel.set_aspect("equal", adjustable="datalim")

@@ -14,6 +14,8 @@ from gpca.reporting.figures.panels import in_lines
 from gpca.reporting.figures.style import (
     BLACK,
     GREY,
+    METHOD_LOOKS,
+    OTHER_LOOK,
     PALETTE,
     SMALL_PT,
     TEXT_WIDTH_IN,
@@ -85,15 +87,16 @@ def draw_severity_curves(
 
 
 def _draw_curves(panel, of_concept: pd.DataFrame, shown: list[str], explainers: Mapping[str, str]) -> None:
-    for number, method in enumerate([REGISTRATION, *shown]):
+    known = {METHOD_LOOKS[name][0] for name in shown if name in METHOD_LOOKS}
+    looks = iter((colour, line, 1.1) for line in LINES for colour in PALETTE if colour not in {*known, BLACK})
+    for method in [REGISTRATION, *shown]:
         rows = of_concept[of_concept["method"] == method].sort_values("low")
         middles = 100 * (rows["low"] + rows["high"]) / 2
         if method == REGISTRATION:
             style = {"color": BLACK, "linewidth": 2.2, "label": SUCCEEDS, "alpha": 0.5}
         else:
-            line = LINES[(number - 1) // (len(PALETTE) - 1) % len(LINES)]
-            colour = PALETTE[(number - 1) % (len(PALETTE) - 1)]
-            style = {"color": colour, "linestyle": line, "linewidth": 1.1, "label": explainers[method]}
+            colour, line, width = METHOD_LOOKS[method] if method in METHOD_LOOKS else next(looks, OTHER_LOOK)
+            style = {"color": colour, "linestyle": line, "linewidth": width, "label": explainers[method]}
         panel.plot(middles, 100 * rows["value"], marker="o", markersize=2.2, **style)
 
 

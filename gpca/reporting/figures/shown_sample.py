@@ -36,6 +36,7 @@ class Stages:
         h_S_d: Their embeddings.
         predictions: What GP-CA said of each.
         u_S: Their uncertainty in nats, NaN where it is not known.
+        u_clean: What 95 % of the clean pairs stay below, in nats.
         limits: The limits of the errors that their states are told apart by.
     """
 
@@ -43,6 +44,7 @@ class Stages:
     h_S_d: np.ndarray
     predictions: pd.DataFrame
     u_S: np.ndarray
+    u_clean: float
     limits: Limits
 
     @classmethod
@@ -71,25 +73,35 @@ class Stages:
             if column not in predictions:
                 raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
             predictions[column] = numbers(predictions_csv, predictions, column)
-        u_S, _ = observed_uncertainties(uncertainty_csv, registrations)
-        return cls(registrations, h_S_d, predictions, u_S, Limits(**limits))
+        uncertain = observed_uncertainties(uncertainty_csv, registrations)
+        return cls(registrations, h_S_d, predictions, *uncertain, Limits(**limits))
 
-    def choose(self, concept: str, path: str | Path) -> int:
-        """Return the row that is shown, a test sample of the concept named right after a failed registration.
+    def choose(self, concept: str, path: str | Path, *others: str) -> int:
+        """Return the row that is shown, a test sample of the concept whose registration is really uncertain.
 
-        Where none failed, the method keeps the half that ICP fits worst, of the samples named right (of all, where none
-        is): people ask for an explanation when a registration looks bad. It returns the one of these with the median
-        score of the concept, or raises an InputError that names `path` where there is no test sample of the concept.
+        Of those named right after a registration that failed and is more uncertain than 95 % of the clean pairs, it is
+        the one with the median score. Where the concept has none such, one of the `others` may have; where they have
+        none either, the wishes are dropped one by one: first that it failed, then that it is uncertain (the half that
+        ICP fits worst is kept), then that it is named right. Where there is no test sample of the concept, an
+        InputError names `path`.
         """
+        for other in (concept, *others):
+            if len(failures := self._uncertain_failures(other)):
+                return _median(failures, other)
         test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
         if test.empty:
             raise InputError(path, f"holds no test sample of '{concept}'", "raise registrations.test")
         right = test[test["concept_predicted"] == concept]
         kept = test if right.empty else right
-        failed = kept[[self.state(row) == FAILED for row in kept.index]]
+        uncertain = kept[self.u_S[kept.index] > self.u_clean]
         worst = kept.assign(fit=self.registrations.fitness[kept.index]).nsmallest((len(kept) + 1) // 2, "fit")
-        ranked = (worst if failed.empty else failed).sort_values([f"score_{concept}", "sample"], kind="stable")
-        return int(ranked.index[(len(ranked) - 1) // 2])
+        return _median(uncertain if len(uncertain) else worst, concept)
+
+    def _uncertain_failures(self, concept: str) -> pd.DataFrame:
+        rows = self.predictions
+        found = rows[(rows["split"] == "test") & (rows["concept_true"] == concept) & (self.u_S > self.u_clean)]
+        found = found[found["concept_predicted"] == concept]
+        return found[[self.state(row) == FAILED for row in found.index]]
 
     def error(self, row: int) -> float:
         """Return how far off a row is after ICP, in diameters."""
@@ -120,8 +132,14 @@ class Stages:
         """Return what is known of a pose: of ``init`` what was perturbed, of ``icp`` how far off it is, and u."""
         if which == "init":
             return severity_text(self.registrations, row, str(self.registrations.concept[row]))
-        uncertain = "" if np.isnan(self.u_S[row]) else f"\n$u$ = {self.u_S[row]:.1f} nats"
+        uncertain = "" if np.isnan(self.u_S[row]) else f"\n$u$ = {self.u_S[row]:.1f} nats (clean: < {self.u_clean:.1f})"
         return f"{self.state(row)}, ADD-S {100 * self.error(row):.1f} % $d${uncertain}"
+
+
+def _median(rows: pd.DataFrame, concept: str) -> int:
+    """Return the row of the median score of a concept."""
+    ranked = rows.sort_values([f"score_{concept}", "sample"], kind="stable")
+    return int(ranked.index[(len(ranked) - 1) // 2])
 
 
 def draw_embedding(axes, h_d: np.ndarray) -> None:

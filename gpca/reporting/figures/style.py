@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from gpca.files import whole_file
 
@@ -29,6 +30,16 @@ SOURCE_COLOUR = BLUE
 CONCEPT_COLOURS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
 CONCEPT_MARKERS = {"noise": "o", "pose": "s", "overlap": "^"}
 SMALL_PT = 7  # No letters are smaller.
+
+# Where many methods share a panel, the paper's have a colour, a line and a width, and all others are grey.
+METHOD_LOOKS: dict[str, tuple[str, Any, float]] = {
+    "gpca_paper": (BLUE, (0, (4, 2)), 1.8),
+    "gpca": (BLUE, "-", 1.8),
+    "learner_forest": (VERMILION, "-", 1.4),
+    "learner_linear_svm": (ORANGE, "-", 1.4),
+    "gpca_pair": (GREEN, "-", 1.8),
+}
+OTHER_LOOK = (LIGHT_GREY, "-", 0.9)
 
 
 def use_style() -> None:

@@ -1,11 +1,19 @@
+import pandas as pd
 import pytest
 
 from baselines.registry import explainer_entry
 from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.reporting.figures.learners import draw_coverage_risk, draw_reliability, draw_uncertainty_vs_distance
+from gpca.reporting.figures import style
+from gpca.reporting.figures.learners import (
+    distance_curve,
+    draw_coverage_risk,
+    draw_reliability,
+    draw_uncertainty_vs_distance,
+)
 from gpca.shift.learners import predict_sets
-from gpca.shift.metrics import read_learner_predictions
+from gpca.shift.metrics import read_learner_predictions, sets_of, uncertainty_metrics
+from gpca.shift.sets import DISTANCES
 from tests.shift.test_learners import quick
 from tests.shift.test_sets import sets
 
@@ -50,3 +58,37 @@ def test_without_predictions_nothing_is_drawn(learned, draw, tmp_path):
         with pytest.raises(InputError, match="hold no predictions of these sources and learners"):
             draw(learned, sources, learners, tmp_path / "a.pdf", tmp_path / "a.png")
     assert not list(tmp_path.iterdir())
+
+
+def drawn_by(draw, learned, tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(style, "save_png", lambda figure, path: figures.append(figure))
+    draw(learned, SOURCES, LEARNERS, tmp_path / "a.pdf", tmp_path / "a.png")
+    return figures[0]
+
+
+def test_rho_is_the_tables_alone_and_with_each_shift(learned, tmp_path, monkeypatch):
+    figure = drawn_by(draw_uncertainty_vs_distance, learned, tmp_path, monkeypatch)
+    written = [[text.get_text() for text in panel.texts] for panel in figure.axes]
+    names = ("in_distribution", "in_distribution+severity", "seen_objects+objects")  # There is no other source.
+    assert len(figure.axes) == len(names) * len(SOURCES)
+    rho = f"rho_max_score_{DISTANCES[0]}"
+    for row, name in enumerate(names):
+        for column, source in enumerate(SOURCES):
+            expected = uncertainty_metrics(sets_of(learned[source, "gpca", 0])[name])[rho]
+            assert f"{expected:.3f}" in written[2 * row + column], (name, source)
+
+
+@pytest.mark.parametrize("draw", [draw_coverage_risk, draw_uncertainty_vs_distance])
+def test_the_papers_learners_have_a_colour_and_the_others_are_grey(learned, draw, tmp_path, monkeypatch):
+    figure = drawn_by(draw, learned, tmp_path, monkeypatch)
+    colours = [line.get_color() for line in figure.axes[0].get_lines()]
+    assert colours == [style.LIGHT_GREY, style.LIGHT_GREY, style.BLUE]  # in the order of drawing
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["GPC", "2 others"]
+
+
+def test_bins_of_distance_hold_equally_many_samples():
+    rows = pd.DataFrame({DISTANCES[0]: range(20, 0, -1), "max_score": [0.1] * 10 + [0.5] * 10})
+    distance, score = distance_curve([rows[:5], rows[5:]])
+    assert distance.tolist() == [1.5 + 2 * n for n in range(10)]
+    assert score.tolist() == pytest.approx([0.5] * 5 + [0.1] * 5)

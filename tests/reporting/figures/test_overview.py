@@ -19,7 +19,8 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
     assert f"{sample['score_pose']:.2f}±0.12" in written
     assert f"{sample['score_noise']:.2f}±0.10" in written
     assert f"{sample['score_overlap']:.2f}±0.05" in written
-    assert "nats" in stages.words(row, "icp")
+    assert stages.u_S[row] > stages.u_clean
+    assert "nats (clean: < 1.0)" in stages.words(row, "icp")
     assert f"aligned: {stages.words(row, 'icp')}" in written
     assert any(f"{100 * of.severity_translation[row]:.0f} % $d$" in words for words in written)
     assert f"Solids (procedural stand-in): {of.object_name[row]}" in written

@@ -15,7 +15,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.reporting.figures.frame_views import draw_scores, read_samples
 from gpca.reporting.figures.real_world_confusions import draw_real_world_confusions
-from gpca.reporting.figures.real_world_example import choose_sample, draw_real_world_example
+from gpca.reporting.figures.real_world_example import choose_sample, covered, draw_real_world_example
 from gpca.reporting.figures.real_world_failures import _mistakes, draw_real_world_failures
 
 
@@ -64,12 +64,32 @@ def test_the_most_confident_mistakes_come_first(results):
 
 def test_fig5_shows_a_test_sample_that_an_occluder_covers_and_that_is_named_right(results):
     samples = read_samples(results / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
-    shown = samples.iloc[choose_sample(samples, "predictions")]
+    pixels_I = np.arange(samples["instance"].max() + 1)
+    shown = samples.iloc[choose_sample(samples, "predictions", pixels_I)]
     assert (shown["split"], shown["concept_true"], shown["lost_to"]) == ("test", "overlap", OCCLUDER)
     wrong = samples.assign(concept_predicted="noise")
-    assert wrong.iloc[choose_sample(wrong, "predictions")]["concept_true"] == "overlap"
+    assert wrong.iloc[choose_sample(wrong, "predictions", pixels_I)]["concept_true"] == "overlap"
     with pytest.raises(InputError, match="holds no test sample of overlap"):
-        choose_sample(samples[samples["concept_true"] != "overlap"], "predictions")
+        choose_sample(samples[samples["concept_true"] != "overlap"], "predictions", pixels_I)
+
+
+def test_fig5_shows_an_object_that_is_large_in_its_image():
+    rows = {"split": "test", "concept_true": "overlap", "concept_predicted": "overlap", "lost_to": OCCLUDER}
+    samples = pd.DataFrame(
+        {**rows, "instance": range(5), "sample": range(5), "score_overlap": [0.9, 0.8, 0.7, 0.6, 0.5]}
+    )
+    assert choose_sample(samples, "predictions", np.array([100, 3, 200, 1, 300])) == 2  # the median of 0, 2 and 4
+
+
+def test_what_is_covered_is_what_lies_not_between_the_points_that_were_kept():
+    v, u = np.mgrid[10:40, 20:60]
+    own = np.column_stack([u.ravel(), v.ravel()])
+    left = own[own[:, 0] < 40]
+    some = left[np.random.default_rng(0).permutation(len(left))[:300]] + 0.3  # every other one, between the pixels
+    mask = covered(own, some, (50, 80))
+    assert mask[12:38, 44:60].all()
+    assert not mask[12:38, 22:38].any()
+    assert not mask[:10].any() and not mask[:, 60:].any()
 
 
 def test_all_three_are_drawn_and_drawing_again_changes_no_byte(results, tmp_path):

@@ -32,6 +32,20 @@ def test_a_calibrated_score_lies_on_the_diagonal():
     plt.close()
 
 
+def test_the_panel_is_square_and_counts_the_samples_of_each_bin():
+    random = np.random.default_rng(0)
+    probability = random.uniform(size=500) ** 3
+    figure, panel = plt.subplots()
+    draw_reliability_panel(panel, probability, random.uniform(size=500) < probability, bins=10)
+    counts = figure.axes[1]
+    expected = np.histogram(probability, bins=10, range=(0, 1))[0]
+    assert [bar.get_height() for bar in counts.patches] == expected.tolist()
+    assert counts.get_yscale() == "log" and counts.get_ylim()[1] > expected.max() ** 1.5
+    assert panel.get_box_aspect() == counts.get_box_aspect() == 1
+    assert panel.get_xlim() == panel.get_ylim()
+    plt.close()
+
+
 def test_the_figure_is_the_same_bytes_each_time(tmp_path):
     judged = {("cups", "gpca_pair", seed): random_judged(seed=seed) for seed in (100, 101)}
     drawn = []

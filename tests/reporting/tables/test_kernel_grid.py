@@ -2,8 +2,10 @@ import pandas as pd
 import pytest
 
 from gpca.classifier.kernel_grid import GRID_COLUMNS
+from gpca.comparison.published import read_published
 from gpca.errors import InputError
-from gpca.reporting.figures.kernel_grid import draw_kernel_curves
+from gpca.reporting.figures import style
+from gpca.reporting.figures.kernel_grid import PRINTED_MARKERS, draw_kernel_curves, printed_accuracies
 from gpca.reporting.tables.kernel_grid import PRINTED, table4_grid, table4_kernels
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
@@ -66,12 +68,27 @@ def test_the_figure_is_the_same_bytes_each_time(tmp_path):
     drawn = []
     for attempt in ("a", "b"):
         paths = [tmp_path / f"{attempt}.{suffix}" for suffix in ("pdf", "png")]
-        draw_kernel_curves(grid(), {"ycb": "YCB", "linemod": "LINEMOD (procedural stand-in)"}, *paths)
+        draw_kernel_curves(grid(), {"ycb": "YCB", "linemod": "LINEMOD (procedural stand-in)"}, read_published(), *paths)
         drawn.append([path.read_bytes() for path in paths])
     assert drawn[0] == drawn[1]
 
 
+def test_the_figure_has_the_accuracies_that_the_paper_prints(tmp_path, monkeypatch):
+    printed = printed_accuracies(read_published(), "linemod")
+    assert set(printed) == set(PRINTED)
+    assert printed["rbf", 0.001, 200] == 50.6
+    figures = []
+    monkeypatch.setattr(style, "save_png", lambda figure, path: figures.append(figure))
+    draw_kernel_curves(grid(), {"linemod": "LINEMOD"}, read_published(), tmp_path / "a.pdf", tmp_path / "a.png")
+    panels = figures[0].axes
+    drawn = [
+        sorted(line.get_ydata()[0] for line in panel.get_lines() if line.get_marker() in PRINTED_MARKERS)
+        for panel in panels
+    ]
+    assert drawn == [sorted(printed.values()), []]  # accuracies; the paper prints no confidence
+
+
 def test_without_a_grid_of_these_sources_nothing_is_drawn(tmp_path):
     with pytest.raises(InputError, match="hold nothing of these sources"):
-        draw_kernel_curves(grid(), {"cups": "Cups"}, tmp_path / "a.pdf", tmp_path / "a.png")
+        draw_kernel_curves(grid(), {"cups": "Cups"}, read_published(), tmp_path / "a.pdf", tmp_path / "a.png")
     assert not list(tmp_path.iterdir())
