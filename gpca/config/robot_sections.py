@@ -85,6 +85,7 @@ class Recovery:
     treatments: Annotated[dict[str, str], Named(dict.fromkeys(CONCEPTS, str), closed=True)]
     actions: Annotated[dict[str, dict | None], Bounds(minProperties=1)]  # an action checks its settings itself
     costs: dict[str, Share]
+    needless: Share
     thresholds: DeclaredThresholds
     rehearsals: Count
     loop: Annotated[LoopSettings, Keys(required=("failures", "tries", "budget"), without=("cloud_points", "icp"))]

@@ -66,6 +66,14 @@ def reinitialise(holding: Holding, robot: Robot, random: np.random.Generator, st
 
     The results of least cost are judged, see :func:`best_start`.
     """
+    return best_start(holding, robot, search(holding, robot, random, starts))
+
+
+def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: int) -> list[np.ndarray]:
+    """Return the `JUDGED` poses ``T_world_object`` of least cost that ICP with a larger reach ends at.
+
+    It starts from the pose held and from random orientations; none is found where there are too few points.
+    """
     from scipy.spatial.transform import Rotation
 
     from gpca.alignment.batched_icp import BatchedICP
@@ -74,7 +82,7 @@ def reinitialise(holding: Holding, robot: Robot, random: np.random.Generator, st
     d = robot.diameter_m
     cloud_m = fuse(holding.shots, d, holding.filtered)
     if len(cloud_m) < 3:
-        return holding
+        return []
     thinned_m = cloud_m[random.permutation(len(cloud_m))[:CLOUD_POINTS]]
     rows = random.permutation(len(robot.points_m))[:MODEL_POINTS]
     model_m = robot.points_m[rows].astype(np.float64)
@@ -90,8 +98,7 @@ def reinitialise(holding: Holding, robot: Robot, random: np.random.Generator, st
     poses_n, fitness_n, rmse_n = icp.register(thinned_m / d, starts_n)
     reach = LOOSER * settings.correspondence_distance
     cost_n = fitness_n * rmse_n**2 + (1 - fitness_n) * reach**2
-    found = [inverse(scale_translation(poses_n[n], d)) for n in np.argsort(cost_n, kind="stable")[:JUDGED]]
-    return best_start(holding, robot, found)
+    return [inverse(scale_translation(poses_n[n], d)) for n in np.argsort(cost_n, kind="stable")[:JUDGED]]
 
 
 def new_view(

@@ -1,4 +1,4 @@
-"""What the calibration samples decide: the robot's thresholds, and how far each explainer can be trusted."""
+"""What is settled before a policy decides: the robot's thresholds, and how far each explainer can be trusted."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ import numpy as np
 
 from gpca.recovery.loop_explainers import LoopExplainers
 from gpca.recovery.policy import RecoveryPolicy
+from gpca.recovery.rehearsal import Rehearsal
 
-FEWEST_FAILED = 10  # calibration samples, for a threshold to be chosen on the failed ones alone
 
+def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
+    """Return the declared thresholds, and the one that is chosen on the rehearsed failures unless it is declared.
 
-def robot_policy(recovery: Mapping, explainers: LoopExplainers, failed_N: np.ndarray) -> RecoveryPolicy:
-    """Return the declared thresholds, and the one that is chosen on the calibration samples unless it is declared.
-
-    It is chosen on those that failed (N,), since a policy is asked about such; on all where hardly any did.
+    Those were searched for as the failures are that policies are asked about, on other tables. Without a rehearsal no
+    policy queues anything.
 
     Args:
         recovery: the config's section.
     """
-    gpca = explainers.calibration.get("gpca")
-    bald_N = np.full(len(failed_N), np.inf) if gpca is None else gpca.bald_N
-    rows = failed_N if failed_N.sum() >= FEWEST_FAILED else np.ones(len(failed_N), bool)
+    bald_N = np.array([rehearsal.bald[episode.number] for episode in rehearsal.failures] if rehearsal else [np.inf])
     attempts = recovery["loop"]["budget"]
-    return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N[rows])
+    return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N)
 
 
 def summary(policy: RecoveryPolicy, explainers: LoopExplainers) -> dict:

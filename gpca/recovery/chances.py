@@ -1,4 +1,4 @@
-"""Chances, learnt from failures of the training tables: that a pose is right, and that an action makes it right."""
+"""Chances, learnt on the training tables: that a pose is right as it is, and that an action makes a wrong one right."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class Chances:
 
 
 def learn_utility(
-    trials: Iterable[Sequence[Trial]], costs: Mapping[str, float], actions: Sequence[str]
+    trials: Iterable[Sequence[Trial]], costs: Mapping[str, float], actions: Sequence[str], needless: float = 0.0
 ) -> ExpectedUtility:
     """Return the policy that the trials of these episodes teach."""
     together = [trial for of_episode in trials for trial in of_episode]
-    return ExpectedUtility(Chances(together, actions), {action: costs[action] for action in actions})
+    return ExpectedUtility(Chances(together, actions), {action: costs[action] for action in actions}, needless)
 
 
 def _fitted(trials: Sequence[Trial], inverse_regularisation: float) -> Any:
@@ -73,32 +73,37 @@ class ExpectedUtility:
     """Takes the action whose success is worth most by what it costs, and none that is not worth it.
 
     A right pose is worth 1. With the chance p that the pose is right as it is and the chance p_a that action a makes a
-    wrong one right, the action gains (1 - p) p_a - c_a over doing nothing. The k actions of the largest p_a also have
-    the largest chance that any of k helps (if they help independently of each other, given what is known), so that one
-    order is best for every budget k where costs are alike.
+    wrong one right, the action gains (1 - p) p_a - p b - c_a over doing nothing, where b is what it costs to act
+    needlessly. The k actions of the largest p_a also have the largest chance that any of k helps (if they help
+    independently of each other, given what is known), so that one order is best for every budget k where costs are
+    alike.
 
     Attributes:
         chances: learnt on the training tables.
         costs: action -> c_a, in right poses.
+        needless: b, in right poses.
     """
 
     chances: Chances
     costs: Mapping[str, float]
+    needless: float = 0.0
 
-    def decide(self, known_F: np.ndarray, before: Iterable[str]) -> Decision:
+    def decide(self, known_F: np.ndarray, before: Iterable[str], alarmed: bool = False) -> Decision:
         """Choose what is done next.
 
         An action that was taken without success comes again only after all others. A robot that is asked again knows
-        that its pose is wrong yet.
+        that its pose is wrong yet, as one does that was alarmed.
         """
         before = list(before)
+        wrong = alarmed or bool(before)
         fewest = min(before.count(action) for action in self.costs)
-        gains = self.gains(known_F, 0.0 if before else self.chances.of(NOTHING, known_F))
+        gains = self.gains(known_F, 0.0 if wrong else self.chances.of(NOTHING, known_F))
         best = max((action for action in gains if before.count(action) == fewest), key=lambda action: gains[action])
         if gains[best] > 0:
             return Decision(best, "", f"{best} gains {gains[best]:.2f}")
-        return Decision(QUEUE if before else NOTHING, "", f"no action is worth its cost: {best} {gains[best]:.2f}")
+        return Decision(QUEUE if wrong else NOTHING, "", f"no action is worth its cost: {best} {gains[best]:.2f}")
 
     def gains(self, known_F: np.ndarray, right: float) -> dict[str, float]:
         """Return what each action gains over doing nothing, where the pose is right with this chance."""
-        return {a: (1 - right) * self.chances.of(a, known_F) - cost for a, cost in self.costs.items()}
+        certain = right * self.needless
+        return {a: (1 - right) * self.chances.of(a, known_F) - certain - cost for a, cost in self.costs.items()}

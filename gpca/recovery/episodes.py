@@ -20,9 +20,10 @@ from gpca.recovery.actions import Action
 from gpca.recovery.cases import Attempt, RobotIn, register_after, register_first, register_misplaced
 from gpca.recovery.observation import observe
 from gpca.recovery.settings import LoopSettings
+from gpca.seeds import generator
 
 POSE = "pose"  # the cause that disturbs nothing but ICP's start
-MISPLACED = 40  # so many of its starts are tried in one situation, at most
+MISPLACED = 40  # so many of its starts are tried in a situation until one fails; in every other one, only the first
 
 
 class Episode:
@@ -49,7 +50,8 @@ class Episode:
         """Return what the robot observes after these actions, see :func:`gpca.recovery.observation.observe`."""
         if actions not in self._observed:
             attempt = self.outcomes[actions]
-            self._observed[actions] = observe(attempt.holding, attempt.record, RobotIn(self.situation))
+            random = generator(*self.situation.axes, "observe", *actions)
+            self._observed[actions] = observe(attempt.holding, attempt.record, RobotIn(self.situation), random)
         return self._observed[actions]
 
     def take(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> Attempt:
@@ -84,7 +86,8 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
         for number in progress(range(settings.tries), f"failures by {cause}"):
             if len(found[True]) == settings.failures:
                 break
-            case, tried = _try_situation(situations, cause, number, settings)
+            misplaced = 1 if number % 2 and len(found[False]) < settings.failures else MISPLACED
+            case, tried = _try_situation(situations, cause, number, settings, misplaced)
             tries[cause] += tried
             if case and len(of_kind := found[not is_right(case[1])]) < settings.failures:
                 of_kind.append(case)
@@ -97,11 +100,14 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
 
 
 def _try_situation(
-    situations: Situations, cause: str, number: int, settings: LoopSettings
+    situations: Situations, cause: str, number: int, settings: LoopSettings, misplaced: int
 ) -> tuple[tuple[Situation, Attempt] | None, int]:
     """Register a disturbed situation, and the clean one where that failed; of bad poses, until one fails.
 
     A pose error changes nothing but ICP's start, so several are tried on the same measurement and the same estimate.
+
+    Args:
+        misplaced: how many of these, at most.
 
     Returns:
         the situation with its registration, or None where that failed without the cause too; how many were made.
@@ -122,5 +128,5 @@ def _try_situation(
         situation = situations.misplaced(clean, tried)
         attempt = register_misplaced(situation, estimated, points, icp)
         assert attempt is not None  # the same points were registered before
-        if tried == MISPLACED or not is_right(attempt):
+        if tried == misplaced or not is_right(attempt):
             return (situation, attempt), tried

@@ -98,12 +98,21 @@ def never_queue(means: Means) -> Decide:
 
 def weigh_chances(means: Means) -> Decide:
     """Take what is worth most by its learnt chance and its cost (:class:`gpca.recovery.chances.ExpectedUtility`)."""
+    return _weigh(means, alarmed=False)
+
+
+def weigh_alarmed(means: Means) -> Decide:
+    """Do the same as if told that the pose is wrong, so that actions are compared apart from recognising failures."""
+    return _weigh(means, alarmed=True)
+
+
+def _weigh(means: Means, alarmed: bool) -> Decide:
     utility = means.utility
     assert utility is not None  # whoever learns is given rehearsals
 
     def decide(case: Case) -> Decision:
         assert case.known_F is not None
-        return utility.decide(case.known_F, case.actions)
+        return utility.decide(case.known_F, case.actions, alarmed)
 
     return decide
 
@@ -145,6 +154,7 @@ POLICIES = {
     "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
     "utility": PolicyEntry("Expected utility, learnt", weigh_chances, explainer="gpca", learns=True),
+    "utility_acting": PolicyEntry("Expected utility, alarmed", weigh_alarmed, explainer="gpca", learns=True),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
     "random": PolicyEntry("Random action", act_at_random),

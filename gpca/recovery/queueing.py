@@ -126,8 +126,8 @@ def learners_of(
     entries = {name: policy_entry(name, means.actions) for name in policies}
     learners: dict[str, Callable[[], Learner]] = {}
     for name, entry in entries.items():
-        if not (entry.learns or entry.queues):
-            continue
+        if not (entry.learns or entry.queues) or any(entry.learns and entries[other].learns for other in learners):
+            continue  # policies of the same chances learn the same
         starts = [starts_of(episodes, means.actions) for episodes in (queued, judged)]
         if entry.queues:
             own, others = (explainers.attach[entry.explainer](registrations) for registrations in starts)

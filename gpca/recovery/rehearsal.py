@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,10 +17,17 @@ from gpca.recovery.settings import LoopSettings
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """Episodes of the training tables, and the trials of each by its number."""
+    """Episodes of the training tables.
+
+    Attributes:
+        episodes: those that failed, and those that did not.
+        trials: of each by its number.
+        bald: of each by its number, at its start, in nats.
+    """
 
     episodes: Sequence[Episode]
     trials: Mapping[int, Sequence[Trial]]
+    bald: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def failures(self) -> list[Episode]:
@@ -59,4 +66,4 @@ def rehearse(
     for episode, sequence in taken:
         right = is_right(episode.take(sequence, actions, settings))
         trials[episode.number].append(Trial(state(episode, sequence[:-1]), sequence[-1], right))
-    return Rehearsal(episodes, trials)
+    return Rehearsal(episodes, trials, {e.number: answers.history(explainer, e.number, ())[0].bald for e in episodes})

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from gpca.alignment.pose_error import CORRECT
 from gpca.environment import require_open3d
 from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
@@ -60,18 +59,15 @@ def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
 
 def register_situations(
     situations: Mapping[str, Situations], train: int, calibration: int, settings: LoopSettings
-) -> tuple[Registrations, np.ndarray]:
-    """Register situations of all causes, failed or not: what the classifier learns from, and is calibrated on.
+) -> Registrations:
+    """Register situations of all causes, failed or not: what the classifier learns from, and is judged by.
 
     Samples 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
 
     Args:
         situations: those of ``train`` and ``test``, which share no table.
-
-    Returns:
-        the registrations, and which of them failed (S,).
     """
-    records, failed = [], []
+    records = []
     for split, count in (("train", train), ("test", calibration)):
         for number in progress(range(count), f"situations of split {split}"):
             cause = CONCEPTS[number % len(CONCEPTS)]
@@ -81,5 +77,4 @@ def register_situations(
                 start = register_first(situation, settings.cloud_points, settings.icp)
                 redraw += 1
             records.append(start.record | {"sample": number, "split": split})
-            failed.append(start.error > CORRECT)
-    return as_registrations(records)[0], np.array(failed)
+    return as_registrations(records)[0]

@@ -56,7 +56,7 @@ def run(options: Namespace) -> None:
     axes = (SOURCE, options.seed)
     with record_provenance(outputs, data_files(objects), options.settings, seed=options.seed):
         tables = lay_tables(surfaces(objects, options.downloads), settings, *axes)
-        registrations, failed_S = register_situations(tables, recovery["train"], recovery["calibration"], loop)
+        registrations = register_situations(tables, recovery["train"], recovery["calibration"], loop)
         explainers = learn_explainers(
             [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],
             registrations,
@@ -66,13 +66,15 @@ def run(options: Namespace) -> None:
             recovery["remedied"],
             *axes,
         )
-        policy = robot_policy(recovery, explainers, failed_S[registrations.rows("test")])
-        _write_summary(options.policy, summary(policy, explainers))
-        means, rehearsal = Means(policy, tuple(actions)), None
+        rehearsal = utility = None
         if learner := next((entry.explainer for entry in entries if entry.learns or entry.queues), ""):
             training = find_episodes(tables["rehearsals"], replace(loop, failures=recovery["rehearsals"]))
             rehearsal = rehearse(training, actions, learner, explainers.explain[learner], loop)
-            means = replace(means, utility=learn_utility(rehearsal.trials.values(), recovery["costs"], tuple(actions)))
+            taught = rehearsal.trials.values()
+            utility = learn_utility(taught, recovery["costs"], tuple(actions), recovery["needless"])
+        policy = robot_policy(recovery, rehearsal)
+        _write_summary(options.policy, summary(policy, explainers))
+        means = Means(policy, tuple(actions), utility)
         episodes = find_episodes(tables["failures"], loop)
         rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes).run(recovery["policies"])
         judged = [episode for episode in episodes if episode.failed]

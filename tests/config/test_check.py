@@ -62,6 +62,7 @@ FAULTS = [
     ("recovery.costs.pray", 0.1, "recovery.costs: no action 'pray'; known are reinitialise, "),
     ("recovery.costs.denoise", 2, "recovery.costs.denoise: 2 is greater than the maximum of 1"),
     ("recovery.rehearsals", 0, "recovery.rehearsals: 0 is less than the minimum of 1"),
+    ("recovery.needless", 2, "recovery.needless: 2 is greater than the maximum of 1"),
     ("recovery.hidden", [0.9, 0.5], "recovery: recovery.hidden: [0.9, 0.5] runs downwards"),
     ("active_learning.stream.widow", 3, "active_learning.stream.widow: unknown; did you mean window?"),
     ("active_learning.strategies", ["bold"], "active_learning.strategies: no strategy 'bold'; known are random, "),

@@ -51,3 +51,13 @@ def test_costs_weigh_against_chances(chances):
     assert dear.decide(np.array([-1.0, 1.0]), ()).action == "new_view"
     hopeless = ExpectedUtility(chances, dict.fromkeys(COSTS, 1.0))
     assert hopeless.decide(np.array([-1.0, 1.0]), ("denoise",)).action == QUEUE
+
+
+def test_what_may_be_right_is_left_alone_where_needless_acts_are_dear(chances):
+    unsure = np.array([0.3, 1.0])
+    assert 0.5 < chances.of(NOTHING, unsure) < 0.9
+    assert ExpectedUtility(chances, COSTS).decide(unsure, ()).action == "denoise"
+    careful = ExpectedUtility(chances, COSTS, needless=1.0)
+    assert careful.decide(unsure, ()).action == NOTHING
+    assert careful.decide(unsure, ("denoise",)).action == "new_view"  # its pose is known to be wrong
+    assert careful.decide(unsure, (), alarmed=True).action == "denoise"

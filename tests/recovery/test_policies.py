@@ -47,6 +47,13 @@ def test_the_learnt_policy_decides_by_what_is_known_and_done():
     assert made("utility", utility)(case(("new_view",), known=np.zeros(1))).action != "new_view"
 
 
+def test_the_learnt_policy_leaves_alone_what_seems_right_unless_it_is_alarmed():
+    trials = [Trial(np.zeros(1), NOTHING, True)] * 30 + [Trial(np.zeros(1), "denoise", True)] * 8
+    utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.05))
+    assert made("utility", utility)(case(known=np.zeros(1))).action == NOTHING
+    assert made("utility_acting", utility)(case(known=np.zeros(1))).action == "denoise"
+
+
 def test_round_robin_takes_every_action_once_in_an_order_of_the_case():
     orders = set()
     for episode in range(12):

@@ -38,6 +38,7 @@ def metrics():
                 "acted_first": episodes,
                 "wrong_first": 0.5,
                 "queued": 0.0,
+                "left_alone": 0.125,
                 "actions": 1.5,
                 "cost": 0.03,
                 "nominal": episodes,
@@ -58,6 +59,7 @@ def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
     assert records["gpca", "recovered_within_1"][3:5] == (pytest.approx(100 * low), pytest.approx(100 * high))
     assert table.cells[0, "recovered_within_3_pose"].test_samples == 8
     assert table.cells[0, "seconds"].mean == 0.25
+    assert table.cells[0, "left_alone"].mean == pytest.approx(12.5)
     assert table.cells[0, "acted_nominal"].mean == pytest.approx(25)
     assert table.cells[0, "cost"].mean == pytest.approx(0.03)
     assert (1, "seconds") not in table.cells
