@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SAMPLE_COLUMNS = ("sample", "dataset", "scene")
+SAMPLES = "test_samples"
 STATE = "state_accuracy"
 TRUTH = "truth"  # in the place of an explainer: how many there are of a kind, ``count_<kind>``
 KINDS = (*LABELS, GEOMETRY, BORDERLINE, "scenes", "objects")
@@ -36,7 +37,8 @@ def collect(
 ) -> pd.DataFrame:
     """Return rows as :func:`gpca.diagnosis.intervals.collect` does, for explainers that have learnt from no frame.
 
-    Beside its measures stands `STATE`: the mean of the shares of the nominal and of the failed that are called so.
+    Beside its measures stand `STATE`, the mean of the shares of the nominal and of the failed that are called so, and
+    the number of `SAMPLES`; what has no value, as there are no samples for it, has no row.
     Intervals are over scenes, objects and seeds, which are drawn with replacement each. The counts of `KINDS` are those
     of all frames, and of each dataset alone, ``real_rgbd/{dataset}``.
 
@@ -44,7 +46,7 @@ def collect(
         causes_files, sample_files, prediction_files: one of each seed, in the same order, named ``…/seed{seed}.…``.
 
     Raises:
-        InputError: files that cannot be read, or are of different samples; no nominal or failed sample at all.
+        InputError: files that cannot be read, or are of different samples.
     """
     import pandas as pd
 
@@ -65,7 +67,7 @@ def collect(
     rows = _counts(REAL_WORLD, of_all)
     for dataset, of_dataset in of_all.groupby("dataset"):
         rows += _counts(f"{REAL_WORLD}/{dataset}", of_dataset)
-    rows += rows_of(REAL_WORLD, judged, drawn_B_N, _measured, (STATE, *MEASURES))
+    rows += rows_of(REAL_WORLD, judged, drawn_B_N, _measured, (SAMPLES, STATE, *MEASURES))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -86,6 +88,7 @@ def _seeds(causes_files, sample_files, prediction_files) -> Iterator[tuple[int, 
 
 def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     found = {STATE: _state_accuracy(samples, weights_B_N), **measure(samples, weights_B_N)}
+    found[SAMPLES] = np.full(len(weights_B_N), float(len(samples)))  # also where nothing else can be measured
     return {metric: value_B for metric, value_B in found.items() if np.isfinite(value_B[0])}
 
 

@@ -42,9 +42,9 @@ def clean_view(instances: Instances, i: int, mesh: MeshScene, surface_m: np.ndar
     points_m, pixels = instances.cloud_m(i).astype(np.float64), instances.pixels_of(i)
     met_m = met(mesh, points_m / points_m[:, 2:], T_camera_object)
     hit_P = np.isfinite(met_m).all(axis=1)
-    if not hit_P.any():
-        return None
     side_m, at_V_2, low_2, shape = _rendered(mesh, camera_3_3, T_camera_object, surface_m)
+    if not hit_P.any() or not len(side_m):
+        return None
     measured_m = transform(inverse(T_camera_object), points_m)
     if not hit_P.all():
         met_m[~hit_P] = met_m[hit_P][cKDTree(met_m[hit_P]).query(measured_m[~hit_P])[1]]

@@ -10,6 +10,7 @@ from gpca.attribution.bootstrap import REPEATS
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.diagnosis.frames import KINDS, STATE, TRUTH
 from gpca.diagnosis.judged import CEILING, POOLED
+from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import title_of
 from gpca.pairs.perturbation import CONCEPTS
@@ -100,10 +101,11 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
     for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
         rows = rows_where(of_frames, method=explainer).set_index("metric")
         table.add_row([(explainer, words)], _cells(rows, SHOWN_OF_FRAMES), rival=explainer != CEILING)
-    table.require_rows("intervals", "hold no diagnosis of frames", "run the step frame_causes first")
+    counted = rows_where(of_frames, method=TRUTH).set_index("metric")
+    if counted.empty or not table.rows:
+        raise InputError("intervals", "hold no diagnosis of frames", "run the step frame_causes first")
     table.compare_down([key for key in SHOWN_OF_FRAMES if key != "samples"])
-    counts = rows_where(of_frames, method=TRUTH).set_index("metric")["value"].astype(int)
-    of = {kind: counts[f"count_{kind}"] for kind in KINDS}
+    of = {kind: int(counted["value"][f"count_{kind}"]) for kind in KINDS}
     failed = {concept: of[concept] for concept in CONCEPTS}
     total = sum(failed.values())
     most = max(failed, key=lambda concept: failed[concept])
@@ -112,7 +114,7 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
         column_head="metric",
         columns=SHOWN_OF_FRAMES,
         footnotes=(
-            f"Of {table.cells[0, 'samples'].value:.0f} registrations {of[NOMINAL]} are nominal, {of[BORDERLINE]} "
+            f"Of {counted['samples'].iloc[0]:.0f} registrations {of[NOMINAL]} are nominal, {of[BORDERLINE]} "
             f"borderline, and {total} failed: {_list_of(failed)}. {of[GEOMETRY]} more are off without a cause. Always "
             f"naming {most} would be right for {100 * failed[most] / max(1, total):.0f} % of the failed.",
             f"± is half of the 95 % interval of {REPEATS} bootstrap draws over {plural(of['scenes'], 'scene')}, "
