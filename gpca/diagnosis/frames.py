@@ -71,8 +71,8 @@ def collect(
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _seeds(causes_files, sample_files, prediction_files) -> Iterator[tuple[int, Causes, pd.DataFrame, pd.DataFrame]]:
-    files = [list(paths) for paths in (causes_files, sample_files, prediction_files)]
+def _seeds(*given: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataFrame, pd.DataFrame]]:
+    files = [list(paths) for paths in given]
     if not files[0] or len({len(paths) for paths in files}) > 1:
         raise InputError("causes of frames", "files of every seed are needed", "give as many of each kind")
     for causes_file, sample_file, prediction_file in zip(*files, strict=True):
@@ -105,6 +105,7 @@ def _state_accuracy(samples: Judged, weights_B_N: np.ndarray) -> np.ndarray:
 def _counts(source: str, rows: pd.DataFrame) -> list[tuple]:
     """Return how many there are of each kind, with no interval and no rival."""
     found = Counter(rows["kind"].tolist())
-    found |= {"scenes": len(set(zip(rows["dataset"], rows["scene"], strict=True))), "objects": rows["object"].nunique()}
+    found["scenes"] = len(set(zip(rows["dataset"], rows["scene"], strict=True)))
+    found["objects"] = rows["object"].nunique()
     own, nothing = (len(rows), rows["seed"].nunique()), (np.nan, np.nan, "", np.nan, np.nan, np.nan)
     return [(source, TRUTH, f"count_{kind}", *own, float(found[kind]), *nothing) for kind in KINDS]

@@ -1,4 +1,4 @@
-"""The meshes of the objects that instances show, ready to be rendered."""
+"""The datasets that instances are read from, and the meshes of their objects, ready to be rendered."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.reading import CentredModel, Dataset, distinct_surfaces
-from gpca.frames.source import resolve_datasets
+from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.source import folders
 
@@ -27,6 +27,13 @@ def datasets_of(
     if not entries:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
     return {name: Dataset(name, tuple(folders(entry, downloads)), **_given(entry)) for name, entry in entries.items()}
+
+
+def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scenes: Path | None) -> list[Path]:
+    """Return the local files that :func:`datasets_of` reads, sorted."""
+    if scenes:
+        return sorted(path for pattern in patterns() for path in scenes.glob(pattern))
+    return frame_files(datasets or {}, data_dir)
 
 
 def meshes_of(

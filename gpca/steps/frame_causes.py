@@ -6,9 +6,10 @@ The explainers have learnt from registrations whose causes were drawn, those of 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.frames.instances import Instances
-from gpca.frames.meshes import datasets_of, meshes_of
+from gpca.frames.meshes import datasets_of, files_behind, meshes_of
 from gpca.frames.plausibility import require_of_objects
 from gpca.frames.reading import read_models, with_shared_models
 from gpca.objects.canonical import ObjectClouds
@@ -36,6 +37,9 @@ from gpca.pairs.dataset import Registrations, joined
 from gpca.provenance import record_provenance
 from gpca.steps import checked_sections
 from gpca.steps.diagnose import observed_only, training_rows, with_what_it_reads
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SECTIONS = {
     "frames": ("real_world", "causes"),
@@ -79,7 +83,8 @@ def run(options: Namespace) -> None:
     for name, settings in given["explainers"].items():
         require_settings(name, settings or {}, CAUSES)
     lessons = _files_of_sources(options)
-    inputs = [options.instances, options.objects, *(path for files in lessons for path in files)]
+    frames = files_behind(given["datasets"], options.data_dir, options.scenes)
+    inputs = [options.instances, options.objects, *frames, *(path for files in lessons for path in files)]
     outputs = [options.out, options.samples, options.predictions]
     with record_provenance(outputs, inputs, options.settings, seed=options.seed):
         causes, samples = _measure(options, given)
@@ -87,13 +92,13 @@ def run(options: Namespace) -> None:
         icp = ICPSettings(**given["icp"])
         described, _, _ = describe_all(causes, *axes, DescriptorSettings(**given["descriptors"]), icp)
         said = _Asked(causes, described, EncoderSettings(**given["encoder"]), axes, lessons)
-        frames = []
+        said_of: list[pd.DataFrame] = []
         for name, settings in given["explainers"].items():
             attribution = said.attribution(name, settings or {})
-            frames.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
+            said_of.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
         causes.save(options.out)
         write_csv(options.samples, samples)
-        write_csv(options.predictions, pd.concat(frames))
+        write_csv(options.predictions, pd.concat(said_of))
 
 
 def _files_of_sources(options: Namespace) -> list[tuple[Path, Path, Path, Path]]:
@@ -104,7 +109,7 @@ def _files_of_sources(options: Namespace) -> list[tuple[Path, Path, Path, Path]]
     return list(zip(options.causes, options.descriptors, options.encoders, options.embeddings, strict=True))
 
 
-def _measure(options: Namespace, given: dict):
+def _measure(options: Namespace, given: dict) -> tuple[Causes, pd.DataFrame]:
     instances, objects = Instances.load(options.instances), ObjectClouds.load(options.objects)
     require_of_objects(instances, objects, options.instances)
     chosen = FrameCauseSettings(**given["frames"])
@@ -169,7 +174,7 @@ class _Asked:
                 self._embedded.append((lessons, self._with({"embedding": h_S_d, "head_logits": logits_S_C})))
         return self._embedded
 
-    def _with(self, arrays) -> Registrations:
+    def _with(self, arrays: Mapping[str, np.ndarray]) -> Registrations:
         return replace(self._registrations, attached={**self._registrations.attached, **arrays})
 
 

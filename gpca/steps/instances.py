@@ -8,10 +8,9 @@ from pathlib import Path
 
 from gpca.arguments import SURFACE_POINTS
 from gpca.frames.initial_pose import InitialPoseSettings
-from gpca.frames.meshes import datasets_of
+from gpca.frames.meshes import datasets_of, files_behind
 from gpca.frames.plausibility import points_on_model
 from gpca.frames.reading import distinct_surfaces, read_instances, read_models, with_shared_models
-from gpca.frames.source import frame_files, patterns
 from gpca.objects.canonical import sample_objects
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
@@ -32,9 +31,7 @@ def run(options: Namespace) -> None:
     """Read models and frames, back-project the masks and find the initial poses."""
     check_settings(options.settings, "real_world")
     datasets = datasets_of(options.settings.get("datasets"), options.data_dir, options.downloads, options.scenes)
-    inputs = frame_files(options.settings.get("datasets"), options.data_dir)
-    if options.scenes:
-        inputs = sorted(path for pattern in patterns() for path in options.scenes.glob(pattern))
+    inputs = files_behind(options.settings.get("datasets"), options.data_dir, options.scenes)
     initial_pose = InitialPoseSettings(**options.settings.get("initial_pose", {}))
     declared = {**options.settings, "surface_points": options.surface_points}
     with record_provenance([options.out, options.objects], inputs, declared):

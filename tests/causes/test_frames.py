@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import transform
 from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.frames import chosen_instances, frame_candidate, measure_frames
 from gpca.causes.settings import CauseSettings
@@ -16,7 +15,7 @@ from gpca.frames.clean_view import clean_view
 from gpca.frames.meshes import meshes_of
 from gpca.frames.reading import Dataset, read_models
 
-SETTINGS = CauseSettings(clean_pairs=20)
+SETTINGS = CauseSettings(clean_pairs=20, points=(64, 96))
 POINTS = 256
 UNKNOWN = "bracket"  # no rotation leaves it as it is, so that ADD sees every error
 
@@ -87,7 +86,7 @@ def test_what_was_done_to_an_instance_is_its_cause(seen, tiny, meshes, change, c
 def test_nothing_is_wrong_with_what_is_whole_and_where_it_should_be(seen, tiny, meshes):
     causes, table = measured(seen, tiny[1], meshes)
     assert causes.truth.error[0, ALL] < SETTINGS.limits.nominal
-    assert table[["rotation_rad", "translation"]].to_numpy() == pytest.approx(0, abs=1e-6)
+    assert table[["rotation_rad", "translation"]].to_numpy() == pytest.approx(0, abs=1e-4)
     assert (table["noise"] < 0.005).all()  # the sensor is perfect, its image rounds
     again, _ = measured(seen, tiny[1], meshes)
     assert (again.truth.error == causes.truth.error).all()
@@ -101,7 +100,7 @@ def test_a_perfect_sensor_measures_what_is_rendered(seen, tiny, meshes):
     whole = clean_view(hidden(seen), 0, meshes[index], surface_m)
     assert whole.share == pytest.approx(view.share / 4, abs=0.05)
     assert len(whole.unmeasured) > len(view.unmeasured)
-    assert np.isfinite(transform(np.eye(4), whole.clean)).all()
+    assert np.isfinite(whole.clean).all()
 
 
 def test_the_model_is_what_the_camera_would_see_where_icp_starts(seen, tiny, meshes):

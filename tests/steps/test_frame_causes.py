@@ -31,7 +31,8 @@ def call(made, tiny, scenes, tmp_path_factory):
     tiny[0].save(folder / "instances.npz")
     tiny[1].save(folder / "objects.npz", "tiny")
     lessons = {"causes": "causes", "descriptors": "descriptors", "cause_embeddings": "embeddings"}
-    words = ["--scenes", scenes, "--source", "tiny", "--seed", "100", "--settings", json.dumps(SETTINGS)]
+    datasets = {"tiny": {"location": str(scenes)}}
+    words = ["--source", "tiny", "--seed", "100", "--settings", json.dumps(SETTINGS | {"datasets": datasets})]
     words += ["--instances", "instances.npz", "--objects", "objects.npz", "--encoders", made / "cause_weights.pt"]
     for name, option in lessons.items():
         words += [f"--{option}", made / f"{name}.npz"]
@@ -84,7 +85,7 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
     [
         ("--descriptors", ["descriptors.npz", "descriptors.npz"], "--descriptors: 2 file(s) for 1 of causes"),
         ("--instances", ["objects.npz"], "objects.npz: array"),
-        ("--scenes", ["."], "holds no test*/<scene>/scene_gt.json"),
+        ("--settings", [json.dumps({"datasets": {"tiny": {"location": "/not/there"}}})], "/not/there is not there"),
         ("--settings", [json.dumps({"frames": {"points": 3}})], "setting points: 3 is less than the minimum of 64"),
         ("--settings", [json.dumps({"explainers": {"oracle": {}}})], "explainer 'oracle': unknown; known are"),
         ("--out", ["objects.npz"], "objects.npz"),
