@@ -30,6 +30,7 @@ STEPS = {
     "train_on_causes": "causes -> encoder weights and embeddings of their aligned sources",
     "estimate": "causes -> covariances of the test registrations by every estimator, with errors",
     "diagnose": "causes, and descriptors or embeddings -> predictions of one explainer of causes",
+    "frame_causes": "instances of depth frames -> what made their registrations fail, and what explainers say of it",
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "train_control": "registrations -> embeddings by an encoder that is trained under a control",
     "controls": "registrations and embeddings -> predictions of every explainer under every control",

@@ -34,6 +34,8 @@ class Candidate:
         kept: (K,) rows of them that an occlusion leaves.
         T_init: 4×4, where a pose error starts: takes what was observed to a wrong place in the model's frame.
         severity: by name, 0 where not applied.
+        model_at_truth: (P, 3) the model where no pose error is, if it is rendered where the registration starts; None
+            where it is the same everywhere.
     """
 
     applied: np.ndarray
@@ -43,11 +45,16 @@ class Candidate:
     kept: np.ndarray
     T_init: np.ndarray
     severity: dict[str, float]
+    model_at_truth: np.ndarray | None = None
 
     def observed(self, causes: tuple[int, ...]) -> np.ndarray:
         """Return the observed cloud with these of the applied causes."""
         points = self.noisy if NOISE in causes else self.clean
         return points[self.kept] if OVERLAP in causes else points
+
+    def reference(self, causes: tuple[int, ...]) -> np.ndarray:
+        """Return the model's points that a registration with these of the applied causes is given."""
+        return self.model if POSE in causes or self.model_at_truth is None else self.model_at_truth
 
     def start(self, causes: tuple[int, ...]) -> np.ndarray:
         """Return the pose, 4×4, that a registration with these of the applied causes starts from."""

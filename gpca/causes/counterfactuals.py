@@ -44,10 +44,11 @@ class Registrar:
             Unmeasurable: no run found a correspondence, or a pose is not finite.
         """
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
-        observed, model = self.candidate.observed(causes), self.candidate.model
+        observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
         started = perf_counter()
         if self._settings.moved == OBSERVED:
-            poses_n, fitness_n, rmse_n = self._target((), model).register(observed, starts_n)
+            rendered = () if model is self.candidate.model else (POSE,)  # which of the two models
+            poses_n, fitness_n, rmse_n = self._target(rendered, model).register(observed, starts_n)
         else:
             alike = tuple(cause for cause in causes if cause != POSE)  # a pose error changes no cloud
             poses_n, fitness_n, rmse_n = self._target(alike, observed).register(model, inverses(starts_n))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.config.explainer_section import EXPLAINERS
 from gpca.config.json_schema import Keys, Named
 from gpca.config.sections import SurfacePoints
@@ -57,6 +58,7 @@ class RealWorld:
     training: dict[str, Training] | None
     explainers: Annotated[dict[str, dict | None], Named(EXPLAINERS)]
     one_encoder: bool
+    causes: FrameCauseSettings
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,11 +59,29 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
 def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:
     any_samples = next(iter(samples_of.values()))
     drawn_B_N = pigeonhole_weights(generator("cause intervals", source), any_samples.seed, any_samples.instance)
+    return rows_of(source, samples_of, drawn_B_N, measure, MEASURES)
+
+
+def rows_of(
+    source: str,
+    samples_of: dict[str, Judged],
+    drawn_B_N: np.ndarray,
+    measured: Callable[[Judged, np.ndarray], dict[str, np.ndarray]],
+    metrics: Iterable[str],
+) -> list[tuple]:
+    """Return rows of `COLUMNS`, of those metrics that have a value.
+
+    Args:
+        samples_of: explainer -> the same N samples beside what it said of them.
+        drawn_B_N: how often each draw of a bootstrap has each of them.
+        measured: returns the metrics of samples, for weights of these.
+    """
+    any_samples = next(iter(samples_of.values()))
     weights_B_N = np.vstack([np.ones(len(any_samples)), drawn_B_N])
-    values = {explainer: measure(samples, weights_B_N) for explainer, samples in samples_of.items()}
+    values = {explainer: measured(samples, weights_B_N) for explainer, samples in samples_of.items()}
     seeds = len(set(any_samples.seed.tolist()))
     rows = []
-    for metric in MEASURES:
+    for metric in metrics:
         ranked = sorted(
             (explainer for explainer in values if explainer != CEILING and metric in values[explainer]),
             key=lambda explainer: values[explainer][metric][0] * (1 if metric in SMALLER_IS_BETTER else -1),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from gpca.causes.truth import NOMINAL, Truth
 from gpca.errors import InputError
 from gpca.objects.views import instance_of
 from gpca.pairs.perturbation import CONCEPTS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 CEILING = "ceiling"  # the truth, measured again from other starts: no explainer can be expected to do better
 POOLED = "pooled"  # all sources together
@@ -71,7 +75,7 @@ def read_judged(
         source, seed = Path(path).parent.name, int(Path(path).stem.removeprefix("seed"))
         causes = Causes.load(path)
         truths[source, seed] = causes.subset(causes.rows("test"))
-        judged[source, CEILING, seed] = _ceiling(truths[source, seed], seed)
+        judged[source, CEILING, seed] = ceiling_of(truths[source, seed], seed)
     for path in prediction_files:
         source, explainer, seed = source_method_seed(path)
         if (source, seed) not in truths:
@@ -81,9 +85,7 @@ def read_judged(
         truth = truths[source, seed]
         if rows["sample"].astype(int).tolist() != truth.registrations.sample.tolist():
             raise InputError(path, "holds other test samples than the causes", "make both anew from one config")
-        scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
-        named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
-        judged[source, explainer, seed] = _judged(truth, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
+        judged[source, explainer, seed] = judged_by(rows, truth, seed)
     if not judged:
         raise InputError("diagnoses", "no files were given", "name at least one explainer in diagnosis.explainers")
     return judged
@@ -95,7 +97,15 @@ def joined(parts: Iterable[Judged]) -> Judged:
     return Judged(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Judged)))
 
 
-def _ceiling(causes: Causes, seed: int) -> Judged:
+def judged_by(rows: pd.DataFrame, truth: Causes, seed: int) -> Judged:
+    """Return test samples beside what the rows of a prediction file, in the same order, say of them."""
+    scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
+    named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
+    return _judged(truth, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
+
+
+def ceiling_of(causes: Causes, seed: int) -> Judged:
+    """Return test samples beside what the truth says of them from other starts."""
     again: Truth = causes.truth_again
     error_N = again.error[:, -1]
     shares_N_3 = np.maximum(again.phi, 0) + 1e-12

@@ -87,7 +87,10 @@ class MeshScene:
 
     def look(self, camera: Camera, T_world_camera: np.ndarray) -> View:
         """Return what the camera sees from a pose."""
-        rays_H_W_3 = camera.rays()
+        return self.along(camera.rays(), T_world_camera)
+
+    def along(self, rays_H_W_3: np.ndarray, T_world_camera: np.ndarray) -> View:
+        """Return what rays of a camera meet, which may be of any shape (..., 3); their z has to be 1."""
         hits = self._cast(rays_H_W_3, T_world_camera)
         hit = np.isfinite(hits["t_hit"].numpy())
         mesh = np.where(hit, hits["geometry_ids"].numpy().astype(np.int64), NOTHING)

@@ -76,6 +76,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "condition": [f"{REAL_WORLD}_{name}" for name in conditions_of(config)],
         "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
+        "frame_cause_seed": list(config["seeds"])[: frames["causes"]["seeds"]],
     }
 
 

@@ -46,28 +46,28 @@ def run(options: Namespace) -> None:
         inputs = [causes_file, read, read_timing]
         with record_provenance([predictions, timings], inputs, options.settings, seed=seed):
             causes = Causes.load(causes_file)
-            registrations = _with_what_it_reads(labelled(causes), entry, read)
+            registrations = with_what_it_reads(labelled(causes), entry, read)
             seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
-            explainer.fit(registrations.subset(_training(registrations, causes_file)))
-            attribution = explainer.explain(_observed(registrations))
+            explainer.fit(registrations.subset(training_rows(registrations, causes_file)))
+            attribution = explainer.explain(observed_only(registrations))
             write_predictions(predictions, causes.registrations, attribution)
             write_timings(timings, registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
 
 
-def _training(registrations: Registrations, path: Path) -> np.ndarray:
+def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
     rows = np.flatnonzero((registrations.split == "train") & (registrations.concept != BORDERLINE))
     if not len(rows):
         raise InputError(path, "holds no training samples with a label", "raise causes.train")
     return rows
 
 
-def _observed(registrations: Registrations) -> Registrations:
+def observed_only(registrations: Registrations) -> Registrations:
     """Return the registrations without anything that tells what is wrong with them."""
     hidden = registrations.without_labels()
     return replace(hidden, attached={name: array for name, array in hidden.attached.items() if name != "causes"})
 
 
-def _with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path: Path) -> Registrations:
+def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path: Path) -> Registrations:
     if entry.reads == "embeddings":
         read = read_embedding(path, registrations, logits=True)
     else:

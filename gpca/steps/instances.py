@@ -7,13 +7,11 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.arguments import SURFACE_POINTS
-from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.meshes import datasets_of, files_behind
 from gpca.frames.plausibility import points_on_model
-from gpca.frames.reading import Dataset, distinct_surfaces, read_instances, read_models, with_shared_models
-from gpca.frames.source import frame_files, patterns, resolve_datasets
+from gpca.frames.reading import distinct_surfaces, read_instances, read_models, with_shared_models
 from gpca.objects.canonical import sample_objects
-from gpca.objects.source import folders
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
@@ -32,21 +30,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Read models and frames, back-project the masks and find the initial poses."""
     check_settings(options.settings, "real_world")
-    entries = resolve_datasets(options.settings.get("datasets"), options.data_dir)
-    if not entries and not options.scenes:
-        raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
-    inputs = frame_files(options.settings.get("datasets"), options.data_dir)
-    if options.scenes:
-        inputs = sorted(path for pattern in patterns() for path in options.scenes.glob(pattern))
+    datasets = datasets_of(options.settings.get("datasets"), options.data_dir, options.downloads, options.scenes)
+    inputs = files_behind(options.settings.get("datasets"), options.data_dir, options.scenes)
     initial_pose = InitialPoseSettings(**options.settings.get("initial_pose", {}))
     declared = {**options.settings, "surface_points": options.surface_points}
     with record_provenance([options.out, options.objects], inputs, declared):
-        datasets = {
-            name: Dataset(name, tuple(folders(entry, options.downloads)), **_given(entry))
-            for name, entry in entries.items()
-        }
-        if options.scenes:
-            datasets = {"scenes": Dataset("scenes", (options.scenes,))}
         frames = {name: dataset.frames() for name, dataset in datasets.items()}
         models = with_shared_models({name: read_models(datasets[name], shown) for name, shown in frames.items()})
         objects = sample_objects(distinct_surfaces(models), options.source, options.surface_points)
@@ -61,9 +49,3 @@ def run(options: Namespace) -> None:
             f"{1e3 * medians_m.mean():.2f} mm on average, {1e3 * medians_m.max():.2f} mm at most",
             file=sys.stderr,
         )
-
-
-def _given(entry: dict) -> dict:
-    given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
-    errors = Path(entry["errors"]) if entry["errors"] else None
-    return given | {"results": tuple(map(Path, entry["results"])), "errors": errors}

@@ -32,6 +32,7 @@ TABLES |= dict.fromkeys(("active_learning_overlap", "new_concepts", "table15_new
 TABLES |= dict.fromkeys(("new_concept_curves",), 1)
 TABLES |= dict.fromkeys(("table5_learners", "table5_compact", "table5_shift"), 1)
 TABLES |= dict.fromkeys(("cause_metrics", "cause_intervals", "table9_causes", "cause_confusions"), 1)
+TABLES |= dict.fromkeys(("measure_frame_causes", "frame_causes", "table9_frames"), 1)
 TABLES |= dict.fromkeys(("nominal_reliability", "model", "time_stages", "table7_runtime", "runtime"), 1)
 TABLES |= dict.fromkeys(("registration_methods", "table11_registration", "table11_severity"), 1)
 TABLES |= dict.fromkeys(("estimator_metrics", "table12_uncertainty", "estimators"), 1)

@@ -39,6 +39,9 @@ BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
 # What four explainers say of the causes: from the samples on, and what is made of it.
 CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
 CAUSES_SHOWN += jobs("nominal_reliability")
+# The same explainers on depth frames.
+ON_FRAMES = jobs("measure_frame_causes", "frame_causes", "table9_frames")
+CAUSES_SHOWN += ON_FRAMES
 MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
 CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
 # Explainers of the first seed of two sources under the controls, and what is made of what they say.
@@ -163,7 +166,7 @@ EDITS = {
     + BACKBONES + MODEL,
     "gpca/frames/bop.py":
         jobs("reduce_embeddings", "instances", register_frames=2, train_on_frames=2, embed=2, attribute=2)
-        + BACKBONES + MODEL + RECOVERY,
+        + BACKBONES + MODEL + RECOVERY + ON_FRAMES,
     "gpca/recovery/policy.py": MODEL + RECOVERY,
     "gpca/reporting/tables/explainers.py": TABLES1,
     "gpca/reporting/figures/confusions.py":

@@ -1,4 +1,4 @@
-"""Makes Table IX: how well explainers say whether a registration failed, and why, by the measured truth."""
+"""Makes Tables IX: how well explainers say whether a registration failed, and why, by the measured truth."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.attribution.bootstrap import REPEATS
+from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.diagnosis.frames import KINDS, STATE, TRUTH
 from gpca.diagnosis.judged import CEILING, POOLED
+from gpca.errors import InputError
+from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import title_of
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
@@ -28,7 +33,13 @@ SHOWN = {
     "nominal_calibration": Column("ECE (%)", interval=False, least_is_best=True),
     "samples": Column("n", decimals=0, interval=False, limits=(0.0, inf)),
 }
+SHOWN_OF_FRAMES = {
+    STATE: Column("State (%)"),
+    **{key: SHOWN[key] for key in ("dominant_accuracy", "false_alarm_rate", "auroc_failed", "average_precision")},
+    **{key: SHOWN[key] for key in ("spearman_attribution", "deletion_gain", "nominal_calibration", "samples")},
+}
 _SHARES = (  # These are printed in %.
+    STATE,
     *("balanced_accuracy", "dominant_accuracy", "false_alarm_rate"),
     *("average_precision", "deletion_gain", "nominal_calibration"),
 )
@@ -51,7 +62,7 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
     for source, title in titles.items():
         for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
             rows = rows_where(intervals, source=source, method=explainer).set_index("metric")
-            table.add_row([(source, title), (explainer, words)], _cells(rows), rival=explainer != CEILING)
+            table.add_row([(source, title), (explainer, words)], _cells(rows, SHOWN), rival=explainer != CEILING)
     table.require_rows("intervals", "hold no diagnosis", "run its explainers first")
     table.compare_down([key for key in SHOWN if key not in ("lead", "samples")], same=1)
     return table.build(
@@ -74,13 +85,56 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
     )
 
 
-def _cells(rows: pd.DataFrame) -> dict[str, Cell | None]:
+def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[str, str]) -> Table:
+    """Return what explainers that learnt from simulated causes say of those measured in frames, the ceiling last.
+
+    Args:
+        intervals: What :func:`gpca.diagnosis.frames.collect` returned.
+        frames: The ``{"title": str, "stand_in": bool}`` of the frames.
+        explainers: The title of each name, in order.
+
+    Raises:
+        InputError: The intervals hold none of these.
+    """
+    of_frames = rows_where(intervals, source=REAL_WORLD)
+    table = TableBuilder("table9_frames", {"explainer": "Explainer"})
+    for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
+        rows = rows_where(of_frames, method=explainer).set_index("metric")
+        table.add_row([(explainer, words)], _cells(rows, SHOWN_OF_FRAMES), rival=explainer != CEILING)
+    counted = rows_where(of_frames, method=TRUTH).set_index("metric")
+    if counted.empty or not table.rows:
+        raise InputError("intervals", "hold no diagnosis of frames", "run the step frame_causes first")
+    table.compare_down([key for key in SHOWN_OF_FRAMES if key != "samples"])
+    of = {kind: int(counted["value"][f"count_{kind}"]) for kind in KINDS}
+    failed = {concept: of[concept] for concept in CONCEPTS}
+    total = sum(failed.values())
+    most = max(failed, key=lambda concept: failed[concept])
+    return table.build(
+        caption=f"What is wrong with a registration of a depth frame: {title_of(frames)}; learnt from simulated causes",
+        column_head="metric",
+        columns=SHOWN_OF_FRAMES,
+        footnotes=(
+            f"Of {counted['samples'].iloc[0]:.0f} registrations {of[NOMINAL]} are nominal, {of[BORDERLINE]} "
+            f"borderline, and {total} failed: {_list_of(failed)}. {of[GEOMETRY]} more are off without a cause. Always "
+            f"naming {most} would be right for {100 * failed[most] / max(1, total):.0f} % of the failed.",
+            f"± is half of the 95 % interval of {REPEATS} bootstrap draws over {plural(of['scenes'], 'scene')}, "
+            f"{plural(of['objects'], 'object')} and {plural(table.most_seeds(), 'seed')}.",
+            "State: mean share of the nominal and of the failed that is called so. The others as in Table IX.",
+        ),
+    )
+
+
+def _list_of(failed: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} mostly by {concept}" for concept, count in failed.items())
+
+
+def _cells(rows: pd.DataFrame, shown: Mapping[str, Column]) -> dict[str, Cell | None]:
     """Return the cells of one source and explainer, from rows whose index is the metric."""
     cells: dict[str, Cell | None] = {}
-    for metric in (name for name in SHOWN if name in rows.index):
+    for metric in (name for name in shown if name in rows.index):
         row, scale = rows.loc[metric], 100 if metric in _SHARES else 1
         cells[metric] = _cell(row, "value", "low", "high", scale)
-        if metric == "balanced_accuracy" and row["rival"]:
+        if metric == "balanced_accuracy" and row["rival"] and "lead" in shown:
             cells["lead"] = _cell(row, "difference", "difference_low", "difference_high", scale)
     if len(rows):
         row = rows.iloc[0]

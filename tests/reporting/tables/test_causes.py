@@ -2,10 +2,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.diagnosis.frames import KINDS, TRUTH
 from gpca.diagnosis.intervals import COLUMNS
 from gpca.diagnosis.judged import CEILING, POOLED
 from gpca.errors import InputError
-from gpca.reporting.tables.causes import table9_causes
+from gpca.reporting.tables.causes import table9_causes, table9_frames
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}
 EXPLAINERS = {"good": "Good", "poor": "Poor", "gate": "Gate"}
@@ -50,3 +51,23 @@ def test_the_bounds_in_the_csv_are_those_of_the_bootstrap(intervals):
 def test_intervals_of_other_explainers_make_no_table(intervals):
     with pytest.raises(InputError, match="hold no diagnosis for table9_causes"):
         table9_causes(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS)
+
+
+def test_frames_are_counted_below_the_table(intervals):
+    counts = {"nominal": 120, "noise": 6, "pose": 30, "overlap": 14, "borderline": 130, "scenes": 13, "objects": 32}
+    found = [
+        ("real_rgbd", TRUTH, f"count_{kind}", 300, 1, counts.get(kind, 0), *[np.nan] * 2, "", *[np.nan] * 3)
+        for kind in KINDS
+    ]
+    found += rows("real_rgbd", "good", "poor", state_accuracy=0.8, dominant_accuracy=0.6, auroc_failed=0.9)
+    found += rows("real_rgbd", "poor", "good", state_accuracy=0.6, dominant_accuracy=0.4)
+    found += rows("real_rgbd", CEILING, "", state_accuracy=0.95)
+    of_frames = pd.concat([intervals, pd.DataFrame(found, columns=list(COLUMNS))])
+    table = table9_frames(of_frames, {"title": "Frames", "stand_in": False}, EXPLAINERS)
+    text = table.markdown()
+    assert "| Good | **80.0 ± 7.5** | **60.0 ± 7.5** |" in text
+    assert "Of 300 registrations 120 are nominal, 130 borderline, and 50 failed: 6 mostly by noise, 30" in text
+    assert "naming pose would be right for 60 % of the failed" in text
+    assert "over 13 scenes, 32 objects and" in text
+    with pytest.raises(InputError, match="hold no diagnosis of frames"):
+        table9_frames(intervals, {"title": "Frames", "stand_in": False}, EXPLAINERS)

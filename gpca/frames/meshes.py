@@ -1,0 +1,66 @@
+"""The datasets that instances are read from, and the meshes of their objects, ready to be rendered."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from gpca.errors import InputError
+from gpca.frames.camera import MeshScene
+from gpca.frames.reading import CentredModel, Dataset, distinct_surfaces
+from gpca.frames.source import frame_files, patterns, resolve_datasets
+from gpca.objects.canonical import ObjectClouds
+from gpca.objects.source import folders
+
+
+def datasets_of(
+    datasets: Mapping[str, dict] | None, data_dir: str | None, downloads: Path, scenes: Path | None
+) -> dict[str, Dataset]:
+    """Return the datasets of the config, by name, or the rendered scenes in their place.
+
+    Raises:
+        InputError: neither is given, or what :func:`gpca.frames.source.resolve_datasets` refuses.
+    """
+    if scenes:
+        return {"scenes": Dataset("scenes", (scenes,))}
+    entries = resolve_datasets(datasets, data_dir)
+    if not entries:
+        raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
+    return {name: Dataset(name, tuple(folders(entry, downloads)), **_given(entry)) for name, entry in entries.items()}
+
+
+def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scenes: Path | None) -> list[Path]:
+    """Return the local files that :func:`datasets_of` reads, sorted."""
+    if scenes:
+        return sorted(path for pattern in patterns() for path in scenes.glob(pattern))
+    return frame_files(datasets or {}, data_dir)
+
+
+def meshes_of(
+    models: Mapping[str, dict[int, CentredModel]], objects: ObjectClouds, shown: Iterable[int]
+) -> dict[int, MeshScene]:
+    """Return each object's mesh alone, in the object's frame, by the number that it has among the objects.
+
+    Args:
+        models: of every dataset, as :func:`gpca.frames.reading.with_shared_models` returns them.
+        objects: their canonical clouds.
+        shown: numbers of the objects that are needed.
+
+    Raises:
+        InputError: an object without a mesh.
+    """
+    surfaces = {surface.name: surface for surface in distinct_surfaces(models)}
+    meshes = {}
+    for index in sorted(set(shown)):
+        name = objects.names[index]
+        if name not in surfaces or surfaces[name].faces is None:
+            fault, remedy = "there is no mesh of it among the models", "make the instances anew from this config"
+            raise InputError(f"object '{name}'", fault, remedy)
+        meshes[index] = MeshScene([(surfaces[name].vertices_m, surfaces[name].triangles)])
+    return meshes
+
+
+def _given(entry: dict) -> dict:
+    given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
+    errors = Path(entry["errors"]) if entry["errors"] else None
+    return given | {"results": tuple(map(Path, entry["results"])), "errors": errors}

@@ -1,0 +1,131 @@
+"""Instances whose answer is known: nothing wrong, hidden, misplaced, noisy; and those that have no answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gpca.causes.frame_settings import FrameCauseSettings
+from gpca.causes.frames import chosen_instances, frame_candidate, measure_frames
+from gpca.causes.settings import CauseSettings
+from gpca.causes.shapley import ALL
+from gpca.errors import InputError
+from gpca.frames.clean_view import clean_view
+from gpca.frames.meshes import meshes_of
+from gpca.frames.reading import Dataset, read_models
+
+SETTINGS = CauseSettings(clean_pairs=20, points=(64, 96))
+POINTS = 256
+UNKNOWN = "bracket"  # no rotation leaves it as it is, so that ADD sees every error
+
+
+@pytest.fixture(scope="module")
+def models(scenes):
+    dataset = Dataset("tiny", (scenes,))
+    return {"tiny": read_models(dataset, dataset.frames())}
+
+
+@pytest.fixture(scope="module")
+def meshes(models, tiny):
+    return meshes_of(models, tiny[1], range(len(tiny[1])))
+
+
+@pytest.fixture(scope="module")
+def seen(tiny):
+    """The instance of the bracket with most pixels, alone, started from the truth."""
+    instances, objects = tiny
+    sizes = np.diff(instances.offsets) * (instances.object_index == objects.names.index(f"tiny {UNKNOWN}"))
+    return only(instances, int(sizes.argmax()))
+
+
+def only(instances, i, points_m=None, pixels=None):
+    """One instance from its true pose, with other points where they are given."""
+    columns = {
+        name: getattr(instances, name)[[i]]
+        for name in ("dataset", "scene", "image", "object_index", "symmetric", "init_from", "camera_3_3", "colour")
+    }
+    points_m = instances.cloud_m(i) if points_m is None else points_m.astype(np.float32)
+    pixels = instances.pixels_of(i) if pixels is None else pixels
+    poses = dict.fromkeys(("T_camera_object_true", "T_camera_object_init"), instances.T_camera_object_true[[i]])
+    return replace(instances, **columns, **poses, points_m=points_m, pixels=pixels, offsets=np.array([0, len(pixels)]))
+
+
+def measured(instances, objects, meshes):
+    rows = np.arange(len(instances))
+    return measure_frames(instances, rows, objects, meshes, "tiny", 100, SETTINGS, POINTS)
+
+
+def hidden(seen):
+    """The same behind something that leaves the leftmost pixels alone."""
+    kept = np.argsort(seen.pixels[:, 0], kind="stable")[: len(seen.pixels) // 4]
+    return only(seen, 0, seen.points_m[kept], seen.pixels[kept])
+
+
+def misplaced(seen):
+    T_wrong = np.eye(4)
+    T_wrong[:3, :3] = Rotation.from_rotvec([0, np.deg2rad(100), 0]).as_matrix()
+    return replace(seen, T_camera_object_init=seen.T_camera_object_true @ T_wrong)
+
+
+def noisy(seen):
+    along = 1 + np.random.default_rng(100).normal(scale=0.02, size=(len(seen.points_m), 1))
+    return only(seen, 0, seen.points_m * along)
+
+
+@pytest.mark.parametrize(("change", "cause"), [(hidden, "overlap"), (misplaced, "pose"), (noisy, "noise")])
+def test_what_was_done_to_an_instance_is_its_cause(seen, tiny, meshes, change, cause):
+    causes, table = measured(change(seen), tiny[1], meshes)
+    assert causes.truth.dominant.tolist() == [cause]
+    others = causes.truth.phi[0][np.array(["noise", "pose", "overlap"]) != cause]
+    assert np.abs(others).max() < 0.5 * causes.truth.phi.max()
+    assert table["dominant"].tolist() == [cause]
+    assert causes.truth.phi.sum() == pytest.approx(causes.truth.error[0, ALL] - causes.truth.error[0, 0])
+
+
+def test_nothing_is_wrong_with_what_is_whole_and_where_it_should_be(seen, tiny, meshes):
+    causes, table = measured(seen, tiny[1], meshes)
+    assert causes.truth.error[0, ALL] < SETTINGS.limits.nominal
+    assert table[["rotation_rad", "translation"]].to_numpy() == pytest.approx(0, abs=1e-4)
+    assert (table["noise"] < 0.005).all()  # the sensor is perfect, its image rounds
+    again, _ = measured(seen, tiny[1], meshes)
+    assert (again.truth.error == causes.truth.error).all()
+
+
+def test_a_perfect_sensor_measures_what_is_rendered(seen, tiny, meshes):
+    index = int(seen.object_index[0])
+    surface_m = tiny[1].points(index).astype(float)
+    view = clean_view(seen, 0, meshes[index], surface_m)
+    assert np.median(np.linalg.norm(view.measured - view.clean, axis=1)) < 1e-3
+    whole = clean_view(hidden(seen), 0, meshes[index], surface_m)
+    assert whole.share == pytest.approx(view.share / 4, abs=0.05)
+    assert len(whole.unmeasured) > len(view.unmeasured)
+    assert np.isfinite(whole.clean).all()
+
+
+def test_the_model_is_what_the_camera_would_see_where_icp_starts(seen, tiny, meshes):
+    from gpca.causes.frames import _subjects
+
+    [subject] = _subjects(seen, np.arange(1), tiny[1])
+    candidate = frame_candidate(misplaced(seen), 0, subject, meshes[subject.index], POINTS, np.random.default_rng(100))
+    assert candidate.reference((1,)) is candidate.model
+    assert candidate.reference((0, 2)) is candidate.model_at_truth
+    assert np.abs(candidate.model.mean(axis=0) - candidate.model_at_truth.mean(axis=0)).max() > 0.01
+
+
+def test_what_has_no_mesh_or_lies_beside_it_is_refused_or_left_out(seen, tiny, models, meshes, capsys):
+    without = {"tiny": {number: model for number, model in models["tiny"].items() if UNKNOWN not in model.surface.name}}
+    with pytest.raises(InputError, match=f"object 'tiny {UNKNOWN}': there is no mesh of it among the models"):
+        meshes_of(without, tiny[1], seen.object_index.tolist())
+    beside = replace(seen, points_m=seen.points_m + np.float32([5, 0, 0]))
+    with pytest.raises(InputError, match="no instance of the frames can be measured"):
+        measured(beside, tiny[1], meshes)
+    assert "instance 0 is left out: its pixels see nothing of the mesh" in capsys.readouterr().err
+
+
+def test_as_many_instances_are_drawn_as_are_wanted(tiny):
+    instances = tiny[0]
+    assert chosen_instances(instances, "tiny", FrameCauseSettings()).tolist() == list(range(len(instances)))
+    some = chosen_instances(instances, "tiny", FrameCauseSettings(instances=5))
+    assert len(set(some.tolist())) == 5
+    assert (np.diff(some) > 0).all()

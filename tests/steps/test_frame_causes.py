@@ -1,0 +1,97 @@
+"""The step ``frame_causes`` by hand, what is collected of it, and what it says of faulty files and settings."""
+
+import json
+
+import pytest
+
+from gpca.__main__ import main
+from gpca.causes.dataset import Causes
+from gpca.diagnosis.frames import KINDS, STATE, TRUTH, collect
+from gpca.errors import InputError
+from gpca.reporting.tables.causes import table9_frames
+
+from ..hostile import refusal
+from .command_lines import CAUSES, ENCODER
+
+FEW = {"iterations": 5, "inducing": 6, "draws": 20}
+SETTINGS = {
+    "frames": {"instances": 6, "points": 128},
+    "causes": CAUSES,
+    "icp": {"max_iterations": 30},
+    "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
+    "encoder": ENCODER,
+    "explainers": {"gpca": FEW, "gpca_pair": FEW, "gate_rmse": {}},
+}
+
+
+@pytest.fixture(scope="module")
+def call(made, tiny, scenes, tmp_path_factory):
+    """A folder with what the step reads, and its command line there."""
+    folder = tmp_path_factory.mktemp("frames")
+    tiny[0].save(folder / "instances.npz")
+    tiny[1].save(folder / "objects.npz", "tiny")
+    lessons = {"causes": "causes", "descriptors": "descriptors", "cause_embeddings": "embeddings"}
+    datasets = {"tiny": {"location": str(scenes)}}
+    words = ["--source", "tiny", "--seed", "100", "--settings", json.dumps(SETTINGS | {"datasets": datasets})]
+    words += ["--instances", "instances.npz", "--objects", "objects.npz", "--encoders", made / "cause_weights.pt"]
+    for name, option in lessons.items():
+        words += [f"--{option}", made / f"{name}.npz"]
+    outputs = {"--out": "seed100.npz", "--samples": "seed100.csv", "--predictions": "said.csv"}
+    words += [word for pair in outputs.items() for word in pair]
+    return folder, ["frame_causes", *map(str, words)]
+
+
+@pytest.fixture(scope="module")
+def asked(call):
+    folder, words = call
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(words) == 0
+    return tuple([folder / name] for name in ("seed100.npz", "seed100.csv", "said.csv"))
+
+
+def test_every_explainer_is_judged_on_the_frames(asked):
+    causes = Causes.load(asked[0][0])
+    assert len(causes) == 6
+    assert set(causes.registrations.split) == {"test"}
+    rows = collect(*asked)
+    counts = rows[(rows["method"] == TRUTH) & (rows["source"] == "real_rgbd")]
+    counts = dict(zip(counts["metric"], counts["value"], strict=True))
+    assert sum(counts[f"count_{kind}"] for kind in KINDS[:-2]) == 6
+    assert set(rows["method"]) <= {TRUTH, "ceiling", *SETTINGS["explainers"]}
+    both = counts["count_nominal"] and any(counts[f"count_{kind}"] for kind in ("noise", "pose", "overlap"))
+    assert bool(both) == (STATE in set(rows["metric"]))
+
+
+def test_the_table_says_how_few_there_are(asked):
+    titles = {name: name for name in SETTINGS["explainers"]}
+    table = table9_frames(collect(*asked), {"title": "Tiny", "stand_in": True}, titles)
+    assert "Of 6 registrations" in table.footnotes[0]
+    assert "procedural stand-in" in table.caption
+    assert table.cells[0, "samples"].mean == 6
+
+
+def test_files_of_other_samples_are_refused(asked, tmp_path):
+    fewer = tmp_path / "seed100.csv"
+    fewer.write_text("".join(asked[1][0].open().readlines()[:-1]))
+    with pytest.raises(InputError, match="holds other samples than the causes"):
+        collect(asked[0], [fewer], asked[2])
+    with pytest.raises(InputError, match="files of every seed are needed"):
+        collect([], [], [])
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--descriptors", ["descriptors.npz", "descriptors.npz"], "--descriptors: 2 file(s) for 1 of causes"),
+        ("--instances", ["objects.npz"], "objects.npz: array"),
+        ("--settings", [json.dumps({"datasets": {"tiny": {"location": "/not/there"}}})], "/not/there is not there"),
+        ("--settings", [json.dumps({"frames": {"points": 3}})], "setting points: 3 is less than the minimum of 64"),
+        ("--settings", [json.dumps({"explainers": {"oracle": {}}})], "explainer 'oracle': unknown; known are"),
+        ("--out", ["objects.npz"], "objects.npz"),
+    ],
+)
+def test_a_fault_is_one_line_and_harms_nothing(call, asked, option, value, words):
+    folder, line = call
+    at = line.index(option)
+    refusal([*line[: at + 1], *value, *line[at + 2 :]], folder, words)
