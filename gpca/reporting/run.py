@@ -18,7 +18,7 @@ from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.readings.registry import GROUPS
+from gpca.readings.registry import FRAME_INPUT, GROUPS
 from gpca.recovery.policies import policy_entry
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
 from gpca.reporting.tables.kernel_grid import PRINTED
@@ -60,10 +60,12 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "new_concept_strategy": list(NEW_CONCEPT_STRATEGIES),
         "erring": list(config["new_concepts"]["erring"]),
         "new_concept_seed": new_concept_seeds(config),
+        "frame_label_seed": list(config["seeds"])[: config["frame_labels"]["seeds"]],
         "pool_strategy": [name for name in strategies if name in STRATEGIES],
         "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
         "shown_source": config["figures"]["source"],
-        "reading_group": list(config["readings"]["groups"]),
+        "reading_group": reading_groups(config),
+        "frame_input": [name for name in reading_groups(config) if name == FRAME_INPUT],
         "kernel_source": list(kernels["sources"]),
         "printed_kernels": [kernel for kernel, rate, n in PRINTED if _is_fitted(kernels, kernel, rate, n)],
         "frames": REAL_WORLD,
@@ -72,6 +74,8 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "first_backbone": backbones[0],
         "classic": [name for name in CLASSIC if name in config["explainers"]],
         "frame_explainer": list(frames["explainers"]),
+        "compared_backbone": list(frames["backbones"])[1:],
+        "unreduced": list(unreduced_methods(frames)),
         "condition": [f"{REAL_WORLD}_{name}" for name in conditions_of(config)],
         "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
@@ -138,13 +142,16 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "learners": learners,
         "strategies": strategies,
         "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
-        "reading_groups": {name: GROUPS[name].title for name in config["readings"]["groups"]},
+        "reading_groups": {name: GROUPS[name].title for name in reading_groups(config)},
         "new_concepts": {
             **learning,
             **config["new_concepts"],
             "seeds": new_concept_seeds(config),
             "test": config["registrations"]["test"],
         },
+        "frame_labels": {**learning, **config["frame_labels"], "train": frames["train"], "test": frames["test"]},
+        "unreduced_methods": unreduced_methods(frames),
+        "frame_encoders": {name: encoder_title(name, "none") for name in frames["backbones"]},
         "target": learning["target"],
         "batch": learning["batch"],
         "test_samples": config["registrations"]["test"],
@@ -173,6 +180,13 @@ def names_of_backbones(frames: Mapping) -> list[str]:
     return [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
 
 
+def unreduced_methods(frames: Mapping) -> dict[str, str]:
+    """Return the titles of what explains frames by a whole embedding, or without one."""
+    backbones = [name for name in names_of_backbones(frames) if name.endswith("-none")]
+    titles = {name: encoder_title(*name.split("-")) for name in backbones}
+    return titles | {name: explainer_entry(name).title for name in frames["explainers"]}
+
+
 def _title_of_pose(settings: Mapping) -> str:
     """Return what a table calls the initial poses of frames."""
     return {"results": "Pose estimators", "true_pose": "True pose, small error"}.get(
@@ -199,6 +213,13 @@ def new_concept_seeds(config: Mapping) -> list[int]:
 def transfers(config: Mapping, sources: Mapping) -> bool:
     """Return whether explainers are asked about sources that they did not learn from; one alone admits no transfer."""
     return TRANSFER in config["controls"]["controls"] and len(sources) > 1
+
+
+def reading_groups(config: Mapping) -> list[str]:
+    """Return the groups of readings; one of them trains encoders of depth frames, and is run where there are seeds."""
+    groups, frames = config["readings"]["groups"], config["real_world"]
+    trains = config["readings"]["frame_seeds"] and "none" in frames["reductions"]
+    return [name for name in groups if name != FRAME_INPUT or trains]
 
 
 def has_gradients(config: Mapping) -> bool:
