@@ -37,6 +37,7 @@ rule reading:
         "<benchmarks>/readings/{reading_group}.tsv"
     wildcard_constraints:
         reading_group="|".join(GROUPS),
+    priority: 3
     conda:
         "../envs/gpca.yaml"
     threads: 1
