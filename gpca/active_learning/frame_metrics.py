@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.active_learning.frame_settings import PAIR
+from gpca.active_learning.frame_settings import PAIR, in_percent
 from gpca.active_learning.metrics import TABLE, collect_curves
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.csv_file import numbers, read_csv
@@ -52,24 +52,18 @@ def collect_labels(
         targets: accuracies on the test samples.
 
     Raises:
-        InputError: no files, a name of another form, what their readers refuse, targets that are alike in percent.
+        InputError: no files, a name of another form, what their readers refuse.
     """
-    label_files, targets = list(label_files), list(targets)
-    validated = _validation_accuracies(curve_files)
-    if len({in_percent(target) for target in targets}) < len(targets):
-        raise InputError("config key frame_labels.targets", "two are alike in whole percent", "leave one out")
-    parts = [_of_target(label_files, target) for target in targets]
-    whole = collect_curves(label_files, targets[0])
+    files = list(label_files)
+    by_target = {in_percent(target): collect_curves(files, target) for target in targets}
+    parts = [_of_target(found, percent) for percent, found in by_target.items()]
+    whole = next(iter(by_target.values()))
     whole = whole[~whole["metric"].isin(TO_TARGET)]
+    validated = _validation_accuracies(curve_files)
     chosen = chosen_backbone(_means(validated), _embeddings(whole))
     found = [part for of in (whole, *parts) for part in (of, _repeated(of, chosen))]
     records = [(VALIDATION, *key[:2], "accuracy", ALL, key[2], value) for key, value in validated.items()]
     return [tidy(records, VALIDATION), *found] if records else found
-
-
-def in_percent(target: float) -> str:
-    """Return how a target stands in the column `table`."""
-    return f"{100 * target:.0f}"
 
 
 def chosen_backbone(accuracies: Mapping[str, float], embeddings: Iterable[str]) -> str:
@@ -88,10 +82,9 @@ def chosen_backbone(accuracies: Mapping[str, float], embeddings: Iterable[str]) 
     return max(backbones, key=lambda name: accuracies.get(name, 0.0))
 
 
-def _of_target(label_files: Iterable[str | Path], target: float) -> pd.DataFrame:
-    found = collect_curves(label_files, target)
-    found = found[found["metric"].isin(TO_TARGET)]
-    return found.assign(table=found["table"] + f"/{in_percent(target)}")
+def _of_target(found: pd.DataFrame, percent: str) -> pd.DataFrame:
+    of_target = found[found["metric"].isin(TO_TARGET)]
+    return of_target.assign(table=of_target["table"] + f"/{percent}")
 
 
 def _repeated(found: pd.DataFrame, embedding: str) -> pd.DataFrame:

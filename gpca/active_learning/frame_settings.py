@@ -30,3 +30,8 @@ class FrameLabelSettings:
     labels: Count = 80
     targets: tuple[PositiveShare, ...] = (0.65, 0.7, 0.75)
     points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
+
+
+def in_percent(target: float) -> str:
+    """Return how a target stands in the column `table` of the metrics."""
+    return f"{100 * target:.0f}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -88,7 +89,7 @@ def _icp(given: Given) -> ICPSettings:
     return ICPSettings(**given.sections["icp"])
 
 
-def _frames(given: Given, source: str, seed: int):
+def _frames(given: Given, source: str, seed: int) -> Path:
     if (source, seed) not in given.registrations or (source, seed) not in given.poses:
         fault = f"lack registrations or poses of {source}, seed {seed}, beside its predictions"
         raise InputError("readings of frame_input", fault, "give them")

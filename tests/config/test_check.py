@@ -66,6 +66,7 @@ FAULTS = [
     ("active_learning.stream.widow", 3, "active_learning.stream.widow: unknown; did you mean window?"),
     ("active_learning.strategies", ["bold"], "active_learning.strategies: no strategy 'bold'; known are random, "),
     ("frame_labels.initial", 200, "frame_labels.initial: 200 labelled samples of two concepts leave no pool of 300"),
+    ("frame_labels.targets", [0.7, 0.701], "frame_labels.targets: two are alike in whole percent"),
     ("frame_labels.target", [0.7], "frame_labels.target: unknown; did you mean targets?"),
     ("frame_labels.held_out", ["glare"], "frame_labels.held_out.0: 'glare' is not one of ['noise', 'pose', 'overlap']"),
     ("new_concepts.error", [0.1], "new_concepts.error: unknown; did you mean errors?"),

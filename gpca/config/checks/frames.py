@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Set
 
 from baselines.registry import require_settings
+from gpca.active_learning.frame_settings import in_percent
 from gpca.config.checks.named import require_names, with_key
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
@@ -47,7 +48,13 @@ def _check_training(config: dict) -> None:
 
 
 def _check_labels(config: dict) -> None:
-    """Check that the samples labelled at the start leave a pool; a third of the training samples is of each concept."""
+    """Check that the targets differ in percent, and that the labels at the start leave a pool.
+
+    A third of the training samples is of each concept.
+    """
+    targets = config["frame_labels"]["targets"]
+    if len(set(map(in_percent, targets))) < len(targets):
+        raise InputError("config key frame_labels.targets", "two are alike in whole percent", "leave one out")
     initial, train = config["frame_labels"]["initial"], config["real_world"]["train"]
     if initial // 2 >= train // len(CONCEPTS):
         fault = f"{initial} labelled samples of two concepts leave no pool of {train} training samples"

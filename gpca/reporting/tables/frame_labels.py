@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from gpca.active_learning.frame_metrics import VALIDATION, chosen_backbone, in_percent
-from gpca.active_learning.frame_settings import PAIR
+from gpca.active_learning.frame_metrics import VALIDATION, chosen_backbone
+from gpca.active_learning.frame_settings import PAIR, in_percent
 from gpca.active_learning.metrics import TABLE
 from gpca.active_learning.settings import ALL_LABELS
 from gpca.attribution.metrics import ALL
