@@ -39,6 +39,7 @@ STEPS = {
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "new_concepts": "registrations, causes and encoders -> learning curves of concepts that no encoder has seen",
+    "frame_labels": "embeddings of depth frames -> learning curves of a new concept, by every backbone and by the pair",
     "kernel_grid": "embeddings -> every kernel, learning rate and number of iterations",
     "shift": "registrations and encoder -> embedded samples unlike the training samples, and their distances",
     "learners": "embeddings -> predictions of every learner, on test samples and on shifted ones",

@@ -103,6 +103,10 @@ STEPS = {
         {"gpca/causes/drawing.py", "gpca/descriptors/dataset.py", "gpca/active_learning/oracle.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
+    "frame_labels": (
+        {"gpca/active_learning/new_concepts.py", "gpca/descriptors/registered.py"},
+        {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
+    ),
     "uncertainty": (
         {"gpca/alignment/icp_kernels.py", "gpca/uncertainty/designs.py"},
         {"gpca/classifier/gpc.py", "gpca/explainers/interface.py"},

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import yaml
 
+from gpca.active_learning.frame_settings import FrameLabelSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.verdicts import Tolerance
@@ -108,8 +109,14 @@ class Exchange(ExchangeSettings):
 
 @dataclass(frozen=True, kw_only=True)
 class Readings(ReadingSizes):
-    """What the paper leaves unstated, by group, and how much of the data the readings see."""
+    """What the paper leaves unstated, by group, and how much of the data the readings see.
 
+    Attributes:
+        frame_seeds: the first so many of the run's, for which encoders of depth frames that see other clouds are
+            trained.
+    """
+
+    frame_seeds: Annotated[int, Bounds(minimum=0)]
     groups: Annotated[
         dict,
         Named({name: group.choices for name, group in GROUPS.items()}),
@@ -151,6 +158,7 @@ class Config:
     shift: Annotated[sections.Shift, SHIFT]
     readings: Annotated[Readings, Keys(required=EVERY)]
     real_world: RealWorld
+    frame_labels: Annotated[FrameLabelSettings, COMPLETE]
     model: sections.ExplainedModel
     runtime: sections.Runtime
     recovery: Recovery

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.diagnostics import calibration_error
+from gpca.attribution.diagnostics import brier_score, calibration_error, negative_log_likelihood
 from gpca.attribution.metrics import ALL, attribution_metrics, read_metrics, source_method_seed, tidy
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
@@ -30,8 +30,8 @@ def collect(
 
     The column `table` says of which test samples: ``attribution`` is all of them, ``seen`` those of objects that a
     training sample shows, ``unseen`` the others, ``dataset/{name}`` those of one dataset's frames. What has no sample
-    has no row. Beside the metrics of :func:`gpca.attribution.metrics.collect` stand the calibration error `ece` and
-    the number of `objects`.
+    has no row. Beside the metrics of :func:`gpca.attribution.metrics.collect` stand the calibration error `ece`, the
+    number of `objects`, and the proper scores `nll` (nats) and `brier`.
 
     Args:
         pose_files: named ``…/{source}/seed{seed}.csv``, of every source and seed among the predictions.
@@ -49,8 +49,9 @@ def collect(
         rows = read_predictions(path)
         for name, test in _parts(path, rows[rows["split"] == "test"], of_source):
             metrics = attribution_metrics(test, concepts_of(rows))
-            metrics |= {"ece": {ALL: _ece(test, concepts_of(rows))}}
-            metrics |= {"objects": {ALL: test["object"].nunique()}}
+            scores = _scores(test, concepts_of(rows))
+            metrics |= {"ece": {ALL: calibration_error(*scores)}, "objects": {ALL: test["object"].nunique()}}
+            metrics |= {"nll": {ALL: negative_log_likelihood(*scores)}, "brier": {ALL: brier_score(*scores)}}
             for metric, of_concept in metrics.items():
                 records += [(name, source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
     for path in one_encoder_files:
@@ -86,7 +87,7 @@ def _parts(path, test: pd.DataFrame, pose_file: str | Path) -> Iterator[tuple[st
     yield from ((name, test[rows]) for name, rows in chosen.items() if rows.any())
 
 
-def _ece(test: pd.DataFrame, concepts: list[str]) -> float:
+def _scores(test: pd.DataFrame, concepts: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the scores (N, C) and the numbers of the true concepts (N,)."""
     scores_N_C = test[[f"score_{concept}" for concept in concepts]].to_numpy(float)
-    truth_N = np.array([concepts.index(concept) for concept in test["concept_true"]])
-    return calibration_error(scores_N_C, truth_N)
+    return scores_N_C, np.array([concepts.index(concept) for concept in test["concept_true"]])

@@ -18,6 +18,8 @@ SECTIONS = {
     "uncertainty": ("uncertainty", "additive"),
     "icp": ("registrations", "icp"),
     "encoder": ("encoders", "*"),
+    "pretraining": ("real_world", "pretraining"),
+    "training": ("real_world", "training", "*"),
     "active_learning": ("active_learning",),
     "gpca_paper": ("explainers", "gpca_paper"),
     "gpca": ("explainers", "gpca"),
@@ -32,12 +34,14 @@ class Given:
 
     Attributes:
         registrations, sets: (source, seed) -> file of the step ``registrations`` or ``shift``.
+        poses: (source, seed) -> CSV beside the registrations of depth frames.
         predictions, embeddings: (source, method, seed) -> file.
         sections: name -> settings of the config's section `SECTIONS` of that name, for what a reading leaves as it is.
     """
 
     registrations: Mapping[tuple[str, int], Path] = field(default_factory=dict)
     sets: Mapping[tuple[str, int], Path] = field(default_factory=dict)
+    poses: Mapping[tuple[str, int], Path] = field(default_factory=dict)
     predictions: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
     embeddings: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
     sections: Mapping[str, dict] = field(default_factory=dict)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from gpca.readings import settings
 from gpca.registry import load
 
+FRAME_INPUT = "frame_input"  # the group that trains an encoder of frames for each of its readings
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
 
 
@@ -82,6 +83,13 @@ GROUPS = {
         settings.FrameRepeats,
         "frames:run",
         ("registrations", "predictions", "embeddings"),
+        (),
+    ),
+    FRAME_INPUT: Group(
+        "What the encoder sees on depth frames",
+        settings.FrameInput,
+        "frame_input:run",
+        ("registrations", "poses", "predictions"),
         (),
     ),
     "features": Group("Classic features", settings.ClassicFeatures, "features:run", ("registrations",), ("ycb",)),

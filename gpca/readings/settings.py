@@ -11,6 +11,7 @@ from itertools import product
 from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import Kernel, LearningRate
+from gpca.pairs.reading import Reading as ReadAs
 from gpca.settings import Bounds, Count, OpenShare, Positive
 
 Quantity = Literal[
@@ -130,6 +131,14 @@ class FrameRepeats:
     """What varies between the repeats on depth frames, and which objects the test samples show."""
 
     repeats: tuple[Literal["everything", "classifiers", "samples"], ...]
+    objects: tuple[Literal["all", "seen", "unseen"], ...]
+
+
+@dataclass(frozen=True)
+class FrameInput:
+    """What the encoder sees on depth frames, and which objects the test samples show."""
+
+    input: tuple[ReadAs, ...]
     objects: tuple[Literal["all", "seen", "unseen"], ...]
 
 

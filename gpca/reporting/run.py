@@ -19,7 +19,7 @@ from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.readings.registry import GROUPS
+from gpca.readings.registry import FRAME_INPUT, GROUPS
 from gpca.recovery.policies import policy_entry
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
 from gpca.reporting.tables.kernel_grid import PRINTED
@@ -61,10 +61,12 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "new_concept_strategy": list(NEW_CONCEPT_STRATEGIES),
         "erring": list(config["new_concepts"]["erring"]),
         "new_concept_seed": new_concept_seeds(config),
+        "frame_label_seed": list(config["seeds"])[: config["frame_labels"]["seeds"]],
         "pool_strategy": [name for name in strategies if name in STRATEGIES],
         "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
         "shown_source": config["figures"]["source"],
-        "reading_group": list(config["readings"]["groups"]),
+        "reading_group": reading_groups(config),
+        "frame_input": [name for name in reading_groups(config) if name == FRAME_INPUT],
         "kernel_source": list(kernels["sources"]),
         "printed_kernels": [kernel for kernel, rate, n in PRINTED if _is_fitted(kernels, kernel, rate, n)],
         "frames": REAL_WORLD,
@@ -73,6 +75,8 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "first_backbone": backbones[0],
         "classic": [name for name in CLASSIC if name in config["explainers"]],
         "frame_explainer": list(frames["explainers"]),
+        "compared_backbone": list(frames["backbones"])[1:],
+        "unreduced": list(unreduced_methods(frames)),
         "condition": [f"{REAL_WORLD}_{name}" for name in conditions_of(config)],
         "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
@@ -144,13 +148,16 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "learners": learners,
         "strategies": strategies,
         "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
-        "reading_groups": {name: GROUPS[name].title for name in config["readings"]["groups"]},
+        "reading_groups": {name: GROUPS[name].title for name in reading_groups(config)},
         "new_concepts": {
             **learning,
             **config["new_concepts"],
             "seeds": new_concept_seeds(config),
             "test": config["registrations"]["test"],
         },
+        "frame_labels": {**learning, **config["frame_labels"], "train": frames["train"], "test": frames["test"]},
+        "unreduced_methods": unreduced_methods(frames),
+        "frame_encoders": {name: encoder_title(name, "none") for name in frames["backbones"]},
         "target": learning["target"],
         "test_samples": config["registrations"]["test"],
         "kernel_sources": of_grid,
@@ -183,6 +190,13 @@ def _dataset_of(entry: Mapping) -> str:
     return PurePath(entry.get("location") or "").name if entry.get("kind") == "bop" else ""
 
 
+def unreduced_methods(frames: Mapping) -> dict[str, str]:
+    """Return the titles of what explains frames by a whole embedding, or without one."""
+    backbones = [name for name in names_of_backbones(frames) if name.endswith("-none")]
+    titles = {name: encoder_title(*name.split("-")) for name in backbones}
+    return titles | {name: explainer_entry(name).title for name in frames["explainers"]}
+
+
 def _title_of_pose(settings: Mapping) -> str:
     """Return what a table calls the initial poses of frames."""
     return {"results": "Pose estimators", "true_pose": "True pose, small error"}.get(
@@ -209,6 +223,13 @@ def new_concept_seeds(config: Mapping) -> list[int]:
 def transfers(config: Mapping, sources: Mapping) -> bool:
     """Return whether explainers are asked about sources that they did not learn from; one alone admits no transfer."""
     return TRANSFER in config["controls"]["controls"] and len(sources) > 1
+
+
+def reading_groups(config: Mapping) -> list[str]:
+    """Return the groups of readings; one of them trains encoders of depth frames, and is run where there are seeds."""
+    groups, frames = config["readings"]["groups"], config["real_world"]
+    trains = config["readings"]["frame_seeds"] and "none" in frames["reductions"]
+    return [name for name in groups if name != FRAME_INPUT or trains]
 
 
 def has_gradients(config: Mapping) -> bool:

@@ -22,6 +22,7 @@ from gpca.steps import checked_sections
 KINDS: dict[str, Callable[[list[Path]], dict]] = {
     "registrations": by_source_and_seed,
     "sets": by_source_and_seed,
+    "poses": by_source_and_seed,
     "predictions": by_method,
     "embeddings": by_backbone,
 }

@@ -9,11 +9,11 @@ from gpca.code_files import ROOT
 from gpca.comparison.chance import ALL, chance
 from gpca.comparison.claim_verdicts import read_verdicts
 from gpca.comparison.claims import read_claims
-from gpca.comparison.published import read_published
+from gpca.comparison.published import TEXT, read_published
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.reasons import NONE_YET, read_reasons
 from gpca.comparison.values import read_results
-from gpca.comparison.verdicts import JUDGED, NOT_RUN, VERDICTS, Tolerance, compare
+from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
 from gpca.reporting.tables.claims import counted
 from gpca.reporting.tables.comparison import counts_table, summary
 
@@ -46,9 +46,12 @@ def shown():
 def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
     rows = reference()
     assert len(rows) == len(shown) == 112
-    # The file behind Table V is too large to be kept, and that run had no row of one encoder in Table VI.
+    # The file behind Table V is too large to be kept, and that run had no row of one encoder in Table VI, and no labels
+    # of depth frames.
     kept = (rows["verdict"] != "not run").to_numpy()
-    assert set(rows.loc[~kept, "table"]) <= {"V", "VI"}
+    lacking = set(rows.loc[~kept & (rows["table"] == TEXT), "row"])
+    assert lacking <= {"BALD, depth frames", "Random, depth frames"}
+    assert set(rows.loc[~kept, "table"]) <= {"V", "VI", TEXT}
     numbers = ("published", "paper_low", "paper_high", "reproduced", "ci_low")
     for column in ("table", "row", "column", *numbers, "repeat_of"):
         assert rows.loc[kept, column].tolist() == pytest.approx(shown.loc[kept, column].tolist(), nan_ok=True)
@@ -62,7 +65,7 @@ def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
 def test_every_miss_of_the_reference_has_a_reason(shown):
     assert shown[shown["reason"] == NONE_YET][["table", "row", "column"]].to_numpy().tolist() == []
     assert (shown.loc[shown["verdict"] != "reproduced", "reason"] != "").all()
-    assert set(shown["verdict"]) == set(VERDICTS) - {NOT_RUN}
+    assert set(JUDGED) <= set(shown["verdict"]) <= {*JUDGED, NOT_COMPARABLE}
     judged = shown["verdict"].isin(JUDGED)
     assert not (shown.loc[judged, "reason"] == "procedural stand-in").any()
 

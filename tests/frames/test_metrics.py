@@ -1,3 +1,4 @@
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -40,6 +41,9 @@ def test_seen_unseen_and_datasets_are_judged_apart(tmp_path):
     assert accuracy[accuracy["source"] == ONE_ENCODER]["table"].tolist() == ["attribution"]
     ece = metrics[(metrics["metric"] == "ece") & (metrics["table"] == "seen")]["value"]
     assert ece.tolist() == [pytest.approx(0.2)]
+    proper = metrics[metrics["table"] == "unseen"].set_index("metric")["value"]
+    assert proper["nll"] == pytest.approx(-np.log(0.1))
+    assert proper["brier"] == pytest.approx(0.8**2 + 0.9**2 + 0.1**2)
     write_metrics(metrics, tmp_path / "real_world.csv")
     together = read_together(tmp_path / "real_world.csv")
     assert set(together["table"]) == {"attribution"}

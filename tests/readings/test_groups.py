@@ -3,13 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from baselines.learners import linear_svm
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.encoders.training import train_encoder
+from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.readings import diagnostics, features, frames, gpc_start, labels, learners, severities
+from gpca.readings import diagnostics, features, frame_input, frames, gpc_start, labels, learners, severities
 from gpca.readings.judged import accuracies
 from gpca.readings.settings import ReadingSizes
 from gpca.shift.metrics import read_learner_predictions
@@ -146,3 +149,33 @@ def test_features_are_chosen_by_name(given):
     counts = {reading[0]: v for (reading, _, _, concept), v in found.items() if concept == "overlap"}
     assert counts["counts"] == 1  # a cropped cloud has fewer points
     assert counts["residual"] < 1
+
+
+def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(given, embedded, tmp_path, monkeypatch):
+    poses = tmp_path / "poses.csv"
+    rows = {"sample": embedded.sample, "split": embedded.split, "instance": embedded.sample // 3, "dataset": "tiny"}
+    pd.DataFrame(rows | {"in_training": True}).to_csv(poses, index=False)
+    trained = []
+
+    def train(registrations, source, seed, settings, *, start=None, group_S=None):
+        trained.append((settings.reading, source, start is not None, group_S is not None, settings.validation_share))
+        return train_encoder(registrations, source, seed, settings, start=start, group_S=group_S)
+
+    monkeypatch.setattr(frame_input, "train_encoder", train)
+    shown = replace(
+        given,
+        registrations=given.registrations | {("other", 0): given.registrations["tiny", 0]},
+        poses={("tiny", 0): poses},
+        sections=SECTIONS | {"pretraining": {"epochs": 1}, "training": {"validation_share": 0.2}},
+    )
+    choices = {"input": ["aligned", "observed", "reversed"], "objects": ["all", "unseen"]}
+    found = rows_of(frame_input.run, shown, choices)
+    assert found[("aligned", "all"), "gpca_paper", "accuracy", "all"] == pytest.approx(15 / 18)
+    assert {reading for reading, *_ in found} == {(cloud, "all") for cloud in choices["input"]}
+    assert trained == [
+        (cloud, source, *of)
+        for cloud in ("observed", "reversed")
+        for source, *of in (("pretraining", False, False, 0.0), ("tiny", True, True, 0.2))
+    ]
+    with pytest.raises(InputError, match="lack registrations or poses of tiny, seed 0, beside its predictions"):
+        rows_of(frame_input.run, replace(shown, poses={}), choices)

@@ -25,7 +25,7 @@ def sources(config):
 def test_every_place_that_the_registry_names_is_there(config, sources):
     names, settings = names_of(config, sources), settings_of(config, sources)
     results = results_of(names)
-    assert len(results) == 61
+    assert len(results) == 63
     for result in results:
         assert all(files for files in result.files(names).values())
         result.arguments(settings)
@@ -46,6 +46,17 @@ def test_a_grid_without_any_printed_row_has_no_table4_kernels(config, sources, c
     made = {result.name for result in results_of(names_of(other, sources))}
     assert "table4_kernels" not in made
     assert "table4_grid" in made
+
+
+def test_encoders_of_other_clouds_are_trained_where_the_config_gives_them_seeds(config, sources):
+    other = deepcopy(config)
+    other["readings"]["frame_seeds"] = 2
+    other["real_world"]["backbones"] = ["dgcnn"]
+    made, more = ({result.name for result in results_of(names_of(of, sources))} for of in (config, other))
+    assert more - made == {"table6_inputs"}
+    assert made - more == {"frame_reliability"}  # one backbone has none beside it
+    assert "frame_input" not in names_of(config, sources)["reading_group"]
+    assert "frame_input" in settings_of(other, sources)["reading_groups"]
 
 
 def test_the_rows_of_table_6_are_gp_ca_on_their_own_embeddings(config, sources):

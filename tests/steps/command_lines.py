@@ -157,6 +157,11 @@ STEP_OPTIONS = {
         "--cause-embeddings": "cause_embeddings.npz", "--strategies": ["bald_kmeans", "all_labels"],
         "--out": ["new_bald_kmeans.csv", "new_all_labels.csv"],
     },
+    "frame_labels": COMMON | {
+        "--settings": {"frame_labels": {"initial": 6, "labels": 2, "points": 64}, "active_learning": LEARNING},
+        "--seed": 0, "--registrations": "registrations.npz", "--backbones": "dgcnn", "--embeddings": "embeddings.npz",
+        "--strategies": ["random", "all_labels"], "--out": ["frame_random.csv", "frame_all_labels.csv"],
+    },
     "kernel_grid": COMMON | {
         "--settings": {"kernels": ["rbf", "polynomial"], "iterations": [2, 4], "inducing": 6, "draws": 20},
         "--seeds": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "grid.csv",

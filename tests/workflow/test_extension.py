@@ -22,7 +22,14 @@ OF_FRAMES = Counter(
     ["real_world", "table6_backbones", "table6_seen_unseen", "fig5_real_world_example", "real_world_failures"]
 )
 OF_FRAMES.update(
-    confusion_real_world=1, pretrain_encoder=1, train_on_frames=2, reduce_embeddings=1, embed=2, attribute=2
+    learn_on_frames=1,
+    table6_labels=1,
+    confusion_real_world=1,
+    pretrain_encoder=1,
+    train_on_frames=2,
+    reduce_embeddings=1,
+    embed=2,
+    attribute=2,
 )
 COLLECTORS = {"metrics": 1, "timings": 1, "fig_attribution_confusions": 1, "table1_extended": 1}
 TABLES = dict.fromkeys(("table1_single_baselines", "table2_per_concept"), 1)

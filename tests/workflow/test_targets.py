@@ -26,7 +26,7 @@ DIAGNOSED = jobs("diagnostics", "coverage_risk", "reliability", "uncertainty_vs_
 TABLES4 = jobs("table4_kernels", "table4_grid")
 KERNELS = jobs("fit_kernel_grid", "kernels", "kernel_learning_curves") + TABLES4
 METHOD = jobs("fig2_overview", "fig4_pipeline")
-FRAMES = jobs("real_world", "table6_backbones", "table6_seen_unseen", "confusion_real_world")
+FRAMES = jobs("real_world", "table6_backbones", "table6_seen_unseen", "table6_labels", "confusion_real_world")
 PICTURES = jobs("fig5_real_world_example", "real_world_failures")
 RUNTIME = jobs("time_stages", "table7_runtime", "runtime")
 MODEL = jobs("model") + RUNTIME
@@ -34,8 +34,9 @@ RECOVERY_FIGURES = jobs("recovery_rates", "queued_labels", "fig6_mitigation", "f
 RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
 METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
 ESTIMATED = jobs("estimator_metrics", "table12_uncertainty", "estimators")
-# GP-CA on the two reductions of Table VI, and what shows it.
-BACKBONES = jobs(attribute=2) + FRAMES + PICTURES
+# GP-CA on the two reductions of Table VI, learning curves of the first seed, and what shows them.
+BACKBONES = jobs("learn_on_frames", attribute=2) + FRAMES + PICTURES
+LABELLED = jobs("learn_on_frames") + FRAMES
 # What four explainers say of the causes: from the samples on, and what is made of it.
 CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
 CAUSES_SHOWN += jobs("nominal_reliability")
@@ -104,7 +105,7 @@ def test_table6_needs_the_frames_and_what_the_encoder_starts_from(planned):
     assert planned.before("results/smoke/tables/table6_backbones.md") == {
         "sample_objects": 2, "register": 2, "pretrain_encoder": 1, "render_scenes": 1, "instances": 1,
         "register_frames": 2, "train_on_frames": 2, "embed": 2, "reduce_embeddings": 1, "attribute": 4, "real_world": 1,
-        "table6_backbones": 1,
+        "learn_on_frames": 1, "table6_backbones": 1,
     }  # fmt: skip
 
 
@@ -146,7 +147,8 @@ EDITS = {
     "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
     "baselines/heads.py": DIAGNOSED,
     "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
-    "gpca/active_learning/acquisition.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED + NEW + RUNTIME,
+    "gpca/active_learning/acquisition.py":
+        jobs("fig4_pipeline", learn_actively=4) + LEARNED + NEW + RUNTIME + LABELLED,
     "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED,
     "gpca/reporting/figures/active_learning.py":
         jobs("active_learning_curves", "active_learning_overlap", "new_concept_curves", "fig4_pipeline"),

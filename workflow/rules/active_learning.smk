@@ -173,3 +173,43 @@ rule new_concepts:
         target=config["active_learning"]["target"],
     script:
         "../scripts/collect.py"
+
+
+rule learn_on_frames:
+    input:
+        registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
+        embeddings=collect(
+            f"<results>/embeddings/{FRAMES}/{{encoder}}/none/seed{{{{seed}}}}.npz",
+            encoder=config["real_world"]["backbones"],
+        ),
+        code=code_files("gpca.steps.frame_labels"),
+    output:
+        collect(
+            f"<results>/frame_labels/{FRAMES}/{{strategy}}/seed{{{{seed}}}}.csv",
+            strategy=NAMES["new_concept_strategy"],
+        ),
+    log:
+        "<logs>/frame_labels/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/frame_labels/seed{seed}.tsv"
+    priority: 4
+    conda:
+        "../envs/gpca.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        settings=as_json(
+            {
+                "frame_labels": config["frame_labels"],
+                "active_learning": config["active_learning"],
+            }
+        ),
+        source=FRAMES,
+        backbones=config["real_world"]["backbones"],
+        strategies=NAMES["new_concept_strategy"],
+    shell:
+        "python -m gpca frame_labels --threads {threads} --source {params.source} --seed {wildcards.seed} "
+        "--registrations {input.registrations} --backbones {params.backbones} --embeddings {input.embeddings} "
+        "--settings {params.settings:q} --strategies {params.strategies} --out {output} 2> {log}"

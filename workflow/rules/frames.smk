@@ -140,7 +140,17 @@ rule real_world:
         pose_files=collect(
             "<results>/poses/{source}/seed{seed}.csv", source=CONDITIONS, seed=SEEDS
         ),
-        code=collector_code("gpca.frames.metrics:collect"),
+        label_files=collect(
+            f"<results>/frame_labels/{FRAMES}/{{strategy}}/seed{{seed}}.csv",
+            strategy=NAMES["new_concept_strategy"],
+            seed=NAMES["frame_label_seed"],
+        ),
+        curve_files=collect(
+            f"<results>/encoders/{FRAMES}/{{encoder}}/seed{{seed}}.csv",
+            encoder=REAL_WORLD["backbones"],
+            seed=SEEDS,
+        ),
+        code=collector_code("gpca.active_learning.frame_metrics:collect"),
     output:
         "<results>/real_world.csv",
     log:
@@ -155,6 +165,7 @@ rule real_world:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.frames.metrics:collect",
+        collector="gpca.active_learning.frame_metrics:collect",
+        targets=config["frame_labels"]["targets"],
     script:
         "../scripts/collect.py"

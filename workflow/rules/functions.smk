@@ -38,6 +38,8 @@ def control_settings(wildcards, **further):
 def read_by_readings(wildcards):
     """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
     group = GROUPS[wildcards.reading_group]
+    if wildcards.reading_group == FRAME_INPUT:
+        return read_by_frame_input()
     sources = [name for name in group.sources if name in SOURCES]
     seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
     made = "predictions"
@@ -63,3 +65,33 @@ def read_by_readings(wildcards):
         )
         for kind in group.reads
     }
+
+
+def read_by_frame_input():
+    """Return the frames of its seeds with what the protocol's encoder makes of them, and what others start from."""
+    of = {"source": FRAMES, "seed": SEEDS[: READINGS["frame_seeds"]]}
+    first = collect(
+        f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SOURCES
+    )
+    return {
+        "registrations": [
+            *collect("<results>/registrations/{source}/seed{seed}.npz", **of),
+            *(first if REAL_WORLD["pretraining"] else []),
+        ],
+        "poses": collect("<results>/poses/{source}/seed{seed}.csv", **of),
+        "predictions": collect(
+            f"<results>/predictions/{{source}}/{BACKBONE}-none/seed{{seed}}.csv", **of
+        ),
+    }
+
+
+def reading_sections(group):
+    """Return the sections of the config that a group reads beside its choices."""
+    if group != FRAME_INPUT:
+        return READING_SECTIONS
+    training = (REAL_WORLD["training"] or {}).get(BACKBONE) or {}
+    of_frames = {"pretraining": REAL_WORLD["pretraining"] or {}, "training": training}
+    encoder = {"encoder": config["encoders"][BACKBONE]}
+    return (
+        {name: READING_SECTIONS[name] for name in ("icp", "gpca")} | of_frames | encoder
+    )

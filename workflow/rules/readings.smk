@@ -1,8 +1,13 @@
 # Files of a run -> the printed numbers under every reading of what the paper leaves unstated -> readings.csv.
-from gpca.readings.registry import GROUPS
+from gpca.readings.registry import FRAME_INPUT, GROUPS
 
 READINGS = config["readings"]
 READING_SIZES = {name: READINGS[name] for name in ("seeds", "encoders", "samples")}
+BACKBONE = REAL_WORLD["backbones"][0]  # whose encoder of frames sees other clouds
+ENCODERS_OF_READINGS = {
+    "encoder_head": config["embedding"]["encoder"],
+    FRAME_INPUT: BACKBONE,
+}
 READING_SECTIONS = {
     "uncertainty": config["uncertainty"].get("additive", {}),
     "icp": config["registrations"]["icp"],
@@ -19,8 +24,8 @@ rule reading:
             "gpca.steps.readings",
             GROUPS[wildcards.reading_group].module,
             *(
-                [encoder_module(config["embedding"]["encoder"])]
-                if wildcards.reading_group == "encoder_head"
+                [encoder_module(encoder)]
+                if (encoder := ENCODERS_OF_READINGS.get(wildcards.reading_group))
                 else []
             ),
         ),
@@ -32,6 +37,7 @@ rule reading:
         "<benchmarks>/readings/{reading_group}.tsv"
     wildcard_constraints:
         reading_group="|".join(GROUPS),
+    priority: 3
     conda:
         "../envs/gpca.yaml"
     threads: 1
@@ -43,7 +49,7 @@ rule reading:
             {
                 "choices": READINGS["groups"][wildcards.reading_group],
                 "sizes": READING_SIZES,
-                **READING_SECTIONS,
+                **reading_sections(wildcards.reading_group),
             }
         ),
         files=lambda wildcards, input: [

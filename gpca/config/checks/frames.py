@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Set
 
 from baselines.registry import require_settings
+from gpca.active_learning.frame_settings import in_percent
 from gpca.config.checks.named import require_names, with_key
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.source import REAL_WORLD, has_estimates, resolve_datasets
 from gpca.objects import procedural
+from gpca.pairs.perturbation import CONCEPTS
 
 
 def check_real_world(config: dict, encoders_left_out: Set[str]) -> None:
@@ -28,6 +30,7 @@ def check_real_world(config: dict, encoders_left_out: Set[str]) -> None:
         fault = "form results needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files, or take another form")
     _check_training(config)
+    _check_labels(config)
     names = ("condition_backbones", section["condition_backbones"])
     require_names(f"real_world.{names[0]}", names[1], section["backbones"], "backbone", encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
@@ -42,3 +45,17 @@ def _check_training(config: dict) -> None:
         for part in ("pretraining", "training"):
             given = (section[part] or {}) if part == "pretraining" else (section[part] or {}).get(name, {})
             with_key(f"real_world.{part}", lambda given=given, name=name: EncoderSettings(**encoders[name] | given))
+
+
+def _check_labels(config: dict) -> None:
+    """Check that the targets differ in percent, and that the labels at the start leave a pool.
+
+    A third of the training samples is of each concept.
+    """
+    targets = config["frame_labels"]["targets"]
+    if len(set(map(in_percent, targets))) < len(targets):
+        raise InputError("config key frame_labels.targets", "two are alike in whole percent", "leave one out")
+    initial, train = config["frame_labels"]["initial"], config["real_world"]["train"]
+    if initial // 2 >= train // len(CONCEPTS):
+        fault = f"{initial} labelled samples of two concepts leave no pool of {train} training samples"
+        raise InputError("config key frame_labels.initial", fault, "lower it or raise real_world.train")

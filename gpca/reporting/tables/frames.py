@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +52,7 @@ def table6_seen_unseen(
     columns = {name: Column(head) for name, head in EVERYTHING_SEEN.items()}
     columns |= {name: Column(f"{name.removeprefix(DATASET)} (%)", interval=False) for name in datasets}
     columns |= {"ece": Column("ECE, all", decimals=2, interval=False, limits=(0.0, 1.0))}
+    columns |= {"nll": Column("NLL, all", decimals=2, interval=False, limits=(0.0, inf))}
     first = rows_where(metrics, source=next(iter(conditions)), metric="test_samples", concept=ALL)
     shares = [_share(first, name) for name in (SEEN, UNSEEN)]
     return table.build(
@@ -62,14 +64,16 @@ def table6_seen_unseen(
             f"objects ({shares[0]} of the test samples) are shown in a scene of the training too, unseen ones "
             f"({shares[1]}) are not. Instances take turns, so that objects and datasets are as unequally frequent as "
             "in the frames.",
-            "A dataset has a value where at least one seed tests its frames. ECE: expected calibration error of all.",
+            "A dataset has a value where at least one seed tests its frames. ECE: expected calibration error of all. "
+            "NLL: their mean negative log likelihood, in nats.",
         ),
     )
 
 
 def _cells(of_method: pd.DataFrame, datasets: Sequence[str]) -> dict[str, Cell | None]:
     cells = {name: _cell(rows_where(of_method, table=name), "accuracy") for name in (*EVERYTHING_SEEN, *datasets)}
-    return cells | {"ece": _cell(rows_where(of_method, table=TOGETHER), "ece", scale=1)}
+    together = rows_where(of_method, table=TOGETHER)
+    return cells | {metric: _cell(together, metric, scale=1) for metric in ("ece", "nll")}
 
 
 def _cell(rows: pd.DataFrame, metric: str, scale: float = 100) -> Cell | None:

@@ -14,7 +14,7 @@ def metrics(values):
         for seed, (accuracy, samples) in enumerate(of_seeds):
             rows += [(table, source, method, "accuracy", ALL, seed, accuracy)]
             rows += [(table, source, method, "test_samples", ALL, seed, samples)]
-            rows += [(table, source, method, "ece", ALL, seed, 0.1)]
+            rows += [(table, source, method, "ece", ALL, seed, 0.1), (table, source, method, "nll", ALL, seed, 1.5)]
     return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
 
 
@@ -40,6 +40,7 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
     assert table.cells[0, "dataset/lm"].mean == pytest.approx(60)
     assert table.cells[1, "attribution"].mean == pytest.approx(60)
     assert (1, "seen") not in table.cells
+    assert table.cells[0, "nll"].mean == 1.5
     assert "40 % of the test samples" in " ".join(table.footnotes)
 
 

@@ -1,0 +1,37 @@
+"""Settings of active learning on depth frames, apart from its code: nothing here needs torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from gpca.pairs.perturbation import Concept
+from gpca.settings import Bounds, Count, PositiveShare
+
+PAIR = "pair"  # the embedding that is measurements of the pair, beside those by the backbones
+
+
+@dataclass(frozen=True)
+class FrameLabelSettings:
+    """What differs from active learning on whole objects.
+
+    Attributes:
+        seeds: the first so many of the run's.
+        held_out: the new concepts, in turn.
+        initial: labelled samples of the known concepts before the first query, balanced.
+        labels: L, the budget of queries.
+        targets: accuracies on the test samples to which labels are counted.
+        points: drawn from each cloud to describe a pair.
+    """
+
+    seeds: Count = 1
+    held_out: tuple[Concept, ...] = ("overlap",)
+    initial: Annotated[int, Bounds(minimum=2)] = 60
+    labels: Count = 80
+    targets: tuple[PositiveShare, ...] = (0.65, 0.7, 0.75)
+    points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
+
+
+def in_percent(target: float) -> str:
+    """Return how a target stands in the column `table` of the metrics."""
+    return f"{100 * target:.0f}"
