@@ -53,4 +53,4 @@ def draw_frame_reliability(
         panel.set_xlim(1 / 3 - 0.03, 1.02)
         panel.set_xticks([0.4, 0.6, 0.8, 1.0])
     handles, labels = panels[0].get_legend_handles_labels()
-    finish_panels(figure, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
+    finish_panels(figure, panels, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)

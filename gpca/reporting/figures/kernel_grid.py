@@ -95,9 +95,9 @@ def draw_kernel_curves(
     ]
     ours: dict[str, Any] = {"color": GREY, "marker": "o", "markerfacecolor": "white", "linestyle": ""}
     handles.append(Line2D([], [], label="row of Table IV", **ours))
-    for marker, rate in zip(PRINTED_MARKERS, rates, strict=False):
-        style: dict[str, Any] = {"color": GREY, "marker": marker, "linestyle": "", "markersize": 3.5}
-        handles.append(Line2D([], [], label=f"paper, rate {rate:g}", **style))
+    for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False):
+        printed: dict[str, Any] = {"color": GREY, "marker": symbol, "linestyle": "", "markersize": 3.5}
+        handles.append(Line2D([], [], label=f"paper, rate {rate:g}", **printed))
     figure.legend(handles=handles, ncol=3, loc="lower center", columnspacing=1.2, handlelength=1.8)
     figure.tight_layout(rect=(0, 0.48 / height_in, 1, 1), pad=0.4, h_pad=0.8)
     save_figure(figure, pdf_path, png_path)

@@ -96,7 +96,10 @@ def draw_real_world_example(
     for panel in panels[:3]:
         _shade(panel, covered(own_px, seen["init", "source"], image.shape[:2]))
     large = float(np.clip(2000 / len(observed_m), 1.1, 5))  # Few points are drawn larger.
-    looks = {"model": {"color": TARGET_COLOUR, "s": 0.7}, "source": {"color": SOURCE_COLOUR, "s": large}}
+    looks: dict[str, dict[str, Any]] = {
+        "model": {"color": TARGET_COLOUR, "s": 0.7},
+        "source": {"color": SOURCE_COLOUR, "s": large},
+    }
     for panel, pose in ((panels[1], "init"), (panels[2], "icp")):
         for name, look in looks.items():
             panel.scatter(*seen[pose, name].T, linewidths=0, **look)
