@@ -1,5 +1,5 @@
 import sys
-from importlib import invalidate_caches
+from importlib import import_module, invalidate_caches
 
 import pytest
 
@@ -16,7 +16,7 @@ def fruits(tmp_path, monkeypatch):
     for name, text in files.items():
         (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
-    import fruits as folder
+    folder = import_module("fruits")
 
     yield Registry("fruit", folder, "FRUITS", first=("exotic",))
     for name in [name for name in sys.modules if name.split(".")[0] in ("fruits", "exotic")]:

@@ -85,7 +85,11 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
     [
         ("--descriptors", ["descriptors.npz", "descriptors.npz"], "--descriptors: 2 file(s) for 1 of causes"),
         ("--instances", ["objects.npz"], "objects.npz: array"),
-        ("--settings", [json.dumps({"datasets": {"tiny": {"location": "/not/there"}}})], "/not/there is not there"),
+        (
+            "--settings",
+            [json.dumps(SETTINGS | {"datasets": {"tiny": {"location": "/not/there"}}})],
+            "/not/there is not",
+        ),
         ("--settings", [json.dumps({"frames": {"points": 3}})], "setting points: 3 is less than the minimum of 64"),
         ("--settings", [json.dumps({"explainers": {"oracle": {}}})], "explainer 'oracle': unknown; known are"),
         ("--out", ["objects.npz"], "objects.npz"),

@@ -103,7 +103,7 @@ def draw_real_world_example(
     for panel, pose in ((panels[1], "init"), (panels[2], "icp")):
         for name, look in looks.items():
             panel.scatter(*seen[pose, name].T, linewidths=0, **look)
-    ends_m = np.vstack([np.zeros(3), 0.5 * registrations.diameter_m[row] * np.eye(3)])
+    ends_m = np.vstack([np.zeros(3), 0.3 * registrations.diameter_m[row] * np.eye(3)])
     origin, *tips = camera.project(transform(poses["icp"], ends_m))
     for tip, name in zip(tips, "xyz", strict=True):
         outline = [withStroke(linewidth=2.4, foreground="white")]
