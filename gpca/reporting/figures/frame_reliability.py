@@ -51,6 +51,6 @@ def draw_frame_reliability(
         gap = draw_reliability_panel(panel, confidence_N, hit_N, BINS)
         panel.set_title(f"{methods[method]}\nECE {gap:.3f}", fontsize=SMALL_PT)
         panel.set_xlim(1 / 3 - 0.03, 1.02)
-        panel.set_xticks([0.4, 0.6, 0.8, 1.0])
+        panel.set_xticks([0.4, 0.6, 0.8, 1.0], ["0.4", "0.6", "0.8", "1"])
     handles, labels = panels[0].get_legend_handles_labels()
     finish_panels(figure, panels, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
