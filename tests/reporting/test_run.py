@@ -1,12 +1,14 @@
 """What a run consists of, worked out from the config that the suite ships."""
 
+import inspect
 from copy import deepcopy
 
 import pytest
 
 from gpca.config.check import check
 from gpca.config.leave_out import without_false
-from gpca.reporting.registry import results_of
+from gpca.registry import load as load_function
+from gpca.reporting.registry import input_name, results_of
 from gpca.reporting.run import explainer_of, files_behind, names_of, settings_of
 
 from ..config.configs import load
@@ -29,6 +31,22 @@ def test_every_place_that_the_registry_names_is_there(config, sources):
     for result in results:
         assert all(files for files in result.files(names).values())
         result.arguments(settings)
+
+
+def test_a_reader_of_one_file_is_given_one_and_a_reader_of_many_a_list(config, sources):
+    other = deepcopy(config)
+    other["readings"]["frame_seeds"] = 2
+    names = names_of(other, sources)
+    for result in results_of(names):
+        files = result.files(names)
+        for given in result.inputs:
+            if given.read:
+                parameters = inspect.signature(load_function(given.read)).parameters
+                for keyword in given.files:
+                    taken = parameters[keyword] if keyword else next(iter(parameters.values()))
+                    many = any(word in str(taken.annotation) for word in ("Iterable", "Sequence", "list"))
+                    is_list = isinstance(files[input_name(given.argument, keyword)], list)
+                    assert is_list == many, f"{result.name}: {given.argument}"
 
 
 def test_tables_of_what_a_run_leaves_out_are_not_made(config, sources):
