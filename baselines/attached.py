@@ -23,7 +23,7 @@ def attached(registrations: Registrations, name: str, *shape: int | None) -> np.
     )
     if not matches:
         sizes = "×".join("any" if size is None else str(size) for size in expected)
-        raise InputError(f"array '{name}'", f"has shape {array.shape}, not {sizes}", "make it anew")
+        raise InputError(f"array '{name}'", f"has shape {array.shape}, not {sizes}", "regenerate it")
     if not np.isfinite(array).all():
-        raise InputError(f"array '{name}'", "holds NaN or infinity", "make it anew")
+        raise InputError(f"array '{name}'", "contains NaN or infinity", "regenerate it")
     return array

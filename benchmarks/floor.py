@@ -56,7 +56,7 @@ def find_sources(folder: Path) -> list[str]:
     """Return the sources of a run for which SHAP or SA read the uncertainty."""
     if sources := sorted({path.parent.parent.name for path in folder.glob("uncertainty/*/additive/seed*.npz")}):
         return sources
-    fault = "holds no uncertainty/{source}/additive/seed*.npz"
+    fault = "has no uncertainty/{source}/additive/seed*.npz"
     raise InputError(folder, fault, "name the folder of a run with shap_additive")
 
 
@@ -76,7 +76,7 @@ def read_source(folder: Path, source: str) -> dict[int, dict[str, Registrations]
             of_design[design] = outcomes.attach_to(registrations, no_seconds, no_seconds)
         evaluated[int(path.stem.removeprefix("seed"))] = of_design
     if not evaluated:
-        raise InputError(folder, f"holds no registrations/{source}/seed*.npz", "the run is incomplete")
+        raise InputError(folder, f"has no registrations/{source}/seed*.npz", "the run is incomplete")
     return evaluated
 
 

@@ -142,7 +142,7 @@ def read_stages(folder: Path) -> dict[str, Stage]:
         stage.job_s += number(path, "s")
         stage.peaks_mb += number(path, "max_rss")
     if not any(stage.work_s for stage in stages.values()):
-        raise InputError(folder, f"holds no *{SIDECAR}", "make the run with this version of the workflow")
+        raise InputError(folder, f"has no *{SIDECAR}", "make the run with this version of the workflow")
     return dict(sorted(stages.items(), key=lambda item: _place(item[0])))
 
 
@@ -151,7 +151,7 @@ def wall_time(folder: Path) -> float:
     files = (folder / "benchmarks").rglob("*.tsv")
     starts = [path.stat().st_mtime - seconds for path in files for seconds in number(path, "s")]
     if not starts:
-        raise InputError(folder, "holds no benchmark files", "make the run with this version of the workflow")
+        raise InputError(folder, "has no benchmark files", "make the run with this version of the workflow")
     return max(path.stat().st_mtime for path in folder.rglob("*") if path.is_file()) - min(starts)
 
 
@@ -228,7 +228,7 @@ def number(path: Path, key: str) -> list[float]:
         value = (json.loads(text) if path.suffix == ".json" else next(rows))[key]
         return [] if value in ("NA", "-") else [float(value)]
     except (ValueError, KeyError, TypeError, StopIteration) as fault:
-        raise InputError(path, f"holds no number '{key}'", "make the run anew") from fault
+        raise InputError(path, f"has no number '{key}'", "repeat the run") from fault
 
 
 if __name__ == "__main__":

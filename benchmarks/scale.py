@@ -85,7 +85,7 @@ def measured(jobs: Sequence[Job], folder: Path) -> dict[str, float]:
             seconds[job.benchmark] = sum(value for record in blocks.values() for value in number(record, "seconds"))
         else:
             raise InputError(
-                folder, f"holds no {job.benchmark}", "finish the run, or give its --configfile and --config"
+                folder, f"has no {job.benchmark}", "finish the run, or give its --configfile and --config"
             )
     return seconds
 

@@ -81,7 +81,7 @@ def name_of_run(folder: Path) -> str:
         InputError: no job was measured there.
     """
     if not (folder / "benchmarks").is_dir():
-        raise InputError(folder, "holds no benchmark files", "name the folder of a finished run")
+        raise InputError(folder, "has no benchmark files", "name the folder of a finished run")
     return folder.resolve().name
 
 

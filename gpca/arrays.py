@@ -47,7 +47,7 @@ def load_arrays(
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such file", f"make it with '{made_by}'")
-    remedy = f"make it anew with '{made_by}'"
+    remedy = f"regenerate it with '{made_by}'"
     try:
         with zipfile.ZipFile(path) as archive:
             members = _checked_members(archive, path, shapes, kinds or {}, remedy)
@@ -70,7 +70,7 @@ def _checked_members(archive, path, shapes, kinds, remedy) -> dict[str, zipfile.
     members = {}
     for name, shape in shapes.items():
         if (count := listed.count(f"{name}.npy")) != 1:
-            raise InputError(path, f"array '{name}' is {'there twice' if count else 'missing'}", remedy)
+            raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
         members[name] = info = archive.getinfo(f"{name}.npy")
         if not is_bounded(info):
             raise InputError(path, f"array '{name}' is compressed in a way that npz does not know", remedy)

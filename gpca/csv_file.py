@@ -30,20 +30,20 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
     try:
         rows = pd.read_csv(path, dtype=str, keep_default_na=False)
     except pd.errors.EmptyDataError as fault:
-        raise InputError(path, "is empty", "make it anew") from fault
+        raise InputError(path, "is empty", "regenerate it") from fault
     except (pd.errors.ParserError, UnicodeDecodeError, OSError) as fault:
-        raise InputError(path, f"is not a readable CSV file ({fault})", "make it anew") from fault
+        raise InputError(path, f"is not a readable CSV file ({fault})", "regenerate it") from fault
     missing = [column for column in columns if column not in rows.columns]
     if missing:
-        raise InputError(path, f"column '{missing[0]}' is missing", "make it anew")
+        raise InputError(path, f"column '{missing[0]}' is missing", "regenerate it")
     if not isinstance(rows.index, pd.RangeIndex):  # pandas takes what is too much for an index, and shifts the rest
-        raise InputError(path, "has rows with more entries than columns", "make it anew")
+        raise InputError(path, "has rows with more entries than columns", "regenerate it")
     # pandas gives the second of two columns another name, so the head is read once more as it stands.
     head = pd.read_csv(path, dtype=str, keep_default_na=False, header=None, nrows=1).iloc[0]
     if (twice := head[head.duplicated()]).size:
-        raise InputError(path, f"column '{twice.iloc[0]}' is there twice", "make it anew")
+        raise InputError(path, f"column '{twice.iloc[0]}' appears twice", "regenerate it")
     if rows.empty:
-        raise InputError(path, "holds no rows", "make it anew")
+        raise InputError(path, "has no rows", "regenerate it")
     return rows
 
 
@@ -57,13 +57,13 @@ def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, leas
 
     values = pd.to_numeric(rows[column], errors="coerce").astype(float)
     if (~np.isfinite(values) & needed).any():
-        raise InputError(path, f"column '{column}' holds something that is not a finite number", "make it anew")
+        raise InputError(path, f"column '{column}' contains values that are not finite numbers", "regenerate it")
     if (values < least).any():
-        raise InputError(path, f"column '{column}' holds numbers below {least:g}", "make it anew")
+        raise InputError(path, f"column '{column}' contains numbers below {least:g}", "regenerate it")
     return values
 
 
-def finite_number(subject: object, name: str, text: str, remedy: str = "make it anew") -> float:
+def finite_number(subject: object, name: str, text: str, remedy: str = "regenerate it") -> float:
     """Return the number that one field holds; `subject` and `name` say where it stands.
 
     Raises:

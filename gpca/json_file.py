@@ -29,7 +29,7 @@ def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
     except ValueError as fault:  # also of UTF-8
         raise InputError(path, f"is not {what} ({fault})", remedy) from fault
     if not isinstance(content, dict):
-        raise InputError(path, f"is not {what} (it holds no object at the top)", remedy)
+        raise InputError(path, f"is not {what} (it has no object at the top)", remedy)
     return content
 
 
@@ -50,7 +50,7 @@ def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in pairs:
         if key in found:
-            raise ValueError(f"key {key[:40]!r} stands twice")
+            raise ValueError(f"key {key[:40]!r} appears twice")
         found[key] = value
     return found
 

@@ -46,7 +46,7 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
     except ValueError as fault:
         raise InputError(path, str(fault), "correct it there") from fault
     if not isinstance(mapping, dict):
-        raise InputError(path, "holds no keys at its top level", "write 'key: value', as in config/config.yaml")
+        raise InputError(path, "has no keys at its top level", "write 'key: value', as in config/config.yaml")
     require_plain(mapping, path)
     return mapping
 
@@ -120,7 +120,7 @@ def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
             if isinstance(key, yaml.ScalarNode) and key.tag != _MERGE:
                 if (key.tag, key.value) in seen:
                     line = key.start_mark.line + 1
-                    raise InputError(path, f"line {line}: key '{key.value}' stands twice", "keep one of them")
+                    raise InputError(path, f"line {line}: key '{key.value}' appears twice", "keep one of them")
                 seen.add((key.tag, key.value))
     sizes[id(node)] = size
     return size

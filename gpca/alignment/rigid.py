@@ -56,7 +56,7 @@ def require_rotation(T_b_a: np.ndarray, subject: object, tolerance: float = 1e-3
     """Raise an InputError that names `subject` unless the pose is finite and its upper left part is a rotation."""
     R = T_b_a[:3, :3]
     if not np.isfinite(T_b_a).all():
-        fault = "it holds NaN or infinity"
+        fault = "it contains NaN or infinity"
     elif abs(R).max() > 2 or abs(R @ R.T - np.eye(3)).max() > tolerance:
         fault = "its axes are not at right angles, or not of length 1"
     elif np.linalg.det(R) < 0:

@@ -136,7 +136,7 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
         rows = read_predictions(path)
         test = rows[rows["split"] == "test"]
         if test.empty:
-            raise InputError(path, "holds no test rows", "make it anew")
+            raise InputError(path, "has no test rows", "regenerate it")
         metrics = attribution_metrics(test, concepts_of(rows))
         if (source, seed) in causal:
             metrics |= _causal_metrics(path, test, *causal[source, seed])
@@ -167,7 +167,7 @@ def _causal_metrics(path, test: pd.DataFrame, causal_path, causal: pd.Series) ->
     keys = _samples(test)
     if not (known := keys.isin(causal.index)).all():
         split, sample = keys[~known][0]
-        raise InputError(causal_path, f"lacks {split} sample {sample} of {path}", "make both anew from one config")
+        raise InputError(causal_path, f"lacks {split} sample {sample} of {path}", "regenerate both from the same config")
     shown = test[causal[keys].to_numpy()]
     metrics: dict[str, dict[str, float]] = {"causal_samples": {ALL: len(shown)}}
     if len(shown):
@@ -197,7 +197,7 @@ def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
         rows = read_csv(path, TIMING_COLUMNS)
         test = rows[rows["split"] == "test"]
         if test.empty:
-            raise InputError(path, "holds no test rows", "make it anew")
+            raise InputError(path, "has no test rows", "regenerate it")
         for column in ("seconds", "icp_seconds"):
             mean = float(numbers(path, test, column).mean())
             records.append(("runtime", source, method, f"{column}_per_sample", ALL, seed, mean))

@@ -67,10 +67,10 @@ def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFra
     rows = read_csv(path, (*labels, *PREDICTION_COLUMNS))
     concepts = concepts_of(rows)
     if not concepts:
-        raise InputError(path, "has no column score_<concept>", "make it anew")
+        raise InputError(path, "has no column score_<concept>", "regenerate it")
     rows["abstained"] = rows["abstained"].str.lower().map(_TRUTH)
     if rows["abstained"].isna().any():
-        raise InputError(path, "column 'abstained' holds something other than True and False", "make it anew")
+        raise InputError(path, "column 'abstained' contains values other than True and False", "regenerate it")
     rows["abstained"] = rows["abstained"].astype(bool)
     for column in ("concept_true", "concept_predicted"):
         known = rows[column].isin(concepts)
@@ -116,7 +116,7 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     rows = read_csv(path, TIMING_COLUMNS)
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
-            raise InputError(path, "does not hold the seconds of these samples", "make it anew")
+            raise InputError(path, "does not hold the seconds of these samples", "regenerate it")
     seconds, icp_seconds = (numbers(path, rows, name, least=0).to_numpy() for name in ("seconds", "icp_seconds"))
     return seconds, icp_seconds
 
@@ -124,6 +124,6 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
 def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:
     """Raise an InputError unless every row is of split train or test and each sample of a split stands once."""
     if not rows["split"].isin(["train", "test"]).all():
-        raise InputError(path, "column 'split' holds something other than train and test", "make it anew")
+        raise InputError(path, "column 'split' contains values other than train and test", "regenerate it")
     if rows.duplicated(list(keys)).any():
-        raise InputError(path, "holds a sample twice", "make it anew")
+        raise InputError(path, "contains a sample twice", "regenerate it")

@@ -95,7 +95,7 @@ class Causes:
         arrays = load_arrays(path, shapes, MADE_BY, kinds)
         for name, within in _possible(arrays, registrations).items():
             if not np.all(within):
-                raise InputError(path, f"'{name}' holds what cannot be", f"make it anew with '{MADE_BY}'")
+                raise InputError(path, f"'{name}' contains impossible values", f"regenerate it with '{MADE_BY}'")
         limits = {name: float(arrays[name]) for name in LIMITS}
         truth, truth_again = (
             Truth(arrays[f"error{again}"], arrays[f"uncertainty{again}"], **limits) for again in ("", "_again")

@@ -52,6 +52,6 @@ def replay(objects: ObjectClouds, causes: Causes, row: int, source: str, seed: i
     if shown.shape != observed[ALL].shape or np.abs(observed[ALL] - shown).max() > 1e-3:
         fault = "is not drawn again by these settings"
         raise InputError(
-            f"sample {registrations.sample[row]} of {source}", fault, "make the causes anew from one config"
+            f"sample {registrations.sample[row]} of {source}", fault, "regenerate the causes from a single config"
         )
     return Replay(candidate.model, observed)

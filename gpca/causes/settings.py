@@ -113,7 +113,7 @@ class CauseSettings(UncertaintySettings):
         for name in ("points", "several"):
             low, high = getattr(self, name)
             if low > high:
-                raise InputError(f"causes {name}", f"[{low}, {high}] runs downwards", "swap the two")
+                raise InputError(f"causes {name}", f"[{low}, {high}] is in descending order", "swap the two")
         low = self.points[0]
         if (left := round(low * (1 - self.severities.crop[1]))) < FEWEST_POINTS:
             fault = f"of {low} points the largest crop leaves {left}"

@@ -215,5 +215,5 @@ def read_verdicts(path: str | Path) -> pd.DataFrame:
         rows[column] = numbers(path, rows, column, needed=rows[column] != "")
     for column in ("verdict", "claim_verdict"):
         if unknown := set(rows[column]) - set(CLAIM_VERDICTS):
-            raise InputError(path, f"unknown {column} '{min(unknown)}'", "make it anew")
+            raise InputError(path, f"unknown {column} '{min(unknown)}'", "regenerate it")
     return rows

@@ -63,14 +63,14 @@ def read_claims(path: str | Path = CLAIMS) -> list[Claim]:
     """
     entries = load_own_yaml(Path(path))
     if not isinstance(entries, list) or not entries:
-        raise InputError(path, "holds no claims", "restore it")
+        raise InputError(path, "has no claims", "restore it")
     claims: list[Claim] = []
     for number, entry in enumerate(entries, start=1):
         if not isinstance(entry, Mapping) or not isinstance(entry.get("name"), str):
             raise InputError(path, f"claim {number} has no name", "give one")
         where = f"{path}, claim {entry['name']}"
         if any(claim.name == entry["name"] for claim in claims):
-            raise InputError(where, "stands twice", "rename one of them")
+            raise InputError(where, "appears twice", "rename one of them")
         claims.append(_claim(where, entry))
     return claims
 

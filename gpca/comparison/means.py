@@ -74,7 +74,7 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
     elif "mean" in heads[1:]:
         means = _of_table(path, rows, heads)
     else:
-        raise InputError(path, "is neither tidy metrics nor a table", "make it anew")
+        raise InputError(path, "is neither tidy metrics nor a table", "regenerate it")
     return {key: mean for key, mean in means if not fnmatchcase(mean.quantity, TIMES)}
 
 

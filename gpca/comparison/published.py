@@ -180,7 +180,7 @@ def read_published(path: str | Path = PUBLISHED) -> list[Number]:
         first[number.key] = line
         numbers.append(number)
     if not numbers:
-        raise InputError(path, "holds no numbers", "restore it")
+        raise InputError(path, "has no numbers", "restore it")
     return numbers
 
 

@@ -79,7 +79,7 @@ def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[Fi
     files = [str(path.relative_to(reference)) for path in sorted(reference.rglob("*.csv"))]
     files = [file for file in files if file not in NOT_COMPARED]
     if not files:
-        raise InputError(reference, "holds no reference", "give the folder of a run that has one in results/reference")
+        raise InputError(reference, "has no reference", "give the folder of a run that has one in results/reference")
     require_same_config(run, reference, files)
     samples = samples_of_sources(reference / "metrics.csv")
     outcomes = []
@@ -102,7 +102,7 @@ def require_same_config(run: Path, reference: Path, files: list[str]) -> None:
         here, there = (_config_of(folder / f"{file}.provenance.json") for folder in (run, reference))
         if here and (other := sorted(section for section in there if here.get(section) != there[section])):
             fault = f"{file} was made with another section '{other[0]}' of the config than {run / file}"
-            raise InputError(reference, fault, "compare a run of that config, or make the reference anew")
+            raise InputError(reference, fault, "compare a run of that config, or regenerate the reference")
 
 
 def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean], allowance: Allowance) -> FileCheck:
@@ -158,9 +158,9 @@ def _record(path: Path) -> dict:
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as fault:
-        raise InputError(path, "is no provenance record", "make its result anew") from fault
+        raise InputError(path, "is no provenance record", "regenerate its result") from fault
     if not isinstance(record, dict):
-        raise InputError(path, "is no provenance record", "make its result anew")
+        raise InputError(path, "is no provenance record", "regenerate its result")
     return record
 
 

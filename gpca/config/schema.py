@@ -35,7 +35,7 @@ from gpca.readings.settings import ReadingSizes
 from gpca.settings import SCHEMA, Bounds
 from gpca.trials.settings import EstimatorPairSettings, PairSettings
 
-HEAD = "# Made from the settings classes by `python -m gpca.config.schema`: change these and make it anew.\n"
+HEAD = "# Made from the settings classes by `python -m gpca.config.schema`: change these and regenerate it.\n"
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
 Settings = dict | None  # of what checks its settings itself
 

@@ -56,5 +56,5 @@ def read_samples(path: str | Path) -> pd.DataFrame:
     for column in (*SEVERITIES, "error"):
         rows[column] = numbers(path, rows, column, least=0)
     if rows["sample"].duplicated().any():
-        raise InputError(path, "holds a sample twice", "make it anew")
+        raise InputError(path, "contains a sample twice", "regenerate it")
     return rows

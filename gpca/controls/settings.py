@@ -58,7 +58,7 @@ class ControlSettings:
 
     def __post_init__(self) -> None:
         if self.draw_points[0] > self.draw_points[1]:
-            fault = f"{list(self.draw_points)} runs downwards"
+            fault = f"{list(self.draw_points)} is in descending order"
             raise InputError("setting draw_points of controls", fault, "swap the two")
 
     @classmethod

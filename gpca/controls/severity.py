@@ -56,7 +56,7 @@ def collect(
     table = pd.concat(samples, ignore_index=True)
     found = judged.merge(table, on=["source", "seed", "sample"], suffixes=("", "_of_sample"), validate="many_to_one")
     if len(found) != len(judged):
-        raise InputError("samples of the controls", "lack test samples of the predictions", "make both anew")
+        raise InputError("samples of the controls", "lack test samples of the predictions", "regenerate both")
     outcomes = table.assign(explainer=REGISTRATION, right=table["error"] < success)
     everything = pd.concat([outcomes, found[outcomes.columns]])
     records = []
@@ -101,6 +101,6 @@ def _with_bins(path, samples: pd.DataFrame, ranges: Severities, bins: int) -> pd
             outside = samples[name][applied & ~samples[name].between(edges[0] - ROUNDED, edges[-1] + ROUNDED)]
             if len(outside):
                 fault = f"'{name}' holds {outside.iloc[0]:g}, outside its bins from {edges[0]:g} to {edges[-1]:g}"
-                raise InputError(path, fault, "make it anew from one config")
+                raise InputError(path, fault, "regenerate it from the same config")
             samples[_bin(name)] = np.clip(np.searchsorted(edges, samples[name], side="right") - 1, 0, bins - 1)
     return samples

@@ -136,7 +136,7 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
         if not np.isfinite(h).all():
-            raise InputError(role, "hold NaN or infinity", "make them anew with 'python -m gpca embed'")
+            raise InputError(role, "hold NaN or infinity", "regenerate them with 'python -m gpca embed'")
     if reduction is None:
         return np.asarray(h_S_d, np.float32)
     n, d = h_train_N_d.shape
@@ -144,7 +144,7 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
         fault = f"{reduction.components} components of {n} training embeddings of {d} numbers"
         raise InputError(f"reduction '{name}'", fault, f"set components to {min(n, d)} or less")
     if not np.ptp(h_train_N_d, axis=0).any():
-        raise InputError("training embeddings", "are all alike", "train the encoder anew")
+        raise InputError("training embeddings", "are all alike", "retrain the encoder")
     from sklearn.preprocessing import StandardScaler
 
     scaler = StandardScaler().fit(h_train_N_d.astype(np.float64))

@@ -66,11 +66,11 @@ class Frame:
         if depth_H_W.ndim != 2:
             raise InputError(self.depth, "is a colour image, not depth", REMEDY)
         if depth_H_W.dtype.itemsize == 1:
-            raise InputError(self.depth, "is 8-bit depth: 16 bits expected", "export it anew, without conversion")
+            raise InputError(self.depth, "is 8-bit depth: 16 bits expected", "export it again without conversion")
         if (depth_H_W < 0).any() or np.isinf(depth_H_W).any():  # NaN is a usual mark of what was not measured
             raise InputError(self.depth, "holds negative or infinite depth", "write 0 where nothing was measured")
         if not (depth_H_W > 0).any():
-            raise InputError(self.depth, "holds no depth: every pixel is 0", "leave the image out, or fetch it anew")
+            raise InputError(self.depth, "has no depth: every pixel is 0", "leave the image out, or fetch it again")
         return depth_H_W * np.float32(self.depth_scale / 1000)
 
     def mask(self, annotation: Annotation) -> np.ndarray:
@@ -103,7 +103,7 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
     found = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
     if not found:
         raise InputError(
-            ", ".join(map(str, folders)), f"holds no {split}*/<scene>/scene_gt.json", "check location, or split"
+            ", ".join(map(str, folders)), f"has no {split}*/<scene>/scene_gt.json", "check location, or split"
         )
     frames = [frame for path in found for frame in _frames_of_scene(path.parent)]
     if not frames:

@@ -103,7 +103,7 @@ def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.nda
     columns = {name: numbers(path, rows, name).to_numpy() for name in COLUMNS}
     ids = columns["obj_id"]
     if (ids != np.round(ids)).any() or (ids < 0).any():
-        raise InputError(path, "column 'obj_id' holds something that is no whole number", "make it anew")
+        raise InputError(path, "column 'obj_id' contains values that are not whole numbers", "regenerate it")
     turns_N_3 = np.stack([columns[name] for name in ("rx", "ry", "rz")], axis=1)
     shifts_N_3 = np.stack([columns[name] for name in ("tx", "ty", "tz")], axis=1)
     if np.linalg.norm(turns_N_3, axis=1).max() > np.pi + 1e-3:

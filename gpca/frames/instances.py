@@ -88,7 +88,7 @@ class Instances:
         shapes |= {name: ("I", 4, 4) for name in shapes if name.startswith("T_")}
         shapes |= {"camera_3_3": ("I", 3, 3), "points_m": ("P", 3), "pixels": ("P", 2), "offsets": ("O",)}
         arrays = load_arrays(path, shapes, MADE_BY)
-        remedy = f"make it anew with '{MADE_BY}'"
+        remedy = f"regenerate it with '{MADE_BY}'"
         kinds = dict.fromkeys(shapes, "iu") | dict.fromkeys(("camera_3_3", "points_m"), "f")
         kinds |= {name: "f" for name in shapes if name.startswith("T_")}
         kinds |= dict.fromkeys(("dataset", "colour", "init_from"), "U") | {"symmetric": "b"}

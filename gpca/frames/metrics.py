@@ -45,7 +45,7 @@ def collect(
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
         if (of_source := poses.get((source, f"seed{seed}"))) is None:
-            raise InputError(path, "has no file of poses beside it", "make both anew from one config")
+            raise InputError(path, "has no file of poses beside it", "regenerate both from the same config")
         rows = read_predictions(path)
         for name, test in _parts(path, rows[rows["split"] == "test"], of_source):
             metrics = attribution_metrics(test, concepts_of(rows))
@@ -74,11 +74,11 @@ def read_together(path: str | Path) -> pd.DataFrame:
 
 def _parts(path, test: pd.DataFrame, pose_file: str | Path) -> Iterator[tuple[str, pd.DataFrame]]:
     if test.empty:
-        raise InputError(path, "holds no test rows", "make it anew")
+        raise InputError(path, "has no test rows", "regenerate it")
     samples = read_samples_of_frames(pose_file)
     samples = samples[samples["split"] == "test"].set_index("sample")
     if not set(test["sample"]) <= set(samples.index):
-        raise InputError(pose_file, f"lacks samples of {path}", "make both anew from one config")
+        raise InputError(pose_file, f"lacks samples of {path}", "regenerate both from the same config")
     shown = samples.loc[test["sample"]]
     in_training, dataset = shown["in_training"].to_numpy(bool), shown["dataset"].to_numpy()
     yield TOGETHER, test

@@ -112,7 +112,7 @@ def points_on_model(instances: Instances, objects: ObjectClouds, most_points: in
 
 def require_of_objects(instances: Instances, objects: ObjectClouds, subject: object) -> None:
     """Raise an InputError that names `subject` unless the instances show these objects, where their true poses say."""
-    remedy = "make both files anew, in one call"
+    remedy = "regenerate both files in one call"
     if instances.object_index.min() < 0 or instances.object_index.max() >= len(objects):
         raise InputError(subject, "shows objects that the file of objects does not hold", remedy)
     medians_m = points_on_model(instances, objects, JUDGED_POINTS)

@@ -64,7 +64,7 @@ class Dataset:
                 return bop.models_folder(folder)
             except InputError:
                 continue
-        raise InputError(", ".join(map(str, self.folders)), "holds no models/obj_*.ply", "fetch the models too")
+        raise InputError(", ".join(map(str, self.folders)), "has no models/obj_*.ply", "fetch the models too")
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CentredM
     """
     ids = sorted({annotation.object_id for frame in frames for annotation in frame.annotations})
     if not ids:
-        raise InputError(dataset.name, "its scene_gt.json name no object in any frame", "check split, or fetch it anew")
+        raise InputError(dataset.name, "its scene_gt.json name no object in any frame", "check split, or fetch it again")
     folder = dataset.models_folder()
     if unknown := [number for number in ids if not (folder / f"obj_{number:06d}.ply").is_file()]:
         raise InputError(
-            f"{dataset.name}: object {unknown[0]}", f"there is no model of it in {folder}", "fetch the models anew"
+            f"{dataset.name}: object {unknown[0]}", f"there is no model of it in {folder}", "fetch the models again"
         )
     info = bop.read_models_info(folder / "models_info.json")
     models = {}

@@ -16,7 +16,7 @@ from gpca.csv_file import read_csv
 from gpca.errors import InputError
 
 COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
-REMEDY = "export it anew"
+REMEDY = "export it again"
 # A pose's distance from the camera, relative to that of the objects annotated in its image: no single estimate is off
 # by more than this, however bad ...
 ONE_OFF = 100.0
@@ -53,7 +53,7 @@ def read_bop_results(
         if key[:2] not in distances_m:
             raise InputError(subject, f"the dataset has no image {key[1]} of scene {key[0]}", "check results or split")
         if key[2] not in known:
-            raise InputError(subject, f"the dataset has no object {key[2]}", "check results, or fetch the models anew")
+            raise InputError(subject, f"the dataset has no object {key[2]}", "check results, or fetch the models again")
         (score,) = _entries(subject, row, "score", 1)
         pose = _pose(subject, row)
         if annotated := distances_m[key[:2]]:
@@ -94,7 +94,7 @@ def _pose(subject: str, row: dict) -> np.ndarray:
 def _entries(subject: str, row: dict, column: str, count: int) -> np.ndarray:
     texts = str(row[column]).replace(",", " ").split()
     if not all(re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text, re.ASCII) for text in texts):
-        raise InputError(subject, f"{column} holds something other than finite numbers", REMEDY)
+        raise InputError(subject, f"{column} contains values that are not finite numbers", REMEDY)
     if len(texts) != count:
         raise InputError(subject, f"{column} has {len(texts)} entries, not {count}", "separate them by spaces")
     numbers = np.array(texts, float)

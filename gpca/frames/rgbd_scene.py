@@ -67,7 +67,7 @@ class SceneSettings:
         for name in ("objects", "distance_m", "elevation_deg"):
             low, high = getattr(self, name)
             if low > high:
-                raise InputError(f"scenes {name}", f"[{low}, {high}] runs downwards", "swap the two")
+                raise InputError(f"scenes {name}", f"[{low}, {high}] is in descending order", "swap the two")
 
 
 @dataclass(frozen=True)

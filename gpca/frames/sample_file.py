@@ -27,7 +27,7 @@ def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
     rows = read_csv(path, COLUMNS)
     rows["in_training"] = rows["in_training"].map(_TRUTH)
     if rows["in_training"].isna().any():
-        raise InputError(path, "column 'in_training' holds something other than True and False", "make it anew")
+        raise InputError(path, "column 'in_training' contains values other than True and False", "regenerate it")
     rows["in_training"] = rows["in_training"].astype(bool)
     return rows
 
@@ -41,5 +41,5 @@ def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndar
     rows = read_samples_of_frames(path)
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
-            raise InputError(path, "holds other samples than the registrations", "make both anew from one config")
+            raise InputError(path, "its samples differ from those of the registrations", "regenerate both from the same config")
     return numbers(path, rows, "instance", least=0).to_numpy(int)

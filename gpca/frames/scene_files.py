@@ -15,7 +15,7 @@ from gpca.alignment.rigid import require_rotation
 from gpca.errors import InputError
 from gpca.json_file import read_json
 
-REMEDY = "the folder may be half unpacked: unpack the dataset anew"
+REMEDY = "the folder may be half unpacked: unpack the dataset again"
 # Wide of every depth camera there is; what lies between is for the measured points to say.
 FOCAL_PX = (1.0, 1e6)
 DEPTH_SCALES = (1e-6, 1e6)  # millimetres per unit: from nanometres to kilometres

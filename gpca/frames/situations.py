@@ -49,7 +49,7 @@ class SituationSettings:
         for name in ("noise_scale", "hidden"):
             low, high = getattr(self, name)
             if low > high:
-                raise InputError(f"recovery.{name}", f"[{low}, {high}] runs downwards", "swap the two")
+                raise InputError(f"recovery.{name}", f"[{low}, {high}] is in descending order", "swap the two")
 
 
 class Shelf:

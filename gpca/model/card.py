@@ -51,7 +51,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
     try:
         limits = _limits(model, diagnoser, origin)
     except (LookupError, TypeError, ValueError, AttributeError) as fault:
-        raise InputError("provenance of the model", f"is incomplete ({fault})", "make the model anew") from fault
+        raise InputError("provenance of the model", f"is incomplete ({fault})", "regenerate the model") from fault
     paragraphs = [
         f"# Model card of {name}",
         "The model that `gpca explain` takes where no other is named or found. It says whether a registration of two "
@@ -116,7 +116,7 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
                 counts = f"{of['samples'].iloc[0]:.0f} ({of['seeds'].iloc[0]:.0f})"
                 rows.append((title, words, *(_interval(of, metric) for metric in MEASURES), counts))
     if not own:
-        raise InputError("cause_intervals.csv", f"holds no scores of {OWN}", "switch it on in diagnosis.explainers")
+        raise InputError("cause_intervals.csv", f"has no scores of {OWN}", "switch it on in diagnosis.explainers")
     changes = origin.record["settings"].get("model", {}).get("causes", {})
     return [
         "Of classifiers of these kinds in the run that made this model, on objects that they had not learnt, with "

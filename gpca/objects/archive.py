@@ -134,7 +134,7 @@ def _write_list(path: Path, sha256_of: dict[str, str]) -> None:
 
 
 def _require_listed(folder: Path, listed: Path) -> None:
-    remedy = f"remove {folder} and {listed.name} beside it, and the archive is unpacked anew"
+    remedy = f"remove {folder} and {listed.name} beside it, and the archive will be unpacked again"
     expected = read_json(listed, "a list of files", remedy)
     # What a desktop leaves in a folder that somebody looked at begins with a dot; no reader takes it for data.
     found = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file() or file.is_symlink()}

@@ -65,7 +65,7 @@ def models_folder(folder: Path) -> Path:
     for candidate in (folder, folder / "models", *sorted(folder.glob("*/models"))):
         if any(candidate.glob("obj_[0-9]*.ply")):
             return candidate
-    raise InputError(folder, "the folder holds no models/obj_*.ply", "check location in the config")
+    raise InputError(folder, "the folder has no models/obj_*.ply", "check location in the config")
 
 
 def read_models_info(path: Path) -> dict[int, dict]:

@@ -27,10 +27,10 @@ FEW_POINTS = 600  # up to so many, all distances take less time than the hull
 def require_points(points: np.ndarray, subject: object) -> None:
     """Raise InputError unless `points` is (P, 3), P > 0, without NaN or infinity."""
     if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
-        raise InputError(subject, "has no points", "fetch or export it anew")
+        raise InputError(subject, "has no points", "fetch or export it again")
     bad = int((~np.isfinite(points)).any(axis=1).sum())
     if bad:
-        raise InputError(subject, f"{bad} of {len(points)} points hold NaN or infinity", "fetch or export it anew")
+        raise InputError(subject, f"{bad} of {len(points)} points hold NaN or infinity", "fetch or export it again")
 
 
 def diameter(points: np.ndarray, subject: object) -> float:
@@ -90,7 +90,7 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
         if n_points < FEWEST_CLOUD_POINTS:
             raise InputError(subject, f"{n_points} surface points", f"ask for {FEWEST_CLOUD_POINTS} or more")
         if len(faces) == 0 or not np.linalg.norm(_area_vectors(vertices_m, faces), axis=1).sum() > 0:
-            raise InputError(subject, "the mesh has no area", "export it anew, with its faces")
+            raise InputError(subject, "the mesh has no area", "export it again with its faces")
         hull_m, draw = _used_vertices(surface), _sampled
     diameter_m = diameter(hull_m, subject)
     require_size(diameter_m, subject)
@@ -191,7 +191,7 @@ class ObjectClouds:
     def load(cls, path: str | Path) -> ObjectClouds:
         """Read an objects npz; InputError when it is missing, unreadable or inconsistent."""
         made_by = f"snakemake -j2 {path}"
-        remedy = f"make it anew with '{made_by}'"
+        remedy = f"regenerate it with '{made_by}'"
         shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
         kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE}
         arrays = load_arrays(path, shapes, made_by, kinds)

@@ -35,7 +35,7 @@ def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None
     """
     path = cached_path(url, folder)
     if path.is_file():
-        _check(path, sha256, url, f"delete {path} to fetch it anew, or correct sha256 in the config")
+        _check(path, sha256, url, f"delete {path} to fetch it again or correct sha256 in the config")
         return path
     print(f"download {url} to {path}", file=sys.stderr)
     with whole_file(path) as partial:

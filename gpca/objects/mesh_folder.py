@@ -49,7 +49,7 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
     if patterns is None:
         found = {path for path in folder.iterdir() if path.name.lower().endswith(tuple(suffixes))}
         if not found:
-            raise InputError(folder, f"the folder holds none of {formats}", "check location, or set files")
+            raise InputError(folder, f"the folder has none of {formats}", "check location, or set files")
         return sorted(found)
     found = set()
     for pattern in patterns:
@@ -72,7 +72,7 @@ def read_surface(path: Path, scale: float) -> Surface:
     """
     import trimesh
 
-    remedy = "fetch or export it anew"
+    remedy = "fetch or export it again"
     require_file(path, "no such file", remedy)
     try:
         require_whole(path)
@@ -105,7 +105,7 @@ def _cloud_normals(cloud, path: Path) -> np.ndarray | None:
     normals = np.column_stack([np.ravel(vertex["data"][axis]) for axis in axes]).astype(np.float64)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     if not (lengths > 0).all():
-        raise InputError(path, "a normal is zero or NaN", "export it anew, with its normals or without any")
+        raise InputError(path, "a normal is zero or NaN", "export it again with its normals or without any")
     return normals / lengths
 
 

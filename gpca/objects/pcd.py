@@ -53,7 +53,7 @@ def parse(content: bytes, subject: object) -> np.ndarray:
         header, body = _parse_header(content)
         points = _DECODERS[header.encoding](body, header)
     except (ValueError, KeyError, IndexError, TypeError, struct.error) as fault:
-        raise InputError(subject, f"is not a readable PCD file ({fault})", "fetch or export it anew") from fault
+        raise InputError(subject, f"is not a readable PCD file ({fault})", "fetch or export it again") from fault
     if header.organised:
         points = points[~np.isnan(points).any(axis=1)]
     require_points(points, subject)

@@ -56,7 +56,7 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
                 if member.name.lower().endswith(".pcd")
             ]
             if not views:
-                raise InputError(path, "the archive holds no .pcd file", "check url or files in the config")
+                raise InputError(path, "the archive has no .pcd file", "check url or files in the config")
             yield from _chosen(views, scale, views_per_instance)
 
 

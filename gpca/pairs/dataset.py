@@ -123,19 +123,19 @@ class Registrations:
         kinds = dict.fromkeys(shapes, REAL) | dict.fromkeys(("split", "concept", "object_name"), TEXT)
         kinds |= dict.fromkeys(("sample", "object_index", "offsets", "target_offsets"), WHOLE)
         arrays = load_arrays(path, shapes, made_by, kinds)
-        remedy = f"make it anew with '{made_by}'"
+        remedy = f"regenerate it with '{made_by}'"
         for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):
             offsets = arrays[ends]
             if len(offsets) != len(arrays["sample"]) + 1 or offsets[0] != 0 or offsets[-1] != len(arrays[points]):
                 raise InputError(path, f"'{ends}' do not match '{points}' and 'sample'", remedy)
             if len(offsets) == 1 or (np.diff(offsets) < 3).any():
-                raise InputError(path, "holds no samples, or a cloud of fewer than 3 points", remedy)
+                raise InputError(path, "has no samples, or a cloud of fewer than 3 points", remedy)
         for name, known in (("split", SPLITS), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
                 raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
         for name, within in _possible(arrays).items():
             if not within.all():
-                raise InputError(path, f"'{name}' holds what cannot be", remedy)
+                raise InputError(path, f"'{name}' contains impossible values", remedy)
         columns: dict[str, Any] = {name: arrays[name] for name in shapes}
         return cls(**columns)
 
@@ -187,7 +187,7 @@ def load_embeddings(
     kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT}
     arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by, kinds)
     if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-        raise InputError(path, "holds other samples than the registrations", f"make it anew with '{made_by}'")
+        raise InputError(path, "its samples differ from those of the registrations", f"regenerate it with '{made_by}'")
     return arrays
 
 

@@ -44,7 +44,7 @@ class Severities:
         for severity in fields(self):
             low, high = getattr(self, severity.name)
             if low > high:
-                raise InputError(f"severity {severity.name}", f"[{low}, {high}] runs downwards", "swap the two")
+                raise InputError(f"severity {severity.name}", f"[{low}, {high}] is in descending order", "swap the two")
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
             rows[name] = numbers(path, rows, name)
         within = (rows["unsolved"] >= 0) & (rows["unsolved"] <= rows["failures"]) & (rows["failures"] > 0)
         if not (within & rows["order"].isin((DOUBTED, DRAWN))).all():
-            raise InputError(path, "holds an unknown order, or more errors than failures", "make it anew")
+            raise InputError(path, "holds an unknown order, or more errors than failures", "regenerate it")
         mean = rows.groupby(["policy", "order", "labels"], sort=False)[["failures", "unsolved"]].mean()
         parts.append(mean.reset_index())
     if not parts or all(part.empty for part in parts):

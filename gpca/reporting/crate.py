@@ -81,7 +81,7 @@ def read_jobs(folder: Path) -> list[Job]:
     for path in sorted(folder.rglob(f"*{RECORD}")):
         paths_of[path.read_bytes()].append(path)
     if not paths_of:
-        raise InputError(folder, f"holds no *{RECORD}", "name the folder of a finished run")
+        raise InputError(folder, f"has no *{RECORD}", "name the folder of a finished run")
     own = {folder / f"{NAME}{RECORD}"}
     return [_job(folder, paths) for paths in paths_of.values() if own.isdisjoint(paths)]
 
@@ -130,7 +130,7 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
 
 def _job(folder: Path, paths: Sequence[Path]) -> Job:
     """Read the record that stands beside all outputs of a job."""
-    read = partial(read_json, what="a record of provenance", remedy="make its result anew")
+    read = partial(read_json, what="a record of provenance", remedy="regenerate its result")
     record = read(paths[0])
     outputs = [path.with_name(path.name.removesuffix(RECORD)) for path in paths]
     try:
@@ -143,7 +143,7 @@ def _job(folder: Path, paths: Sequence[Path]) -> Job:
             seconds=float(record["seconds"]),
         )
     except (KeyError, TypeError, AttributeError, ValueError) as fault:
-        raise InputError(paths[0], "is not a record of provenance", "make its result anew") from fault
+        raise InputError(paths[0], "is not a record of provenance", "regenerate its result") from fault
 
 
 def _relative(folder: Path, path: Path) -> str:

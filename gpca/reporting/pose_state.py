@@ -38,5 +38,5 @@ def observed_uncertainties(path: str | Path, registrations: Registrations) -> tu
     samples = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
     u_S = observed.reindex(samples).to_numpy(float)
     if np.isnan(u_S).all():
-        raise InputError(path, "holds other samples than the registrations", "make both anew")
+        raise InputError(path, "its samples differ from those of the registrations", "regenerate both")
     return u_S, limit

@@ -69,7 +69,7 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
             other, measured = distances[source, seed]
             keys = _keys(rows)
             if not keys.isin(measured.index).all():
-                raise InputError(other, f"lacks samples of {path}", "make both anew from one config")
+                raise InputError(other, f"lacks samples of {path}", "regenerate both from the same config")
             rows = rows.join(measured.loc[keys].set_axis(rows.index))
         found[source, learner, seed] = rows
     return found

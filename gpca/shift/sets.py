@@ -77,12 +77,12 @@ class ShiftedSets:
         shapes |= {"h": ("S", "d"), "distance": ("S", len(DISTANCES))}
         kinds = dict.fromkeys(shapes, TEXT) | {"sample": WHOLE, "h": REAL, "distance": REAL}
         arrays = load_arrays(path, shapes, "python -m gpca shift", kinds)
-        remedy = "make it anew with 'python -m gpca shift'"
+        remedy = "regenerate it with 'python -m gpca shift'"
         for name, known in (("set", TRAINED_ON), ("split", ("train", "test")), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
                 raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
         if not len(arrays["set"]) or (arrays["distance"] < 0).any():
-            raise InputError(path, "holds no samples, or negative distances", remedy)
+            raise InputError(path, "has no samples, or negative distances", remedy)
         sets = cls(**{name: arrays[name] for name in shapes})
         for name in np.unique(sets.set):
             if not len(sets.rows(TRAINED_ON[name], "train")):

@@ -55,7 +55,7 @@ def _section(config: Path) -> dict:
         raise InputError(config, "no such file", "run this in the folder of the suite, or name the file with --config")
     section = read_mapping(config).get("reference")
     if section is None:
-        raise InputError(config, "holds no section reference", f"name another file with --config, as {CONFIG}")
+        raise InputError(config, "has no section reference", f"name another file with --config, as {CONFIG}")
     needed = [field.name for field in fields(Allowance)]
     if not isinstance(section, dict) or not set(needed) <= set(section):
         raise InputError(

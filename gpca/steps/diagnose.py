@@ -57,7 +57,7 @@ def run(options: Namespace) -> None:
 def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
     rows = np.flatnonzero((registrations.split == "train") & (registrations.concept != BORDERLINE))
     if not len(rows):
-        raise InputError(path, "holds no training samples with a label", "raise causes.train")
+        raise InputError(path, "has no training samples with a label", "raise causes.train")
     return rows
 
 

@@ -36,7 +36,7 @@ def run(options: Namespace) -> None:
             h_S_d = arrays["h"]
             train_S = arrays["split"] == "train"
             if not train_S.any():
-                raise InputError(embeddings, "holds no training samples", "make it anew with 'python -m gpca embed'")
+                raise InputError(embeddings, "has no training samples", "regenerate it with 'python -m gpca embed'")
             axes = (options.source, seed, "reduction")
             reduced_S_c = reduce(options.reduction, h_S_d[train_S], h_S_d, options.settings, *axes)
             save_arrays(out, {name: arrays[name] for name in SHAPES} | {"h": reduced_S_c})

@@ -53,7 +53,7 @@ def read_estimates(path: str | Path) -> pd.DataFrame:
     for name in COVARIANCE:
         rows[name] = numbers(path, rows, name, needed=told)
     if not rows["failed"].isin(("True", "False")).all():
-        raise InputError(path, "holds a row neither failed nor not", f"make it anew with '{MADE_BY}'")
+        raise InputError(path, "holds a row neither failed nor not", f"regenerate it with '{MADE_BY}'")
     rows["failed"] = rows["failed"] == "True"
     return rows
 
@@ -117,5 +117,5 @@ class ReferenceSamples:
             or (offsets[0], offsets[-1]) != ends
             or (np.diff(offsets) < 0).any()
         ):
-            raise InputError(path, "'offsets' do not match 'twists' and 'sample'", f"make it anew with '{MADE_BY}'")
+            raise InputError(path, "'offsets' do not match 'twists' and 'sample'", f"regenerate it with '{MADE_BY}'")
         return cls(**arrays)

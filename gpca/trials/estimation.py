@@ -87,7 +87,7 @@ def try_estimators(
         made = {name: make_estimator(name, given, examples) for name, given in estimators.items()}
         rows = _spaced(causes.rows("test"), wanted)
         if not len(rows):
-            raise InputError(f"causes of {source}", "hold no test samples", "raise causes.test")
+            raise InputError(f"causes of {source}", "have no test samples", "raise causes.test")
         for row in progress(rows, f"estimators on {source}, seed {seed}, {method}"):
             case = make.case(row)
             if row == rows[0]:

@@ -126,5 +126,5 @@ def _chosen(registrations: Registrations, source: str, samples: int) -> np.ndarr
     """Return the rows of the first test samples: threes of one object, which go round the objects."""
     rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < samples))
     if not len(rows):
-        raise InputError(f"registrations of {source}", "hold no test samples", "raise registrations.test")
+        raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
     return rows

@@ -57,7 +57,7 @@ class Outcomes:
         row_of = {key: row for row, key in enumerate(zip(registrations.split, registrations.sample, strict=True))}
         rows = [row_of.get(key) for key in zip(self.split, self.sample, strict=True)]
         if None in rows:
-            raise InputError("uncertainty", "holds samples that the registrations lack", "make both anew")
+            raise InputError("uncertainty", "holds samples that the registrations lack", "regenerate both")
         names = ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
         own = {name: getattr(self, name) for name in names}
         seconds = {"seconds": seconds_S_K, "icp_seconds": icp_seconds_S_K}
@@ -75,15 +75,15 @@ class Outcomes:
         shapes |= {"sample": ("S",), "split": ("S",), "covariance": ("S", "K", 6, 6)}
         kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT, "icp_calls": WHOLE, "degenerate": "b"}
         arrays = load_arrays(path, shapes, "python -m gpca uncertainty", kinds)
-        remedy = "make it anew with 'python -m gpca uncertainty'"
+        remedy = "regenerate it with 'python -m gpca uncertainty'"
         if len(arrays["sample"]) == 0:
-            raise InputError(path, "holds no samples", remedy)
+            raise InputError(path, "has no samples", remedy)
         for name, values in {
             "covariance": np.diagonal(arrays["covariance"], axis1=2, axis2=3),
             "icp_calls": arrays["icp_calls"],
         }.items():
             if (values < 0).any():
-                raise InputError(path, f"'{name}' holds what cannot be", remedy)
+                raise InputError(path, f"'{name}' contains impossible values", remedy)
         return cls(**{name: arrays[name] for name in shapes})
 
 
@@ -106,14 +106,14 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
     """
     rows = read_csv(path, ("sample", "split", "condition", "seconds", "icp_seconds"))
     shape = outcomes.uncertainty.shape
-    remedy = "make it anew with 'python -m gpca uncertainty'"
+    remedy = "regenerate it with 'python -m gpca uncertainty'"
     if len(rows) != np.prod(shape):
         raise InputError(path, f"holds {len(rows)} rows, not {shape[0]} samples × {shape[1]} conditions", remedy)
     expected = {"sample": outcomes.sample[:, None], "split": outcomes.split[:, None], "condition": np.arange(shape[1])}
     for name, values in expected.items():
         found = (rows[name] if name == "split" else numbers(path, rows, name)).to_numpy().reshape(shape)
         if not (found == values).all():
-            raise InputError(path, "holds other samples or conditions than the outcomes", remedy)
+            raise InputError(path, "its samples or conditions differ from those of the outcomes", remedy)
     seconds, icp_seconds = (
         numbers(path, rows, name, least=0).to_numpy().reshape(shape) for name in ("seconds", "icp_seconds")
     )

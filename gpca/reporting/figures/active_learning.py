@@ -114,7 +114,7 @@ def draw_panels(
     columns, down, across = ([name for name in part if any(key[i] == name for key in shown)]
                              for i, part in enumerate((sources, rows, lines)))  # fmt: skip
     if not shown:
-        raise InputError("active learning", "holds no curve of these sources and strategies", "run it first")
+        raise InputError("active learning", "has no curve of these sources and strategies", "run it first")
     use_style()
     import matplotlib.pyplot as plt
 

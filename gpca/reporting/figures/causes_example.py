@@ -100,7 +100,7 @@ def choose_sample(causes: Causes, path: str | Path) -> int:
     """Return the row that is shown; see :func:`draw_causes_example`."""
     failed = np.flatnonzero((causes.registrations.split == "test") & (causes.truth.state == FAILED))
     if not len(failed):
-        raise InputError(path, "holds no failed test sample", "raise causes.test")
+        raise InputError(path, "has no failed test sample", "raise causes.test")
     number = causes.truth.causes[failed].sum(axis=1)
     most = failed[number == number.max()]
     phi = np.maximum(causes.truth.phi[most], 0)
@@ -118,7 +118,7 @@ def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: M
         rows = read_predictions(path)
         of_sample = (rows["split"] == registrations.split[row]) & (rows["sample"] == str(registrations.sample[row]))
         if of_sample.sum() != 1:
-            raise InputError(path, "lacks the sample that is shown", "make it anew from one config")
+            raise InputError(path, "lacks the sample that is shown", "regenerate it from the same config")
         said = rows[of_sample].iloc[0]
         if not said["abstained"]:
             by_name[name] = [said[f"score_{label}"] for label in LABELS]

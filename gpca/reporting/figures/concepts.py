@@ -96,7 +96,7 @@ def choose_samples(registrations: Registrations, path: str | Path, object_name: 
             choices.append({concept: int(rows[np.argmin(distance_S[rows])]) for concept, rows in rows_of.items()})
     if not choices:
         subject = f"object '{object_name}'" if object_name else "any object"
-        raise InputError(path, f"holds no test sample of each concept for {subject}", "name another or make more")
+        raise InputError(path, f"has no test sample of each concept for {subject}", "name another or make more")
     return min(choices, key=lambda samples: max(distance_S[sample] for sample in samples.values()))
 
 

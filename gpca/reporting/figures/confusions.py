@@ -62,7 +62,7 @@ def draw_confusions_figure(
     rows = [name for name in explainers if any((source, name) in confusions for source in sources)]
     columns = [name for name in sources if any((name, explainer) in confusions for explainer in explainers)]
     if not rows:
-        raise InputError(metrics_csv, "holds no confusion of these explainers and sources", "make it anew")
+        raise InputError(metrics_csv, "has no confusion of these explainers and sources", "regenerate it")
     use_style()
     import matplotlib.pyplot as plt
 

@@ -147,7 +147,7 @@ def _chosen(reference: pd.DataFrame, samples: ReferenceSamples, method: str, pat
     place_of = {str(samples.sample[i]): int(i) for i in np.flatnonzero(enough_S)}
     known = reference[reference["sample"].isin(list(place_of))]
     if known.empty:
-        raise InputError(path, f"holds no results of '{method}'", "make it anew from one config")
+        raise InputError(path, f"has no results of '{method}'", "regenerate it from the same config")
     shown = {}
     for kind, failed in (("Succeeded", False), ("Failed", True)):
         of_kind = known[known["failed"] == failed].sort_values("add_relative")

@@ -186,7 +186,7 @@ def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[st
     shown = [name for name in learners if any(learner == name for _, learner, _ in learned)]
     columns = [name for name in sources if any(source == name for source, _, _ in learned)]
     if not shown or not columns:
-        raise InputError("learners", "hold no predictions of these sources and learners", "run them first")
+        raise InputError("learners", "have no predictions of these sources and learners", "run them first")
     return shown, columns
 
 

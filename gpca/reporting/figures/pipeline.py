@@ -102,7 +102,7 @@ def _curves(files: list[str | Path]) -> tuple[str, dict[str, pd.DataFrame]]:
         curves = {name: one for (_, name, setting), one in mean_curves(files, [concept]).items() if setting == SETTING}
         if any(name in curves for name in TITLES):
             return concept, curves
-    raise InputError("active learning", f"holds no curve of {' or '.join(TITLES)}", "run one of these strategies")
+    raise InputError("active learning", f"has no curve of {' or '.join(TITLES)}", "run one of these strategies")
 
 
 def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, asked: Round) -> None:

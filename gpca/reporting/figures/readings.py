@@ -52,7 +52,7 @@ def draw_readings(
     missed = asked_about(judged)
     shown = [name for name in groups if (missed["group"] == name).any()]
     if not shown:
-        raise InputError("reading_verdicts.csv", "holds no readings of these groups", "run the readings first")
+        raise InputError("reading_verdicts.csv", "has no readings of these groups", "run the readings first")
     use_style()
     import matplotlib.pyplot as plt
     from matplotlib.layout_engine import ConstrainedLayoutEngine

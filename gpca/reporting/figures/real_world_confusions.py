@@ -25,7 +25,7 @@ def draw_real_world_confusions(
     pooled = {method: counts for (_, method), counts in pooled_confusions(read_together(metrics_csv)).items()}
     shown = {method: pooled[method] for method in methods if method in pooled}
     if not shown:
-        raise InputError(metrics_csv, "holds no confusion of these backbones", "make it anew")
+        raise InputError(metrics_csv, "has no confusion of these backbones", "regenerate it")
     use_style()
     import matplotlib.pyplot as plt
 

@@ -135,7 +135,7 @@ def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray)
     """Return the row that is shown; see :func:`draw_real_world_example`. Instance i has ``pixels_I[i]`` pixels."""
     overlap = samples[(samples["split"] == "test") & (samples["concept_true"] == "overlap")]
     if overlap.empty:
-        raise InputError(path, "holds no test sample of overlap", "raise real_world.test")
+        raise InputError(path, "has no test sample of overlap", "raise real_world.test")
     for column, wanted in (("lost_to", OCCLUDER), ("concept_predicted", "overlap")):
         narrower = overlap[overlap[column] == wanted]
         overlap = overlap if narrower.empty else narrower

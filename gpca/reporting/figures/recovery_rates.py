@@ -51,7 +51,7 @@ def draw_recovery_rates(
     """
     shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1") is not None]
     if not shown:
-        raise InputError("metrics", "hold no recovery rates", "run the step recover first")
+        raise InputError("metrics", "have no recovery rates", "run the step recover first")
     use_style()
     import matplotlib.pyplot as plt
 

@@ -43,7 +43,7 @@ def draw_nominal_reliability(
     }
     shown = [name for name in explainers if parts[name]]
     if not shown:
-        raise InputError("diagnoses", "hold no predictions of these sources and explainers", "run them first")
+        raise InputError("diagnoses", "have no predictions of these sources and explainers", "run them first")
     figure, panels = small_panels(len(shown), panel_height_in=1.85)
     for panel, name in zip(panels, shown, strict=True):
         label_S = np.concatenate([samples.label for samples in parts[name]])

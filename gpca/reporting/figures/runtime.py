@@ -64,6 +64,6 @@ def _bars(runtime: pd.DataFrame, numbers: Iterable[Number]) -> dict[str, dict[st
         for component in COLOURS:
             milliseconds = mean_ms.get((component, device), mean_ms.get((component, "CPU")))
             if milliseconds is None:
-                raise InputError("runtime", f"holds no row of '{component}'", "run the step 'runtime' anew")
+                raise InputError("runtime", f"has no row of '{component}'", "rerun the step 'runtime'")
             stages[component] = milliseconds
     return bars

@@ -47,7 +47,7 @@ def draw_saliency(
     places = {int(sample): place for place, sample in enumerate(maps["sample"])}
     shown = {concept: sample for concept, sample in chosen.items() if sample is not None}
     if not shown or set(shown.values()) - (set(test) & set(places)):
-        raise InputError(maps_npz, f"holds other samples than {deletions_csv}", "make both anew")
+        raise InputError(maps_npz, f"its samples differ from those of {deletions_csv}", "regenerate both")
     use_style()
     import matplotlib.pyplot as plt
     from matplotlib.cm import ScalarMappable

@@ -50,7 +50,7 @@ def draw_severity_curves(
     """
     shown = [name for name in explainers if (severities["method"] == name).any()]
     if not shown:
-        raise InputError("severities", "hold none of these explainers", "run the controls first")
+        raise InputError("severities", "have none of these explainers", "run the controls first")
     use_style()
     import matplotlib.pyplot as plt
     from matplotlib.layout_engine import ConstrainedLayoutEngine

@@ -66,9 +66,9 @@ class Stages:
         predictions = read_predictions(predictions_csv)
         named = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
         if named != list(zip(predictions["split"], predictions["sample"], strict=True)):
-            raise InputError(predictions_csv, f"holds other samples than {registrations_npz}", "make both anew")
+            raise InputError(predictions_csv, f"its samples differ from those of {registrations_npz}", "regenerate both")
         if set(concepts_of(predictions)) != set(CONCEPTS):
-            raise InputError(predictions_csv, f"does not score the concepts {', '.join(CONCEPTS)}", "make it anew")
+            raise InputError(predictions_csv, f"does not score the concepts {', '.join(CONCEPTS)}", "regenerate it")
         for column in ("bald", *(f"variance_{concept}" for concept in CONCEPTS)):
             if column not in predictions:
                 raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
@@ -90,7 +90,7 @@ class Stages:
                 return _median(failures, other)
         test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
         if test.empty:
-            raise InputError(path, f"holds no test sample of '{concept}'", "raise registrations.test")
+            raise InputError(path, f"has no test sample of '{concept}'", "raise registrations.test")
         right = test[test["concept_predicted"] == concept]
         kept = test if right.empty else right
         uncertain = kept[self.u_S[kept.index] > self.u_clean]

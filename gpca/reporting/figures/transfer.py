@@ -41,7 +41,7 @@ def draw_transfer(
     moved = rows_where(accuracy, control=TRANSFER)
     shown = [name for name in explainers if (moved["method"] == name).any()]
     if not shown:
-        raise InputError("intervals", "hold no transfer", "run the controls of two sources first")
+        raise InputError("intervals", "have no transfer", "run the controls of two sources first")
     use_style()
     import matplotlib.pyplot as plt
 

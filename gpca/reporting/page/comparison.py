@@ -108,5 +108,5 @@ def _number(path: str | Path, row: Mapping[str, str], name: str, kind: type = fl
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(path, f"'{name}' holds something that is not a number: '{row[name]}'", "make it anew")
+        raise InputError(path, f"'{name}' contains a value that is not a number: '{row[name]}'", "regenerate it")
     return value

@@ -45,7 +45,7 @@ def read_markdown_table(path: str | Path) -> ShownTable:
     Raises:
         InputError: missing or unreadable file, no caption, no table, rows of different lengths.
     """
-    remedy = "make it anew with snakemake"
+    remedy = "regenerate it with snakemake"
     try:
         text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError as fault:

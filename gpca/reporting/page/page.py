@@ -152,7 +152,7 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
         except FileNotFoundError:
             values = {"Code": "not recorded"}
         except (ValueError, KeyError, TypeError) as fault:
-            raise InputError(record_path, "is not a record of provenance", "make its result anew") from fault
+            raise InputError(record_path, "is not a record of provenance", "regenerate its result") from fault
         for fact, value in values.items():
             facts.setdefault(fact, Counter())[value] += 1
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
@@ -209,4 +209,4 @@ def _size(path: Path) -> tuple[int, int]:
         with Image.open(path) as image:
             return image.size
     except OSError as fault:
-        raise InputError(path, "is no readable image", "make it anew with snakemake") from fault
+        raise InputError(path, "is no readable image", "regenerate it with snakemake") from fault

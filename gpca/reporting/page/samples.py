@@ -56,7 +56,7 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
         number = str(registrations.sample[row])
         if number not in test.index:
             fault = f"lacks test sample {number} of {files['registrations']}"
-            raise InputError(files["predictions"], fault, "make both anew")
+            raise InputError(files["predictions"], fault, "regenerate both")
         error = registration_error(registrations, row)
         samples.append(
             _sample(registrations, row, test.loc[number], concepts_of(predictions))

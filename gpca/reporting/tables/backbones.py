@@ -77,7 +77,7 @@ def table6_backbones(
     for method, name in CLASSIC.items():
         labels = [(method, name), ("none", REDUCTIONS["none"])]
         table.add_row(labels, _cells(metrics, method, reference_R, not table.rows))
-    table.require_rows("metrics", "hold no accuracy", "run its explainers first")
+    table.require_rows("metrics", "have no accuracy", "run its explainers first")
     table.compare_down(["accuracy"])
     shown = table.cells[0, "accuracy"]
     rival = f"To {BACKBONES.get(first, '')}"

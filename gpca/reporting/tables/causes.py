@@ -63,7 +63,7 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
         for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
             rows = rows_where(intervals, source=source, method=explainer).set_index("metric")
             table.add_row([(source, title), (explainer, words)], _cells(rows, SHOWN), rival=explainer != CEILING)
-    table.require_rows("intervals", "hold no diagnosis", "run its explainers first")
+    table.require_rows("intervals", "have no diagnosis", "run its explainers first")
     table.compare_down([key for key in SHOWN if key not in ("lead", "samples")], same=1)
     return table.build(
         caption="What is wrong with a registration, if anything: objects that no explainer was trained on"
@@ -103,7 +103,7 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
         table.add_row([(explainer, words)], _cells(rows, SHOWN_OF_FRAMES), rival=explainer != CEILING)
     counted = rows_where(of_frames, method=TRUTH).set_index("metric")
     if counted.empty or not table.rows:
-        raise InputError("intervals", "hold no diagnosis of frames", "run the step frame_causes first")
+        raise InputError("intervals", "have no diagnosis of frames", "run the step frame_causes first")
     table.compare_down([key for key in SHOWN_OF_FRAMES if key != "samples"])
     of = {kind: int(counted["value"][f"count_{kind}"]) for kind in KINDS}
     failed = {concept: of[concept] for concept in CONCEPTS}

@@ -44,7 +44,7 @@ def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
                     cells |= {control + CHANGE: cell_of(row, "change") for control, row in found.items()}
                 label = words if way == PAPER else f"{words}, {TRAINED[way]}"
                 table.add_row([(source, title), (way, label)], cells)
-    table.require_rows("intervals", "hold no GP-CA", "run the controls first")
+    table.require_rows("intervals", "have no GP-CA", "run the controls first")
     return table.build(
         caption="Accuracy (%) on encoders that are trained otherwise" + stand_in_clause(sources.values()),
         column_head="objects",
@@ -87,7 +87,7 @@ def table10_costs(
         accuracy = rows_where(intervals, source=pooled, method=explainer, metric="accuracy").set_index("control")
         cells |= {name: cell_of(accuracy.loc[name]) for name in gains if name in accuracy.index}
         table.add_row([(explainer, words)], cells)
-    table.require_rows("costs", "hold no explainer", "run the controls first")
+    table.require_rows("costs", "have no explainer", "run the controls first")
     return table.build(
         caption="What explainers of the pair cost and gain" + stand_in_clause(sources.values()),
         column_head="metric",

@@ -54,7 +54,7 @@ def table10_controls(
         for explainer, words in explainers.items():
             rows = rows_where(intervals, source=source, method=explainer)
             table.add_row([(source, title), (explainer, words)], _cells(rows, source, names))
-    table.require_rows("intervals", "hold no controls", "run their explainers first")
+    table.require_rows("intervals", "have no controls", "run their explainers first")
     table.compare_down([name for name in names if name != "shuffled"], same=1)
     columns = {name: Column(TITLES[name], interval=False) for name in names}
     columns |= {
@@ -121,7 +121,7 @@ def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
         elsewhere = rows_where(of_explainer, control=TRANSFER, trained_on=POOLED).set_index("source")
         cells = {name: cell_of(elsewhere.loc[name]) for name in (*titles, POOLED) if name in elsewhere.index}
         table.add_row([(explainer, words), (POOLED, "another (mean)")], cells)
-    table.require_rows("intervals", "hold no transfer", "run the controls of two sources first")
+    table.require_rows("intervals", "have no transfer", "run the controls of two sources first")
     return table.build(
         caption="Accuracy (%) from each source to each other" + stand_in_clause(sources.values()),
         column_head="tested",

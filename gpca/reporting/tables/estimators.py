@@ -59,7 +59,7 @@ def table12_uncertainty(
             }
             cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", method, 1e3)
             table.add_row([(method, method_title), (name, title)], cells, rival=name != REFERENCE)
-    table.require_rows("metrics", "hold no estimator", "run the step estimate first")
+    table.require_rows("metrics", "have no estimator", "run the step estimate first")
     table.compare_down(_RANKED, same=1)
     numbers = {
         method: cell_over_sources(metrics, metrics, sources, REFERENCE, "no_estimate", method, 1) for method in methods

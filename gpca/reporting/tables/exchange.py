@@ -23,7 +23,7 @@ from gpca.reporting.tables.table import Column, Table
 if TYPE_CHECKING:
     import pandas as pd
 
-_NOTHING = ("metrics", "hold no explanation", "run the step exchange first")
+_NOTHING = ("metrics", "have no explanation", "run the step exchange first")
 _OF_ESTIMATORS = {
     "agreement": Column("As with Monte-Carlo"),
     "abstained": Column("Abstained", interval=False),

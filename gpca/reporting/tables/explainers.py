@@ -36,7 +36,7 @@ EXTENDED = {  # Each of these metrics has a column in table1_extended.
 }
 _SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # These are printed in %.
 _LEAST_CAUSAL = 30  # causal samples of all seeds; the accuracy on fewer says nothing
-_NOTHING = ("metrics", "hold no accuracy", "run its explainers first")  # The error of a table without rows says this.
+_NOTHING = ("metrics", "have no accuracy", "run its explainers first")  # The error of a table without rows says this.
 
 
 def table1_single_baselines(

@@ -45,7 +45,7 @@ def table6_inputs(metrics: pd.DataFrame, title: str) -> Table:
             cells |= {concept: _share(of["all"], concept=concept) for concept in CONCEPTS}
             cells |= {f"{one}_as_{other}": _taken(of["all"], one, other) for one, other in CONFUSED.items()}
             table.add_row([(method, encoder_title(*method.split("-"))), (cloud, words)], cells)
-    table.require_rows("metrics", "hold no accuracy", "run the readings frame_input first")
+    table.require_rows("metrics", "have no accuracy", "run the readings frame_input first")
     table.compare_down(OBJECTS, same=1)
     columns = {name: Column(head) for name, head in OBJECTS.items()}
     columns |= {concept: Column(f"{concept.capitalize()} (%)", interval=False) for concept in CONCEPTS}

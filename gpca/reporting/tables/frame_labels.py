@@ -62,7 +62,7 @@ def table6_labels(metrics: pd.DataFrame, title: str, encoders: Mapping[str, str]
         if any(cells.values()):
             cells["validation"] = cell_of_repeats(100 * rows_where(validation, method=name)["value"].to_numpy(), 0)
         table.add_row([(name, f"{words} (chosen)" if name == chosen else words)], cells)
-    table.require_rows("metrics", "hold no learning curve", "run frame_labels first")
+    table.require_rows("metrics", "have no learning curve", "run frame_labels first")
     for percent in percents:
         table.compare_across([f"{strategy}_{percent}" for strategy in STRATEGIES])
     columns = {"validation": Column("Validation (%)", interval=False)}

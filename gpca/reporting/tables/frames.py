@@ -47,7 +47,7 @@ def table6_seen_unseen(
         of_source = rows_where(metrics, source=source)
         for method, name in titles.items():
             table.add_row([(source, words), (method, name)], _cells(rows_where(of_source, method=method), datasets))
-    table.require_rows("metrics", "hold no accuracy", "run its explainers first")
+    table.require_rows("metrics", "have no accuracy", "run its explainers first")
     table.compare_down(EVERYTHING_SEEN, same=1)
     columns = {name: Column(head) for name, head in EVERYTHING_SEEN.items()}
     columns |= {name: Column(f"{name.removeprefix(DATASET)} (%)", interval=False) for name in datasets}

@@ -28,7 +28,7 @@ ORDERS = {
     "random": "At random",
     "least_gradient": "Least salient first",
 }
-_NOTHING = ("metrics", "hold no gradients", "run the step gradients first")
+_NOTHING = ("metrics", "have no gradients", "run the step gradients first")
 
 
 def saliency_deletion(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:

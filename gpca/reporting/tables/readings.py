@@ -58,7 +58,7 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
             numbers |= {"least": of.least, "most": of.most, "value": of.value}
             cells = {name: None if math.isnan(x) else plain_cell(float(x), seeds, 0) for name, x in numbers.items()}
             table.add_row(labels, cells)
-    table.require_rows("reading_verdicts.csv", "holds no missed number", "nothing is missed")
+    table.require_rows("reading_verdicts.csv", "has no missed number", "nothing is missed")
     return table.build(
         "The numbers that are not reproduced, under other readings of what the paper leaves unstated"
         + stand_in_clause(sources.values())

@@ -50,7 +50,7 @@ def table8_recovery(
         if policy in seconds:
             cells["seconds"] = plain_cell(seconds[policy], seeds, failures)
         table.add_row([(policy, words)], cells)
-    table.require_rows("metrics", "hold no recovery", "run the step recover first")
+    table.require_rows("metrics", "have no recovery", "run the step recover first")
     table.compare_down(within)
     failures = table.cells[0, within[0]].test_samples
     return table.build(

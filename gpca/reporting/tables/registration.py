@@ -58,7 +58,7 @@ def table11_registration(
         }
         cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", ALL, 1e3)
         table.add_row(labels, cells)
-    table.require_rows("metrics", "hold no registration method", "run the step register_methods first")
+    table.require_rows("metrics", "have no registration method", "run the step register_methods first")
     columns = {f"success_{cause}": Column(f"{cause.capitalize()} (%)") for cause in causes}
     columns |= {key: column for key, (column, _) in _ERRORS.items()}
     table.compare_down(columns, same=1)
@@ -93,7 +93,7 @@ def table11_severity(
         table.add_row(
             labels, {key: cell_over_sources(metrics, metrics, sources, name, "success", key, 100) for key in columns}
         )
-    table.require_rows("metrics", "hold no registration method", "run the step register_methods first")
+    table.require_rows("metrics", "have no registration method", "run the step register_methods first")
     table.compare_down(columns, same=1)
     pairs = {key: cell.test_samples for (_, key), cell in table.cells.items()}
     return table.build(

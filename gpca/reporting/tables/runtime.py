@@ -29,7 +29,7 @@ def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number])
         InputError: The frame has no rows.
     """
     if runtime.empty:
-        raise InputError("runtime", "holds no rows", "run the step 'runtime' first")
+        raise InputError("runtime", "has no rows", "run the step 'runtime' first")
     published = printed_seconds(numbers)
     table = TableBuilder(
         "table7_runtime", {"component": "Component", "device": "Device", "published_device": "Device (paper)"}
