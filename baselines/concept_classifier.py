@@ -38,7 +38,7 @@ def known_concepts(concept_N: np.ndarray, labels: tuple[str, ...] = CONCEPTS) ->
     """Return the labels among those of training samples, in their order; fewer than two raise an InputError."""
     known = [label for label in labels if (concept_N == label).any()]
     if len(known) < 2:
-        raise InputError("training registrations", "fewer than two concepts", "give samples of at least two")
+        raise InputError("training registrations", "cover fewer than two concepts", "give samples of at least two")
     return known
 
 

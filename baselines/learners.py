@@ -58,7 +58,7 @@ class ProbableSVM(Learner):
 
         folds = min(5, *np.unique(registrations.concept, return_counts=True)[1])
         if folds < 2:
-            raise InputError("training registrations", "hold a single sample of a concept", "give at least two")
+            raise InputError("training registrations", "have a single sample of a concept", "give at least two")
         svm = SVC(kernel=self._kernel, random_state=PAPERS_RANDOM_STATE)
         self._classifier = ConceptClassifier(_standardised(CalibratedClassifierCV(svm, cv=folds, ensemble=False)))
         super().fit(registrations)

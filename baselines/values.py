@@ -58,7 +58,7 @@ class ScaledValues:
 
     def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], worth: str) -> None:
         if worth not in WORTHS:
-            raise InputError("setting 'worth'", f"unknown '{worth}'", f"known are {', '.join(WORTHS)}")
+            raise InputError("setting 'worth'", f"unknown '{worth}'", f"choose one of {', '.join(WORTHS)}")
         self._values = values
         self._conditions = conditions
         self._worth = worth

@@ -84,9 +84,7 @@ def measured(jobs: Sequence[Job], folder: Path) -> dict[str, float]:
         elif blocks:
             seconds[job.benchmark] = sum(value for record in blocks.values() for value in number(record, "seconds"))
         else:
-            raise InputError(
-                folder, f"has no {job.benchmark}", "finish the run, or give its --configfile and --config"
-            )
+            raise InputError(folder, f"has no {job.benchmark}", "finish the run, or give its --configfile and --config")
     return seconds
 
 

@@ -25,23 +25,23 @@ STEPS = {
     "embed": "registrations and encoder -> embeddings",
     "reduce": "embeddings -> embeddings of fewer dimensions by PCA, UMAP or an autoencoder",
     "uncertainty": "registrations -> Monte-Carlo ICP under the conditions of a design",
-    "causes": "canonical clouds -> pairs with any subset of the causes, and the share of each in the error",
-    "describe": "causes -> measurements of each pair that need no truth",
+    "causes": "canonical clouds -> pairs with any subset of the causes, and each cause's share of the error",
+    "describe": "causes -> measurements of each pair that need no ground truth",
     "train_on_causes": "causes -> encoder weights and embeddings of their aligned sources",
     "estimate": "causes -> covariances of the test registrations by every estimator, with errors",
     "diagnose": "causes, and descriptors or embeddings -> predictions of one explainer of causes",
-    "frame_causes": "instances of depth frames -> what made their registrations fail, and what explainers say of it",
+    "frame_causes": "instances of depth frames -> why their registrations failed, and what explainers say about it",
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "train_control": "registrations -> embeddings by an encoder that is trained under a control",
     "controls": "registrations and embeddings -> predictions of every explainer under every control",
     "exchange": "registrations -> explanations based on other registration methods and estimators",
-    "gradients": "registrations, encoder and embeddings -> what GP-CA's scores react to: saliency maps and TCAV",
+    "gradients": "registrations, encoder and embeddings -> what GP-CA's scores respond to: saliency maps and TCAV",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "new_concepts": "registrations, causes and encoders -> learning curves of concepts that no encoder has seen",
     "frame_labels": "embeddings of depth frames -> learning curves of a new concept, by every backbone and by the pair",
-    "kernel_grid": "embeddings -> every kernel, learning rate and number of iterations",
-    "shift": "registrations and encoder -> embedded samples unlike the training samples, and their distances",
+    "kernel_grid": "embeddings -> scores of every kernel, learning rate and number of iterations",
+    "shift": "registrations and encoder -> embedded samples that differ from the training samples, and their distances",
     "learners": "embeddings -> predictions of every learner, on test samples and on shifted ones",
     "readings": "files of a run -> the printed numbers under other readings of what the paper leaves unstated",
     "recover": "settings -> failures on virtual scenes, and what every recovery policy does about them",
@@ -82,8 +82,10 @@ def _run(arguments: list[str], chosen: str | None) -> int:
     steps = parser.add_subparsers(dest="step", required=True, metavar="step")
     for name, summary in STEPS.items():
         step = steps.add_parser(name, help=summary, description=summary)
-        step.add_argument("--threads", type=THREADS, default=1, help="threads of torch, numba and OpenMP (default 1)")
-        step.add_argument("--settings", default="{}", help="JSON: the step's section of the config")
+        step.add_argument(
+            "--threads", type=THREADS, default=1, help="number of threads for torch, numba and OpenMP (default 1)"
+        )
+        step.add_argument("--settings", default="{}", help="the step's section of the config, as JSON")
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
             _keep_freed_memory()
@@ -123,7 +125,7 @@ def _mapping(text: str) -> dict:
     try:
         settings = parse_json(text)
     except ValueError as fault:
-        raise InputError("--settings", f"not JSON: {fault}", "give a JSON object") from fault
+        raise InputError("--settings", f"invalid JSON: {fault}", "give a JSON object") from fault
     if not isinstance(settings, dict):
         raise InputError("--settings", "not a JSON object", 'give one, such as {"draw_points": 512}')
     require_plain(settings, "--settings")

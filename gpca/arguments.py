@@ -12,7 +12,7 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with status 2 and one line that names the command, the fault and the help."""
-        self.exit(2, f"{self.prog}: {' '.join(message.split())}; '{self.prog} --help' lists what it takes\n")
+        self.exit(2, f"{self.prog}: {' '.join(message.split())}; see '{self.prog} --help'\n")
 
 
 def whole_number(least: int, most: int) -> Callable[[str], int]:
@@ -22,7 +22,7 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
         # Python reads more: digits of other scripts, underlines between them, and numbers that take it minutes.
         digits = text.removeprefix("-")
         if not (digits.isascii() and digits.isdigit() and len(digits) < 20 and least <= int(text) <= most):
-            raise argparse.ArgumentTypeError(f"'{text[:40]}' is no whole number from {least} to {most}")
+            raise argparse.ArgumentTypeError(f"'{text[:40]}' is not a whole number from {least} to {most}")
         return int(text)
 
     return read

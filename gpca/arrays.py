@@ -59,7 +59,7 @@ def load_arrays(
     for name, array in arrays.items():
         if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():
             found = "NaN or infinity" if not np.isfinite(array).all() else f"numbers above {LARGEST_NUMBER:.0e}"
-            raise InputError(path, f"array '{name}' holds {found}", remedy)
+            raise InputError(path, f"array '{name}' contains {found}", remedy)
     return arrays
 
 
@@ -73,14 +73,14 @@ def _checked_members(archive, path, shapes, kinds, remedy) -> dict[str, zipfile.
             raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
         members[name] = info = archive.getinfo(f"{name}.npy")
         if not is_bounded(info):
-            raise InputError(path, f"array '{name}' is compressed in a way that npz does not know", remedy)
+            raise InputError(path, f"array '{name}' uses a compression that npz does not support", remedy)
         with archive.open(info) as stream:
             actual, dtype, start = _npy_header(stream)
         if dtype.hasobject:
-            raise InputError(path, "holds pickled objects, which are never loaded", remedy)
+            raise InputError(path, "contains pickled objects, which are never loaded", remedy)
         _check_shape(path, name, actual, shape, sizes, remedy)
         if math.prod(actual) and dtype.kind not in kinds.get(name, _KNOWN):
-            raise InputError(path, f"array '{name}' is of type {dtype}", remedy)
+            raise InputError(path, f"array '{name}' has type {dtype}", remedy)
         if start + math.prod(actual) * dtype.itemsize != info.file_size:
             raise ValueError(f"array '{name}' is not as long as its header says")
     require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)

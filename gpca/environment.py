@@ -29,7 +29,7 @@ def system_library_hint(message: str) -> str | None:
         return None
     library = missing[1]
     if library not in SYSTEM_PACKAGES:
-        return f"install the system package that holds {library}"
+        return f"install the system package that provides {library}"
     debian, fedora = SYSTEM_PACKAGES[library]
     return f"install {library}: 'apt-get install {debian}' (Debian, Ubuntu) or 'dnf install {fedora}' (Fedora)"
 

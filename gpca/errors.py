@@ -22,7 +22,7 @@ class InputError(ValueError):
 def require_known(kind: str, name: object, known: Collection[str]) -> None:
     """Raise an InputError that lists the known names of a kind of thing unless this is one of them."""
     if name not in known:
-        raise InputError(f"{kind} '{name}'", "unknown", f"known are {', '.join(known)}")
+        raise InputError(f"{kind} '{name}'", "unknown", f"choose one of {', '.join(known)}")
 
 
 @contextmanager

@@ -55,16 +55,18 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
     taken = {Path(os.path.realpath(path)) for path in inputs}
     for output in map(Path, outputs):
         if (place := Path(os.path.realpath(output))) in taken:
-            raise InputError(output, "is an input, or another output, too", "give each file a name of its own")
+            raise InputError(output, "is also an input or another output", "give each file its own name")
         taken.add(place)
         if place.exists() and not (place.is_dir() if folders else place.is_file()):  # a device would be replaced
-            raise InputError(output, f"is there and no {'folder' if folders else 'file'}", "give another name")
+            raise InputError(output, f"exists but is not a {'folder' if folders else 'file'}", "choose another name")
         existing = next(folder for folder in place.parents if os.path.lexists(folder))
         if not existing.is_dir():
-            raise InputError(output, f"cannot be written: {existing} is no folder", "give another name")
+            raise InputError(output, f"cannot be written: {existing} is not a folder", "choose another name")
         # Root may write to /proc, as far as permissions tell.
         if not os.access(existing, os.W_OK | os.X_OK) or existing.is_relative_to("/proc"):
-            raise InputError(output, f"cannot be written: {existing} may not be written to", "give another folder")
+            raise InputError(
+                output, f"cannot be written: no permission to write to {existing}", "choose another folder"
+            )
 
 
 @contextmanager
@@ -112,4 +114,4 @@ def read_image(path: str | Path, remedy: str) -> np.ndarray:
     except (Image.DecompressionBombError, Image.DecompressionBombWarning) as fault:
         raise InputError(path, too_many, remedy) from fault
     except Exception as fault:  # Pillow raises errors of many kinds for a damaged file
-        raise InputError(path, "is truncated or no readable image", remedy) from fault
+        raise InputError(path, "is truncated or not a readable image", remedy) from fault

@@ -29,7 +29,7 @@ def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
     except ValueError as fault:  # also of UTF-8
         raise InputError(path, f"is not {what} ({fault})", remedy) from fault
     if not isinstance(content, dict):
-        raise InputError(path, f"is not {what} (it has no object at the top)", remedy)
+        raise InputError(path, f"is not {what} (its top level is not an object)", remedy)
     return content
 
 
@@ -56,4 +56,4 @@ def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number")
+    raise ValueError(f"{name} is not a number")

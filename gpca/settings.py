@@ -112,7 +112,9 @@ def require_valid(instance: dict, schema: dict, subject: str, complete: bool = T
         path = ".".join([*map(str, fault.absolute_path), str(unknown)])
         close = get_close_matches(str(unknown), known, n=1)
         raise InputError(
-            f"{subject} {path}", "unknown", f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
+            f"{subject} {path}",
+            "unknown",
+            f"did you mean {close[0]}?" if close else f"choose one of {', '.join(known)}",
         )
     if fault.validator == "type" and fault.schema["type"] == "array" and isinstance(fault.instance, str | int | float):
         raise InputError(f"{subject} {key}", fault.message, f"give a list: [{fault.instance}]")

@@ -21,7 +21,7 @@ def standard_streams() -> Iterator[None]:
         InputError: stdout is closed, its reader is gone, or its disk is full.
     """
     if sys.stdout is None:
-        raise InputError("stdout", "is closed", "redirect it, to /dev/null where nothing shall be printed")
+        raise InputError("stdout", "is closed", "redirect it, for example to /dev/null")
     if sys.stderr is None:  # else what is meant for it would be printed to stdout
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdin, sys.stdout, sys.stderr):

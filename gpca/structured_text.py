@@ -32,9 +32,13 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(path, "is no file" if path.exists() else "no such file", "name a config, a YAML or JSON file")
+        raise InputError(
+            path, "is not a file" if path.exists() else "no such file", "name a config, a YAML or JSON file"
+        )
     if (size := path.stat().st_size) > LARGEST_BYTES:
-        raise InputError(path, f"is no config: it has {size} bytes", f"a config has {LARGEST_BYTES} at the most")
+        raise InputError(
+            path, f"is too large for a config: it has {size} bytes", f"a config has at most {LARGEST_BYTES}"
+        )
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as fault:
@@ -59,10 +63,10 @@ def require_plain(mapping: Mapping, subject: object) -> None:
     for path, value in _entries(mapping):
         key = ".".join(map(str, path))
         if not isinstance(path[-1], str | _Index):
-            raise InputError(f"{subject} {key}", f"the key {path[-1]!r} is no text", f'write "{path[-1]}", in quotes')
+            raise InputError(f"{subject} {key}", f"the key {path[-1]!r} is not text", f'write "{path[-1]}", in quotes')
         for text in (path[-1], value):
             if isinstance(text, str) and not _printable(text):
-                raise InputError(f"{subject} {key!r}", f"{text!r} holds a control character", "write it in one line")
+                raise InputError(f"{subject} {key!r}", f"{text!r} contains a control character", "write it on one line")
         if not (value is None or isinstance(value, str | int | float | Mapping | list)):
             raise InputError(f"{subject} {key}", f"{value!r} is a {type(value).__name__}", "put it in quotes")
 
@@ -92,10 +96,10 @@ def _parse_yaml(text: str, path: Path) -> Any:
             return None
         # On the nodes, before any alias is unfolded.
         if _size(node, {}, path) > MOST_ENTRIES:
-            raise InputError(path, f"its aliases unfold to more than {MOST_ENTRIES} entries", "write out what is meant")
+            raise InputError(path, f"its aliases expand to more than {MOST_ENTRIES} entries", "write the entries out")
         return loader.construct_document(node)
     except RecursionError as fault:
-        raise InputError(path, "is nested too deeply", "write it flat") from fault
+        raise InputError(path, "is nested too deeply", "nest it less") from fault
     except InputError:
         raise
     except (yaml.YAMLError, ValueError) as fault:  # a date or a number may look like one and be none
@@ -108,7 +112,7 @@ def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
         return 1
     place = f"line {node.start_mark.line + 1}"
     if (known := sizes.get(id(node), 0)) is None:
-        raise InputError(path, f"{place}: what begins here holds itself", "take the alias away")
+        raise InputError(path, f"{place}: the value that begins here contains itself", "remove the alias")
     if known:
         return known
     sizes[id(node)] = None  # on the way

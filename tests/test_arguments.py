@@ -52,13 +52,13 @@ def test_both_ends_are_allowed():
 
 
 SETTINGS = {
-    "no JSON": ("{", "not JSON"),
+    "no JSON": ("{", "invalid JSON"),
     "list": ("[]", "not a JSON object"),
     "number": ("3", "not a JSON object"),
-    "empty": ("", "not JSON"),
-    "key twice": ('{"kind": "bop", "kind": "mesh_folder"}', "key 'kind' stands twice"),
+    "empty": ("", "invalid JSON"),
+    "key twice": ('{"kind": "bop", "kind": "mesh_folder"}', "key 'kind' appears twice"),
     "nested": ('{"a": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deeply"),
-    "endless digits": ('{"a": ' + "9" * 5000 + "}", "not JSON"),
+    "endless digits": ('{"a": ' + "9" * 5000 + "}", "invalid JSON"),
     "control character": ('{"title": "a\\nb"}', "control character"),
     "half a letter": ('{"title": "\\ud800"}', "control character"),
     "unknown": ('{"knd": "bop"}', "did you mean kind?"),

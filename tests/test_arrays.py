@@ -72,8 +72,8 @@ def arrays(**changed):
         (arrays(points=np.zeros(4)), "array 'points' is 4, not P×3"),
         (arrays(labels=np.array("a")), "array 'labels' is scalar, not 4"),
         (arrays(labels=np.array(["a"] * 5)), "array 'labels' is 5, not 4"),
-        (arrays(points=np.full((4, 3), np.nan)), "array 'points' holds NaN"),
-        (arrays(points=np.full((4, 3), np.inf, np.float32)), "array 'points' holds NaN or infinity"),
+        (arrays(points=np.full((4, 3), np.nan)), "array 'points' contains NaN"),
+        (arrays(points=np.full((4, 3), np.inf, np.float32)), "array 'points' contains NaN or infinity"),
     ],
 )
 def test_faulty_files_are_refused_in_one_line(tmp_path, write, expected):

@@ -155,14 +155,14 @@ def test_a_missing_run_is_one_line_and_status_2(capsys):
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"peak_memory_mb": 1}', '{"seconds": "long", "peak_memory_mb": 1}'])
 def test_a_damaged_record_is_named(run_folder, text):
     (run_folder / "objects" / "cup.npz.provenance.json").write_text(text)
-    with pytest.raises(InputError, match=r"cup\.npz\.provenance\.json: holds no number 'seconds'"):
+    with pytest.raises(InputError, match=r"cup\.npz\.provenance\.json: has no number 'seconds'"):
         pipeline.read_stages(run_folder)
 
 
 def test_a_run_without_records_is_refused(tmp_path):
-    with pytest.raises(InputError, match="holds no"):
+    with pytest.raises(InputError, match="has no"):
         pipeline.read_stages(tmp_path)
-    with pytest.raises(InputError, match="holds no benchmark files"):
+    with pytest.raises(InputError, match="has no benchmark files"):
         pipeline.wall_time(tmp_path)
 
 

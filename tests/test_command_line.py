@@ -54,4 +54,4 @@ def test_wrong_usage_is_argparses_status_2(words, capsys):
         main(words)
     assert caught.value.code == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.endswith("--help' lists what it takes")
+    assert line.endswith(" --help'") and "; see '" in line

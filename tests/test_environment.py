@@ -37,7 +37,7 @@ def test_open3d_imports_here():
 @pytest.mark.parametrize(
     ("package", "expected"),
     [
-        ("import ctypes\nctypes.CDLL('libgpca-absent.so.3')\n", "holds libgpca-absent.so.3"),
+        ("import ctypes\nctypes.CDLL('libgpca-absent.so.3')\n", "provides libgpca-absent.so.3"),
         ("raise ImportError('libGL.so.1: cannot open shared object file: No such file')\n", "apt-get install libgl1"),
         ("raise ImportError('undefined symbol')\n", "make environment"),
     ],

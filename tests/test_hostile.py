@@ -8,7 +8,7 @@ NOT_JSON = ["objects", "--source", "procedural", "--out", "objects.npz", "--sett
 
 
 def test_a_refusal_is_one_line_with_status_2(tmp_path):
-    line = refusal(NOT_JSON, tmp_path, "--settings", "not JSON")
+    line = refusal(NOT_JSON, tmp_path, "--settings", "invalid JSON")
     assert line.startswith("gpca objects:")
 
 

@@ -27,14 +27,14 @@ def folder(tmp_path):
 @pytest.mark.parametrize(
     ("out", "word"),
     [
-        ("taken", "no file"),
-        (".", "no file"),
-        ("..", "no file"),
-        ("", "no file"),
-        ("/", "no file"),
-        ("fifo", "no file"),
-        ("file/objects.npz", "no folder"),
-        ("file/deeper/objects.npz", "no folder"),
+        ("taken", "is not a file"),
+        (".", "is not a file"),
+        ("..", "is not a file"),
+        ("", "is not a file"),
+        ("/", "is not a file"),
+        ("fifo", "is not a file"),
+        ("file/objects.npz", "is not a folder"),
+        ("file/deeper/objects.npz", "is not a folder"),
         ("/proc/objects.npz", "written"),
         ("x" * 300, "too long"),
         ("loop/objects.npz", "loop"),
@@ -58,7 +58,7 @@ def test_one_file_is_not_written_twice_nor_over_what_is_read(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     Path("a").write_text("")
     Path("link").symlink_to("a")
-    with pytest.raises(InputError, match="is an input, or another output, too; give each file a name of its own"):
+    with pytest.raises(InputError, match="is also an input or another output; give each file its own name"):
         require_outputs(outputs, inputs)
 
 

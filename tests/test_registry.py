@@ -38,7 +38,7 @@ def test_a_file_that_is_new_in_the_folder_is_found(fruits, tmp_path):
 
 @pytest.mark.parametrize("ask", ["entry", "module"])
 def test_an_unknown_name_is_answered_with_the_known(fruits, ask):
-    with pytest.raises(InputError, match="fruit 'pear': unknown; known are mango, plum, cherry, apple"):
+    with pytest.raises(InputError, match="fruit 'pear': unknown; choose one of mango, plum, cherry, apple"):
         getattr(fruits, ask)("pear")
 
 

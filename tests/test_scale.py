@@ -77,9 +77,9 @@ def test_a_larger_run_has_as_many_of_each_and_passes_the_check():
 
 def test_a_run_with_a_job_that_was_not_recorded_is_refused(run_folder, tmp_path, capsys):
     assert scale.main([str(tmp_path / "nowhere")]) == 2
-    assert "nowhere: holds no benchmark files" in capsys.readouterr().err
+    assert "nowhere: has no benchmark files" in capsys.readouterr().err
     (run_folder / "benchmarks/objects/ycb.tsv").unlink()
     assert scale.main([str(run_folder)]) == 2
     assert capsys.readouterr().err.endswith(
-        "holds no benchmarks/objects/ycb.tsv; finish the run, or give its --configfile and --config\n"
+        "has no benchmarks/objects/ycb.tsv; finish the run, or give its --configfile and --config\n"
     )

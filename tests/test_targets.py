@@ -100,7 +100,7 @@ def test_the_command_prints_the_table_and_writes_it_into_its_page(
 
 def test_faults_are_one_line_and_status_2(smoke_plan, run_folder, tmp_path, monkeypatch, capsys):
     assert targets.main([str(tmp_path / "nowhere")]) == 2
-    assert "nowhere: holds no benchmark files; name the folder of a finished run" in capsys.readouterr().err
+    assert "nowhere: has no benchmark files; name the folder of a finished run" in capsys.readouterr().err
     monkeypatch.setattr(targets, "plan", lambda run, configfile, config: smoke_plan)
     (tmp_path / "page.md").write_text("No place.\n")
     assert targets.main([str(run_folder), "--write", str(tmp_path / "page.md")]) == 2
@@ -109,7 +109,7 @@ def test_faults_are_one_line_and_status_2(smoke_plan, run_folder, tmp_path, monk
     assert (tmp_path / "page.md").read_text() == "No place.\n"
     (run_folder / "benchmarks/objects/ycb.tsv").write_text("nothing\n")
     assert targets.main([str(run_folder)]) == 2
-    assert "ycb.tsv: holds no number 's'; make the run anew" in capsys.readouterr().err
+    assert "ycb.tsv: has no number 's'; repeat the run" in capsys.readouterr().err
 
 
 def test_a_plan_that_cannot_be_made_says_why(tmp_path):

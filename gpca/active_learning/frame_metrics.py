@@ -78,7 +78,7 @@ def chosen_backbone(accuracies: Mapping[str, float], embeddings: Iterable[str]) 
     """
     backbones = [name for name in embeddings if name != PAIR]
     if not backbones:
-        raise InputError("learning curves of depth frames", "are of no backbone", "regenerate them")
+        raise InputError("learning curves of depth frames", "cover no backbone", "regenerate them")
     return max(backbones, key=lambda name: accuracies.get(name, 0.0))
 
 

@@ -48,7 +48,9 @@ class LabelFile:
             if concept != SKIPPED:
                 require_name(concept, where)
             if self.labels.get(key, concept) != concept:
-                raise InputError(where, f"'{concept}' contradicts '{self.labels[key]}' before", "remove one of them")
+                raise InputError(
+                    where, f"'{concept}' contradicts the earlier '{self.labels[key]}'", "remove one of them"
+                )
             self.labels[key] = concept
 
     def add(self, key: Key, concept: str) -> None:
@@ -68,7 +70,7 @@ def require_name(concept: str, subject: object = "concept") -> None:
     if not concept:
         raise InputError(subject, "the concept has no name", "give one, e.g. 'occlusion'")
     if not (concept.isascii() and concept.isidentifier() and concept == concept.lower()):
-        raise InputError(subject, f"'{concept}' is no name of a concept", "use small letters, digits and _")
+        raise InputError(subject, f"'{concept}' is not a valid concept name", "use lowercase letters, digits and _")
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class Session:
         self._start = dict(start)
         concepts = tuple(dict.fromkeys(start.values()))
         if len(concepts) < 2:
-            raise InputError("labelling", "starts with fewer than two labelled concepts", "name two with --known")
+            raise InputError("labeling", "starts with fewer than two labeled concepts", "name two with --known")
         self.gpc = GPC(concepts, settings, "label", seed)
         rows = [self._rows[key] for key in start]
         self.gpc.fit(h_S_d[rows], np.array(list(start.values())), h_S_d)

@@ -86,8 +86,8 @@ def make_task(
         pool, new = np.setdiff1d(pool, np.setdiff1d(new, new_kept)), new_kept
     if len(initial) < each * len(known) or len(pool) == len(new) or not len(new):
         raise InputError(
-            f"active learning with {settings.initial} labelled samples of {' and '.join(known)}",
-            f"leaves no pool of {len(train)} training samples",
+            f"active learning with {settings.initial} labeled samples of {' and '.join(known)}",
+            f"leaves none of {len(train)} training samples for the pool",
             f"lower active_learning.initial or raise {'registrations' if classes == CONCEPTS else 'causes'}.train",
         )
     rows = (initial, pool, samples.rows("test"))

@@ -93,8 +93,8 @@ class NewConceptSettings:
 
     def __post_init__(self) -> None:
         if missing := set(self.erring) - set(self.embeddings):
-            fault = f"'{sorted(missing)[0]}' is none of the embeddings"
-            raise InputError("setting erring of new_concepts", fault, f"choose among {', '.join(self.embeddings)}")
+            fault = f"'{sorted(missing)[0]}' is not among the embeddings"
+            raise InputError("setting erring of new_concepts", fault, f"choose from {', '.join(self.embeddings)}")
 
     @classmethod
     def from_dict(cls, section: dict) -> NewConceptSettings:

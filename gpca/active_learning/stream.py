@@ -35,7 +35,7 @@ def arrival_order(task: Task, stream: StreamSettings, *axes: object) -> np.ndarr
     if n_new > len(new) or stream.arrivals - n_new > len(known) or n_new < 1:
         raise InputError(
             f"a stream of {stream.arrivals} arrivals",
-            f"needs more than a pool of {len(known)} known and {len(new)} new samples",
+            f"needs a larger pool than {len(known)} known and {len(new)} new samples",
             "lower active_learning.stream.arrivals",
         )
     rest = known[stream.quiet : stream.arrivals - n_new]

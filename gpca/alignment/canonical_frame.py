@@ -49,7 +49,7 @@ def require_cloud_points(points: np.ndarray, subject: object) -> None:
     """Raise an InputError unless the points are (N, 3), finite, and as many as the encoders have seen at least."""
     require_points(points, subject)
     if len(points) < FEWEST_CLOUD_POINTS:
-        raise InputError(subject, f"holds {len(points)} points", f"give {FEWEST_CLOUD_POINTS} or more")
+        raise InputError(subject, f"has {len(points)} points", f"give {FEWEST_CLOUD_POINTS} or more")
 
 
 def thin(points: np.ndarray, most: int, *axes: object) -> np.ndarray:

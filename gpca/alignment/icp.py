@@ -101,7 +101,7 @@ class ICP:
 def require_cloud(name: str, points: np.ndarray) -> None:
     """Raise an InputError unless there are at least three points (N, 3), all of them finite."""
     if len(points) < 3 or not np.isfinite(points).all():
-        raise InputError(name, f"{len(points)} points, or NaN among them", "give at least 3 finite points")
+        raise InputError(name, f"has {len(points)} points or contains NaN", "give at least 3 finite points")
 
 
 def clipped_cost(fitness_n: np.ndarray, inlier_rmse_n: np.ndarray, distance: float) -> np.ndarray:

@@ -58,18 +58,18 @@ def require_rotation(T_b_a: np.ndarray, subject: object, tolerance: float = 1e-3
     if not np.isfinite(T_b_a).all():
         fault = "it contains NaN or infinity"
     elif abs(R).max() > 2 or abs(R @ R.T - np.eye(3)).max() > tolerance:
-        fault = "its axes are not at right angles, or not of length 1"
+        fault = "its axes are not orthogonal or not of unit length"
     elif np.linalg.det(R) < 0:
-        fault = "it is mirrored, of determinant -1"
+        fault = "it is mirrored: its determinant is -1"
     else:
         return
-    raise InputError(subject, f"the pose is no rigid transform: {fault}", "give a proper rotation, row by row")
+    raise InputError(subject, f"the pose is not a rigid transform: {fault}", "give a proper rotation, row by row")
 
 
 def require_rigid(T_b_a: np.ndarray, subject: object) -> None:
     """Raise an InputError that names `subject` unless this is a 4×4 rigid transform, last row and all."""
     if T_b_a.shape != (4, 4):
-        raise InputError(subject, f"the pose is of shape {T_b_a.shape}", "give 4×4 numbers")
+        raise InputError(subject, f"the pose has shape {T_b_a.shape}", "give 4×4 numbers")
     require_rotation(T_b_a, subject)
     if not np.allclose(T_b_a[3], (0, 0, 0, 1), atol=1e-6):
-        raise InputError(subject, "the pose is no rigid transform", "its last row has to be 0 0 0 1")
+        raise InputError(subject, "the pose is not a rigid transform", "its last row must be 0 0 0 1")

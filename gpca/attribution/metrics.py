@@ -167,7 +167,9 @@ def _causal_metrics(path, test: pd.DataFrame, causal_path, causal: pd.Series) ->
     keys = _samples(test)
     if not (known := keys.isin(causal.index)).all():
         split, sample = keys[~known][0]
-        raise InputError(causal_path, f"lacks {split} sample {sample} of {path}", "regenerate both from the same config")
+        raise InputError(
+            causal_path, f"lacks {split} sample {sample} of {path}", "regenerate both from the same config"
+        )
     shown = test[causal[keys].to_numpy()]
     metrics: dict[str, dict[str, float]] = {"causal_samples": {ALL: len(shown)}}
     if len(shown):

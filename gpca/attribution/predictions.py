@@ -116,7 +116,7 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     rows = read_csv(path, TIMING_COLUMNS)
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
-            raise InputError(path, "does not hold the seconds of these samples", "regenerate it")
+            raise InputError(path, "does not contain the times of these samples", "regenerate it")
     seconds, icp_seconds = (numbers(path, rows, name, least=0).to_numpy() for name in ("seconds", "icp_seconds"))
     return seconds, icp_seconds
 

@@ -84,13 +84,15 @@ def measure_frames(
         axes = (source, seed, "frame causes", i)
         try:
             if (subject := of_object.get(int(instances.object_index[i]))) is None:
-                raise Unmeasurable("its clean pairs are off")
+                raise Unmeasurable("its clean pairs are misaligned")
             candidate = frame_candidate(instances, i, subject, meshes[subject.index], points, generator(*axes))
             records.append(_measured(candidate, measuring, subject, axes) | {"sample": i, "split": "test"})
         except Unmeasurable as fault:
-            print(f"causes of {source}: instance {i} is left out: {fault}", file=sys.stderr)
+            print(f"causes of {source}: instance {i} is skipped: {fault}", file=sys.stderr)
     if not records:
-        raise InputError(f"causes of {source}", "no instance of the frames can be measured", "check meshes and poses")
+        raise InputError(
+            f"causes of {source}", "no instance in the frames can be measured", "check the meshes and poses"
+        )
     causes, _ = as_causes(records)
     return causes, _table(instances, causes)
 
@@ -107,10 +109,10 @@ def frame_candidate(
     T_true, T_init = instances.T_camera_object_true[i], instances.T_camera_object_init[i]
     outline_m = subject.surface[:OUTLINE_POINTS] * diameter_m
     if (view := clean_view(instances, i, mesh, outline_m)) is None:
-        raise Unmeasurable("its pixels see nothing of the mesh at the true pose")
+        raise Unmeasurable("its pixels show none of the mesh at the true pose")
     models = [_drawn(rendered_side(mesh, camera_3_3, T, outline_m), points, random) for T in (T_true, T_init)]
     if min(map(len, models)) < FEWEST_POINTS:
-        raise Unmeasurable("its mesh cannot be seen at the pose that ICP starts from")
+        raise Unmeasurable("its mesh is not visible at the pose that ICP starts from")
     kept = random.permutation(len(view.clean))[:points]
     hidden = _drawn(view.unmeasured, round(len(kept) * (1 - view.share) / max(view.share, 1e-9)), random)
     residuals = view.measured[kept] - view.clean[kept]

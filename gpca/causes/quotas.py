@@ -88,16 +88,21 @@ class Quotas:
         unfilled = [name for name, wanted in self._wanted.items() if self._count(name) < wanted]
         # The least filled one; of several that are empty, the largest.
         name = min(unfilled, key=lambda name: (self._count(name) / self._wanted[name], -self._wanted[name]))
-        state = {NOMINAL: "nominal", BORDERLINE: "borderline", GEOMETRY: "off when clean"}.get(name)
+        samples = {
+            NOMINAL: "nominal samples",
+            BORDERLINE: "borderline samples",
+            GEOMETRY: "samples misaligned when clean",
+        }
+        state = samples.get(name)
         change = ""
         if state is None:
-            state = f"failed by {name}"
+            state = f"samples that failed from {name}"
             lacking = [several for several in (False, True) if self.wants((name, several))]
             if len(lacking) == 1:
                 state += " among several causes" if lacking[0] else " alone"
                 change = ", widen causes.several"
-        found = f"{candidates} candidates gave {self._count(name)} of {self._wanted[name]} samples that are {state}"
-        remedy = f"{REMEDIES[name]}{change}, or give some of causes.shares.{name} to another share"
+        found = f"{candidates} candidates yielded {self._count(name)} of {self._wanted[name]} {state}"
+        remedy = f"{REMEDIES[name]}{change}, or move part of causes.shares.{name} to another share"
         return InputError(f"causes of {source}, seed {seed}, {split}", found, remedy)
 
     def _count(self, name: str) -> int:

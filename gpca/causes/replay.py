@@ -50,7 +50,7 @@ def replay(objects: ObjectClouds, causes: Causes, row: int, source: str, seed: i
         observed.append(transform(runs.T_target_source_n[0], candidate.observed(applied)))
     shown = registrations.cloud(row)
     if shown.shape != observed[ALL].shape or np.abs(observed[ALL] - shown).max() > 1e-3:
-        fault = "is not drawn again by these settings"
+        fault = "is not reproduced by these settings"
         raise InputError(
             f"sample {registrations.sample[row]} of {source}", fault, "regenerate the causes from a single config"
         )

@@ -51,8 +51,8 @@ class Limits:
 
     def __post_init__(self) -> None:
         if self.nominal > self.failed:
-            fault = f"nominal {self.nominal} is above failed {self.failed}"
-            raise InputError("causes limits", fault, "give a larger limit of failed, or a smaller one of nominal")
+            fault = f"nominal {self.nominal} exceeds failed {self.failed}"
+            raise InputError("causes limits", fault, "raise failed or lower nominal")
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Shares:
 
     def __post_init__(self) -> None:
         if abs((total := sum(asdict(self).values())) - 1) > 1e-6:
-            raise InputError("causes shares", f"they add up to {total:.4g}", "let them add up to 1")
+            raise InputError("causes shares", f"add up to {total:.4g}", "make them add up to 1")
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,8 @@ class CauseSettings(UncertaintySettings):
                 raise InputError(f"causes {name}", f"[{low}, {high}] is in descending order", "swap the two")
         low = self.points[0]
         if (left := round(low * (1 - self.severities.crop[1]))) < FEWEST_POINTS:
-            fault = f"of {low} points the largest crop leaves {left}"
-            remedy = f"raise causes.points or lower causes.severities.crop until {FEWEST_POINTS} are left"
+            fault = f"the largest crop leaves {left} of {low} points"
+            remedy = f"raise causes.points or lower causes.severities.crop until at least {FEWEST_POINTS} remain"
             raise InputError("causes points", fault, remedy)
 
     def runs(self) -> UncertaintySettings:

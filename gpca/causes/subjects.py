@@ -70,7 +70,7 @@ def split_by_object(
     """
     instances = sorted({instance_of(subject.name) for subject in subjects})
     if len(instances) < FEWEST_INSTANCES:
-        fault = f"{len(instances)} object(s) cannot be split into those of training and those of testing"
+        fault = f"{len(instances)} object(s) cannot be split into training and test objects"
         raise InputError(f"causes of {source}", fault, f"give at least {FEWEST_INSTANCES} objects")
     order = generator(source, seed, "causes", "objects").permutation(instances)
     count = min(max(1, round(settings.test_objects * len(order))), len(order) - 1)
@@ -104,8 +104,8 @@ def measure_clean_pairs(
         off = count - sum(error < settings.limits.nominal for error, _ in found)
         if off > MOST_FAILING * count and not settings.shares.geometry:
             print(
-                f"causes of {source}: object '{subject.name}' is left out: {off} of {count} clean pairs are off by "
-                f"{100 * settings.limits.nominal:g} % of the diameter or more, or cannot be registered",
+                f"causes of {source}: object '{subject.name}' is skipped: {off} of {count} clean pairs have an error "
+                f"of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be registered",
                 file=sys.stderr,
             )
             continue
@@ -113,7 +113,7 @@ def measure_clean_pairs(
         uncertainties += [uncertainty for _, uncertainty in found]
     if not uncertainties:
         limit = f"{100 * settings.limits.nominal:g} % of the diameter"
-        fault = f"of every object nearly all clean pairs are off by {limit} or more, or cannot be registered"
+        fault = f"nearly all clean pairs of every object have an error of at least {limit} or cannot be registered"
         raise InputError(f"causes of {source}", fault, "raise causes.limits.nominal or causes.points")
     return left, float(np.quantile(uncertainties, settings.limits.clean))
 

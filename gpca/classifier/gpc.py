@@ -126,7 +126,9 @@ class GPC:
         The other classes keep covariances, labels and posterior; the new one learns what it is not.
         """
         if not name or name in self.classes:
-            raise InputError(f"concept '{name}'", "is empty or known already", f"known are {', '.join(self.classes)}")
+            raise InputError(
+                f"concept '{name}'", "is empty or already known", f"the known ones are {', '.join(self.classes)}"
+            )
         self.classes = (*self.classes, name)
         self._set_prior(self._prior.grow())
 

@@ -78,9 +78,9 @@ def read_claims(path: str | Path = CLAIMS) -> list[Claim]:
 def _claim(where: str, entry: Mapping) -> Claim:
     required = (*_TOLD, "note") if "comparisons" not in entry else (*_TOLD, *_TESTED)
     if missing := [name for name in required if name not in entry]:
-        raise InputError(where, f"lacks '{missing[0]}'", "give it")
+        raise InputError(where, f"lacks '{missing[0]}'", "add it")
     if unknown := set(entry) - {*required, "ratio"}:
-        raise InputError(where, f"unknown key '{min(unknown)}'", f"known are {', '.join(required)}, ratio")
+        raise InputError(where, f"unknown key '{min(unknown)}'", f"use only {', '.join(required)}, ratio")
     told = {name: entry[name] for name in _TOLD}
     if "comparisons" not in entry:
         return Claim(**told, note=entry["note"])
@@ -97,7 +97,9 @@ def _claim(where: str, entry: Mapping) -> Claim:
 def _pairs(where: str, of: Mapping, comparison: Mapping) -> Iterator[Compared]:
     """Yield every pair of one comparison, by source and table."""
     if set(comparison) != {"one", "others"}:
-        raise InputError(where, f"a comparison has the keys {', '.join(comparison)}", "give it one and others")
+        raise InputError(
+            where, f"has a comparison with the keys {', '.join(comparison)}", "give it the keys one and others"
+        )
     sources, tables = (_listed(of.get(name)) for name in ("source", "in_table"))
     for other, source, table in product(comparison["others"], sources, tables):
         place = {**of, "source": source, "in_table": table}
@@ -109,7 +111,7 @@ def _value(where: str, place: Mapping, own: str | float | Mapping) -> Counterpar
         return float(own)
     full = {**place, **(own if isinstance(own, Mapping) else {"method": own})}
     if set(full) != set(_PLACES) or not all(isinstance(text, str) and text for text in full.values()):
-        raise InputError(where, f"a value is at {full}", f"name its {', '.join(_PLACES)}")
+        raise InputError(where, f"has a value at {full}", f"name its {', '.join(_PLACES)}")
     require_known(where, "in_file", full["in_file"], (*FILES, PREDICTIONS))
     return Counterpart(
         full["in_file"],

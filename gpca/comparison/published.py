@@ -174,9 +174,11 @@ def read_published(path: str | Path = PUBLISHED) -> list[Number]:
         where = f"{path}, line {line}"
         number = _number(where, fields)
         if number.key in first:
-            raise InputError(where, f"holds {_named(number.key)} again", f"line {first[number.key]} has it")
+            raise InputError(where, f"repeats {_named(number.key)}", f"it is on line {first[number.key]}")
         if number.same_as and number.same_as not in first:
-            raise InputError(where, f"'same_as' {_named(number.same_as)} is no number above", "take names of this file")
+            raise InputError(
+                where, f"'same_as' {_named(number.same_as)} is not a number above", "use a name from this file"
+            )
         first[number.key] = line
         numbers.append(number)
     if not numbers:
@@ -206,16 +208,18 @@ def read_lines(path: str | Path, columns: Sequence[str]) -> Iterator[tuple[int, 
         with Path(path).open(newline="", encoding="utf-8") as file:
             reader = csv.reader(file, strict=True)
             if tuple(next(reader, ())) != tuple(columns):
-                raise InputError(f"{path}, line 1", "other columns", f"they have to be {','.join(columns)}")
+                raise InputError(f"{path}, line 1", "has other columns", f"they must be {','.join(columns)}")
             for fields in reader:
                 if len(fields) != len(columns):
-                    fault = f"{len(fields)} fields for {len(columns)} columns"
-                    raise InputError(f"{path}, line {reader.line_num}", fault, "put a text with a comma in quotes")
+                    fault = f"has {len(fields)} fields for {len(columns)} columns"
+                    raise InputError(
+                        f"{path}, line {reader.line_num}", fault, "put text that contains a comma in quotes"
+                    )
                 yield reader.line_num, {name: field.strip() for name, field in zip(columns, fields, strict=True)}
     except FileNotFoundError:
         raise InputError(path, "no such file", "restore it") from None
     except (UnicodeDecodeError, csv.Error, IsADirectoryError) as fault:
-        raise InputError(path, f"is no readable CSV file: {fault}", "restore it") from fault
+        raise InputError(path, f"is not a readable CSV file: {fault}", "restore it") from fault
 
 
 def _number(where: str, fields: dict[str, str]) -> Number:
@@ -233,9 +237,9 @@ def _number(where: str, fields: dict[str, str]) -> Number:
     decimals = _whole(where, "decimals", fields["decimals"])
     paper_n = _whole(where, "paper_n", fields["paper_n"] or "0", least=0)
     if upper < value:
-        raise InputError(where, f"'upper' {upper:g} lies below 'value' {value:g}", "swap them")
+        raise InputError(where, f"'upper' {upper:g} is below 'value' {value:g}", "swap them")
     if any(round(bound, decimals) != bound for bound in (value, upper)):
-        raise InputError(where, f"a value with more digits than {decimals} decimals", "correct one of them")
+        raise InputError(where, f"has a value with more than {decimals} decimals", "correct one of them")
     if paper_n and fields["unit"] == "%" and fields["statistic"] == "mean":
         nearest = 100 * round(value / 100 * paper_n) / paper_n
         if abs(nearest - value) > 0.5 * 10.0**-decimals + 1e-9:
@@ -265,16 +269,16 @@ def _counterpart(where: str, fields: dict[str, str]) -> Counterpart | None:
     given = [name for name in _COUNTERPART if fields[name]]
     if not given:
         if not fields["note"]:
-            raise InputError(where, "neither a counterpart nor a note that says why there is none", "give one")
+            raise InputError(where, "has neither a counterpart nor a note that explains why", "give one")
         return None
     if len(given) < len(_COUNTERPART):
         empty = next(name for name in _COUNTERPART if not fields[name])
-        raise InputError(where, f"names a counterpart, but '{empty}' is empty", "fill in all of it or nothing")
+        raise InputError(where, f"names a counterpart, but '{empty}' is empty", "fill in all of it or none")
     require_known(where, "in_file", fields["in_file"], FILES)
     require_known(where, "statistic", fields["statistic"], STATISTICS)
     metrics = tuple(fields["metric"].split("/"))
     if len(metrics) > 2 or not all(metrics):
-        raise InputError(where, f"'metric' is '{fields['metric']}'", "give one, or one divided by another")
+        raise InputError(where, f"'metric' is '{fields['metric']}'", "give one metric, or one divided by another")
     return Counterpart(
         fields["in_file"],
         fields["in_table"],
@@ -289,7 +293,7 @@ def _counterpart(where: str, fields: dict[str, str]) -> Counterpart | None:
 def require_known(where: str, name: str, given: str, known: Iterable[str]) -> str:
     """Return what was given, or raise an InputError that lists what is known."""
     if given not in known:
-        raise InputError(where, f"unknown {name} '{given}'", f"known are {', '.join(known)}")
+        raise InputError(where, f"unknown {name} '{given}'", f"expected one of {', '.join(known)}")
     return given
 
 

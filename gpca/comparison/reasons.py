@@ -45,7 +45,7 @@ def read_reasons(numbers: Iterable[Number], path: str | Path = REASONS) -> list[
             raise InputError(where, "'reason' is empty", "say what was found, or remove the line")
         if not any(reason.fits(number) for number in numbers):
             named = " / ".join((reason.table, reason.row, reason.column))
-            raise InputError(where, f"{named} is no printed number", "take names of published.csv, or *")
+            raise InputError(where, f"{named} is not a printed number", "use names from published.csv, or *")
         reasons.append(reason)
     return reasons
 

@@ -48,7 +48,7 @@ class Allowance:
         """Return the largest difference from a mean of the reference's file that rounding explains."""
         kind = kind_of(file, mean.quantity)
         if kind not in self.tolerances:
-            raise InputError("config key reference.tolerances", f"no kind '{kind}'", "give its tolerance")
+            raise InputError("config key reference.tolerances", f"has no kind '{kind}'", "add its tolerance")
         allowed = max(self.tolerances[kind], self.half_widths * mean.half_width)
         if kind == "count" and not mean.unit:
             allowed = max(allowed, self.ratio * abs(mean.value))
@@ -101,12 +101,12 @@ def require_same_config(run: Path, reference: Path, files: list[str]) -> None:
     for file in files:
         here, there = (_config_of(folder / f"{file}.provenance.json") for folder in (run, reference))
         if here and (other := sorted(section for section in there if here.get(section) != there[section])):
-            fault = f"{file} was made with another section '{other[0]}' of the config than {run / file}"
+            fault = f"{file} was made with a different config section '{other[0]}' than {run / file}"
             raise InputError(reference, fault, "compare a run of that config, or regenerate the reference")
 
 
 def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean], allowance: Allowance) -> FileCheck:
-    for one, other, told in ((there, here, "lacks"), (here, there, "has beyond the reference")):
+    for one, other, told in ((there, here, "lacks"), (here, there, "adds to the reference")):
         if beyond := [key for key in one if key not in other]:
             return FileCheck(file, DIFFERENT, f"{told} {len(beyond)} of {len(one)} values, such as {_named(beyond[0])}")
     differing = [key for key in there if here[key].value != there[key].value]
@@ -118,7 +118,7 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     largest = _difference(here[worst].value - there[worst].value, allowance.of(file, there[worst]), there[worst])
     told = f"{len(differing)} of {len(there)} values differ"
     if beyond:
-        told = f"{told}, {len(beyond)} by more than rounding usually does"
+        told = f"{told}, {len(beyond)} by more than rounding usually explains"
     too_many = len(beyond) > allowance.beyond * len(there)
     return FileCheck(file, DIFFERENT if too_many else ROUNDING, f"{told}; at most, {_named(worst)}: {largest}")
 
@@ -142,7 +142,7 @@ def device_of(folder: Path, file: str) -> str:
     if isinstance(device, str):  # records of earlier versions have no more than the name
         return device
     known = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
-    return ", ".join(filter(None, [*known, device.get("instructions")])) or "on a processor that is not recorded"
+    return ", ".join(filter(None, [*known, device.get("instructions")])) or "on an unrecorded processor"
 
 
 def _config_of(path: Path) -> dict[str, str]:
@@ -158,9 +158,9 @@ def _record(path: Path) -> dict:
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as fault:
-        raise InputError(path, "is no provenance record", "regenerate its result") from fault
+        raise InputError(path, "is not a provenance record", "regenerate its result") from fault
     if not isinstance(record, dict):
-        raise InputError(path, "is no provenance record", "regenerate its result")
+        raise InputError(path, "is not a provenance record", "regenerate its result")
     return record
 
 

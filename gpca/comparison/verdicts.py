@@ -45,7 +45,7 @@ class Tolerance:
     def __post_init__(self):
         if not (1 if self.factor else 0) <= self.reproduced <= self.close:
             least = "1 <= reproduced <= close" if self.factor else "0 <= reproduced <= close"
-            raise InputError("tolerance", f"{self.reproduced:g} and {self.close:g}", f"it has to be {least}")
+            raise InputError("tolerance", f"{self.reproduced:g} and {self.close:g}", f"must satisfy {least}")
 
 
 def compare(
@@ -78,7 +78,7 @@ def compare(
     values: dict[tuple[str, ...], Reproduced | None] = {}
     for number in numbers:
         if number.unit not in tolerances:
-            raise InputError("config key comparison.tolerances", f"no unit '{number.unit}'", "give its tolerance")
+            raise InputError("config key comparison.tolerances", f"has no unit '{number.unit}'", "add its tolerance")
         deviation = _deviation_of(number, deviations)
         printed = printed_of(number, deviation)
         found = values[number.key] = value_of_run(number, results, clusters)

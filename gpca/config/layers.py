@@ -22,7 +22,9 @@ def read_file(path: str | Path) -> dict[str, Any]:
     """
     config = read_mapping(path)
     if TEMPLATE in config:
-        raise InputError(path, f"is a template: {TEMPLATE} lets it run code", "write its values out, and drop that key")
+        raise InputError(
+            path, f"is a template, and {TEMPLATE} lets it run code", "write out its values and remove that key"
+        )
     return config
 
 

@@ -79,7 +79,7 @@ def _wait_for_jobs() -> None:
     told = False
     while jobs := " ".join(map(str, _living_jobs())):
         if not told:
-            print(f"gpca: waits for jobs of a killed run to end; 'kill {jobs}' ends them at once", file=sys.stderr)
+            print(f"gpca: waiting for jobs of a killed run to end; 'kill {jobs}' ends them at once", file=sys.stderr)
             told = True
         time.sleep(1)
 

@@ -194,12 +194,12 @@ def main(arguments: list[str] | None = None) -> None:
         InputError: with ``--check``, of a file that is something else.
     """
     parser = argparse.ArgumentParser(prog="python -m gpca.config.schema", description=__doc__.split("\n")[0])
-    parser.add_argument("--check", action="store_true", help="write nothing; fail where the file differs")
+    parser.add_argument("--check", action="store_true", help="write nothing; fail if the file differs")
     if not parser.parse_args(arguments).check:
         with whole_file(SCHEMA) as partial:
             partial.write_text(schema_text(), encoding="utf-8")
     elif SCHEMA.read_text(encoding="utf-8") != schema_text():
-        raise InputError(SCHEMA.name, "is not what the settings classes say", "run 'python -m gpca.config.schema'")
+        raise InputError(SCHEMA.name, "does not match the settings classes", "run 'python -m gpca.config.schema'")
 
 
 if __name__ == "__main__":

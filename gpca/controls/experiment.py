@@ -100,9 +100,9 @@ class Experiment:
     def _admits(self, control: str, registrations: Registrations, others: Mapping) -> bool:
         why = left_out(control, registrations, self.settings, self.backbone)
         if control == TRANSFER and not others:
-            why = "it needs two sources or more"
+            why = "it needs at least two sources"
         if why:
-            print(f"controls of {self.source}: '{control}' is left out: {why}", file=sys.stderr)
+            print(f"controls of {self.source}: '{control}' is skipped: {why}", file=sys.stderr)
         return not why
 
     def _asked(self, source: str, registrations: Registrations) -> Registrations:

@@ -39,7 +39,7 @@ def read_controls(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
         _, trained_on, seed = source_method_seed(path)
         rows = read_predictions(path, LABELS)
         if unknown := sorted(set(rows["control"]) - {PAPER, SEEN, *CONTROLS}):
-            raise InputError(path, f"unknown control '{unknown[0]}'", f"known are {', '.join(CONTROLS)}")
+            raise InputError(path, f"unknown control '{unknown[0]}'", f"expected one of {', '.join(CONTROLS)}")
         instances = rows["tested"] + "/" + rows["object"].map(instance_of)
         frames.append(
             pd.DataFrame(

@@ -38,7 +38,7 @@ def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> di
         InputError: none, an unknown one, or settings that it does not take.
     """
     if not explainers:
-        raise InputError("setting explainers", "names none", "give at least one")
+        raise InputError("setting explainers", "is empty", "name at least one")
     rivals = {}
     for name, settings in explainers.items():
         require_settings(name, settings)

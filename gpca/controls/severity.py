@@ -100,7 +100,7 @@ def _with_bins(path, samples: pd.DataFrame, ranges: Severities, bins: int) -> pd
             applied = samples["concept"] == concept
             outside = samples[name][applied & ~samples[name].between(edges[0] - ROUNDED, edges[-1] + ROUNDED)]
             if len(outside):
-                fault = f"'{name}' holds {outside.iloc[0]:g}, outside its bins from {edges[0]:g} to {edges[-1]:g}"
+                fault = f"'{name}' contains {outside.iloc[0]:g}, outside its bins from {edges[0]:g} to {edges[-1]:g}"
                 raise InputError(path, fault, "regenerate it from the same config")
             samples[_bin(name)] = np.clip(np.searchsorted(edges, samples[name], side="right") - 1, 0, bins - 1)
     return samples

@@ -24,13 +24,13 @@ def left_out(control: str, registrations: Registrations, settings: ControlSettin
     if control in (UNSEEN, *TRAININGS):
         found = len(set(instances(registrations)))
         if found < FEWEST_OBJECTS:
-            return f"it needs {FEWEST_OBJECTS} objects or more, there are {found}"
+            return f"it needs at least {FEWEST_OBJECTS} objects, but there are {found}"
     if control in ("density", "random_draws"):
         fewest, least = int(np.diff(registrations.offsets).min()), settings.draw_points[0]
         if fewest < least:
-            return f"its smallest draw has {least} points, and a cloud has {fewest}"
+            return f"its smallest draw has {least} points, but a cloud has only {fewest}"
         if backbone not in OF_ANY_SIZE:
-            return f"backbone '{backbone}' takes clouds of one size only"
+            return f"backbone '{backbone}' accepts clouds of one size only"
     return None
 
 

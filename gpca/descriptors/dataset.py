@@ -62,7 +62,9 @@ class Descriptors:
         kinds = dict.fromkeys(GROUPS, REAL) | {"sample": WHOLE, "split": TEXT}
         arrays = load_arrays(path, shapes | {"sample": ("S",), "split": ("S",)}, MADE_BY, kinds)
         if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-            raise InputError(path, "its samples differ from those of the registrations", f"regenerate it with '{MADE_BY}'")
+            raise InputError(
+                path, "its samples differ from those of the registrations", f"regenerate it with '{MADE_BY}'"
+            )
         return cls(arrays["sample"], arrays["split"], {name: arrays[name] for name in GROUPS})
 
 

@@ -82,7 +82,9 @@ def _seeds(*given: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataF
         said = read_predictions(prediction_file, labels=("explainer",))
         for path, of_path in ((sample_file, [samples]), (prediction_file, [r for _, r in said.groupby("explainer")])):
             if any(rows["sample"].tolist() != numbers for rows in of_path):
-                raise InputError(path, "its samples differ from those of the causes", "regenerate both from the same config")
+                raise InputError(
+                    path, "its samples differ from those of the causes", "regenerate both from the same config"
+                )
         yield int(Path(causes_file).stem.removeprefix("seed")), causes, samples[list(SAMPLE_COLUMNS)], said
 
 

@@ -84,7 +84,9 @@ def read_judged(
         rows = rows[rows["split"] == "test"]
         truth = truths[source, seed]
         if rows["sample"].astype(int).tolist() != truth.registrations.sample.tolist():
-            raise InputError(path, "its test samples differ from those of the causes", "regenerate both from the same config")
+            raise InputError(
+                path, "its test samples differ from those of the causes", "regenerate both from the same config"
+            )
         judged[source, explainer, seed] = judged_by(rows, truth, seed)
     if not judged:
         raise InputError("diagnoses", "no files were given", "name at least one explainer in diagnosis.explainers")

@@ -40,7 +40,9 @@ def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
     x_B_N_F = x_B_N_F.detach()
     n_points = x_B_N_F.shape[1]
     if n_points < k:
-        raise InputError(f"cloud of {n_points} points", f"has no {k} neighbours", "raise draw_points or lower k")
+        raise InputError(
+            f"cloud of {n_points} points", f"has fewer than {k} neighbors per point", "raise draw_points or lower k"
+        )
     # |x_j|² - 2 x_i·x_j, as one product of [x_i ; 1] and [-2 x_j ; |x_j|²]: |x_i|² is the same for a whole row and does
     # not change which points are nearest.
     ones_B_N_1 = x_B_N_F.new_ones((*x_B_N_F.shape[:2], 1))

@@ -56,7 +56,9 @@ class UMAP:
         # Beyond these umap-learn takes fewer neighbours, or starts at random, with no more than a warning.
         for key, most in (("neighbours", n - 1), ("components", n - 3)):
             if (value := getattr(self, key)) > most:
-                raise InputError("reduction 'umap'", f"{value} {key} of {n} training embeddings", f"lower {key}")
+                raise InputError(
+                    "reduction 'umap'", f"{value} {key} are too many for {n} training embeddings", f"lower {key}"
+                )
         seed = seed_of(*axes, "umap") % 2**32
         with warnings.catch_warnings(action="ignore"):
             from umap import UMAP as UmapLearn
@@ -136,15 +138,15 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
         if not np.isfinite(h).all():
-            raise InputError(role, "hold NaN or infinity", "regenerate them with 'python -m gpca embed'")
+            raise InputError(role, "contain NaN or infinity", "regenerate them with 'python -m gpca embed'")
     if reduction is None:
         return np.asarray(h_S_d, np.float32)
     n, d = h_train_N_d.shape
     if reduction.components > min(n, d):
-        fault = f"{reduction.components} components of {n} training embeddings of {d} numbers"
-        raise InputError(f"reduction '{name}'", fault, f"set components to {min(n, d)} or less")
+        fault = f"{reduction.components} components are too many for {n} training embeddings of {d} numbers"
+        raise InputError(f"reduction '{name}'", fault, f"set components to at most {min(n, d)}")
     if not np.ptp(h_train_N_d, axis=0).any():
-        raise InputError("training embeddings", "are all alike", "retrain the encoder")
+        raise InputError("training embeddings", "are all identical", "retrain the encoder")
     from sklearn.preprocessing import StandardScaler
 
     scaler = StandardScaler().fit(h_train_N_d.astype(np.float64))
@@ -162,7 +164,9 @@ def make_reduction(name: str, settings: dict):
     reduction = REDUCTIONS[name]
     known = [field.name for field in fields(reduction)] if reduction else []
     if unknown := [key for key in settings if key not in known]:
-        raise InputError(f"reduction '{name}'", f"no setting '{unknown[0]}'", f"known are {', '.join(known) or 'none'}")
+        raise InputError(
+            f"reduction '{name}'", f"has no setting '{unknown[0]}'", f"its settings are {', '.join(known) or 'none'}"
+        )
     return reduction(**settings) if reduction else None
 
 

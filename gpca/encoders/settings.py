@@ -48,14 +48,14 @@ class EncoderSettings:
 
     def __post_init__(self) -> None:
         if self.patience and not self.validation_share:
-            raise InputError("encoder setting 'patience'", "needs samples held out", "set validation_share above 0")
+            raise InputError("encoder setting 'patience'", "needs held-out samples", "set validation_share above 0")
         if self.fewest_points is None:
             return
         if self.backbone not in OF_ANY_SIZE:
-            fault = f"backbone '{self.backbone}' takes clouds of one size only"
+            fault = f"backbone '{self.backbone}' accepts clouds of one size only"
             raise InputError("encoder setting 'fewest_points'", fault, f"leave it out, or use {OF_ANY_SIZE[0]}")
         if self.fewest_points > self.draw_points:
-            fault = f"{self.fewest_points} is above draw_points, {self.draw_points}"
+            fault = f"{self.fewest_points} exceeds draw_points, {self.draw_points}"
             raise InputError("encoder setting 'fewest_points'", fault, "lower it")
 
 

@@ -29,7 +29,7 @@ def read_tensors(path: str | Path) -> Any:
         if any(info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size for info in members):
             raise ValueError("it is compressed, which torch does not write")
         if sum(info.file_size for info in members) > Path(path).stat().st_size:
-            raise ValueError("it says that it holds more than it does")
+            raise ValueError("it claims to contain more than it does")
         if (damaged := archive.testzip()) is not None:
             raise ValueError(f"the checksum of its member '{damaged}' differs")
     content = torch.load(path, weights_only=True, map_location="cpu")
@@ -51,13 +51,13 @@ def require_like(state: object, expected: Mapping[str, torch.Tensor], what: str)
     The expected tensors may be on torch's meta device, which says what they would be and takes no memory.
     """
     if not isinstance(state, Mapping) or set(state) != set(expected):
-        raise ValueError(f"its {what} has other parts")
+        raise ValueError(f"its {what} has different parts")
     for name, tensor in expected.items():
         found = state[name]
         if not isinstance(found, torch.Tensor) or found.shape != tensor.shape or found.dtype != tensor.dtype:
-            raise ValueError(f"'{name}' of its {what} is of another shape or type")
+            raise ValueError(f"'{name}' of its {what} has a different shape or type")
         if name.endswith("running_var") and (found < 0).any():
-            raise ValueError(f"'{name}' of its {what} holds negative variances")
+            raise ValueError(f"'{name}' of its {what} contains negative variances")
 
 
 def _tensors(content: object) -> Iterator[tuple[str, torch.Tensor]]:
@@ -76,9 +76,9 @@ def _tensors(content: object) -> Iterator[tuple[str, torch.Tensor]]:
 
 def _require_sound(name: str, tensor: torch.Tensor) -> None:
     if tensor.layout != torch.strided or tensor.device.type != "cpu" or tensor.is_quantized or tensor.is_complex():
-        raise ValueError(f"'{name}' is a tensor of a kind that is never written")
+        raise ValueError(f"'{name}' is a tensor of an unsupported kind")
     if tensor.numel() * tensor.element_size() > tensor.untyped_storage().nbytes():
-        raise ValueError(f"'{name}' says that it is larger than what the file holds of it")
+        raise ValueError(f"'{name}' claims to be larger than its data in the file")
     # gpytorch keeps the bounds of its parameters, which may be infinite.
     if tensor.is_floating_point() and not name.endswith("_bound") and not (tensor.abs() <= LARGEST_NUMBER).all():
-        raise ValueError(f"'{name}' holds NaN, infinity or numbers above {LARGEST_NUMBER:.0e}")
+        raise ValueError(f"'{name}' contains NaN, infinity or numbers above {LARGEST_NUMBER:.0e}")

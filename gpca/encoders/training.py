@@ -99,7 +99,7 @@ def train_encoder(
     optimiser = Adam(model.parameters(), settings.learning_rate, settings.weight_decay)
     rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
     if len(rows) < 2:
-        raise InputError(f"registrations of {source}, seed {seed}", "have no training samples", "raise their number")
+        raise InputError(f"registrations of {source}, seed {seed}", "have no training samples", "increase their number")
     if targets_S_C is None:
         wanted_S = torch.from_numpy(np.array([classes.index(concept) for concept in registrations.concept]))
     else:

@@ -15,5 +15,5 @@ def require_exchangeable(name: str) -> None:
     """
     entry = explainer_entry(name)
     if entry.design not in (None, DESIGN) and not entry.observed_only:
-        fault = f"reads design '{entry.design}', of which estimators have no part"
-        raise InputError(f"explainer '{name}'", fault, f"name one that reads '{DESIGN}'")
+        fault = f"reads design '{entry.design}', which estimators do not provide"
+        raise InputError(f"explainer '{name}'", fault, f"choose one that reads '{DESIGN}'")

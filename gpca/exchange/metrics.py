@@ -43,7 +43,7 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
         _, source, seed = source_method_seed(path)
         rows = read_predictions(path, (*LABELS, FAILURE))
         if unknown := sorted(set(rows["exchanged"]) - {METHOD, ESTIMATOR}):
-            raise InputError(path, f"exchanges '{unknown[0]}'", f"known are {METHOD}, {ESTIMATOR}")
+            raise InputError(path, f"exchanges '{unknown[0]}'", f"expected {METHOD} or {ESTIMATOR}")
         rows["right"] = (rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"]
         for (exchanged, explainer), of_explainer in rows.groupby(["exchanged", "explainer"], sort=False):
             measure = _of_estimators if exchanged == ESTIMATOR else _of_methods

@@ -64,11 +64,11 @@ class Frame:
         """
         depth_H_W = read_image(self.depth, REMEDY)
         if depth_H_W.ndim != 2:
-            raise InputError(self.depth, "is a colour image, not depth", REMEDY)
+            raise InputError(self.depth, "is a color image, not depth", REMEDY)
         if depth_H_W.dtype.itemsize == 1:
             raise InputError(self.depth, "is 8-bit depth: 16 bits expected", "export it again without conversion")
         if (depth_H_W < 0).any() or np.isinf(depth_H_W).any():  # NaN is a usual mark of what was not measured
-            raise InputError(self.depth, "holds negative or infinite depth", "write 0 where nothing was measured")
+            raise InputError(self.depth, "contains negative or infinite depth", "write 0 where nothing was measured")
         if not (depth_H_W > 0).any():
             raise InputError(self.depth, "has no depth: every pixel is 0", "leave the image out, or fetch it again")
         return depth_H_W * np.float32(self.depth_scale / 1000)
@@ -84,7 +84,9 @@ class Frame:
         inside = mask > 0
         # A tenth, because the rim of a small mask that was resized or saved as JPEG has values in between.
         if inside.any() and 10 * np.unique(mask[inside], return_counts=True)[1].max() < inside.sum():
-            raise InputError(annotation.mask, "is no mask: most of its pixels differ", "write 0 outside, 255 inside")
+            raise InputError(
+                annotation.mask, "is not a mask: most of its pixel values differ", "write 0 outside, 255 inside"
+            )
         return inside
 
 
@@ -103,16 +105,16 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
     found = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
     if not found:
         raise InputError(
-            ", ".join(map(str, folders)), f"has no {split}*/<scene>/scene_gt.json", "check location, or split"
+            ", ".join(map(str, folders)), f"has no {split}*/<scene>/scene_gt.json", "check location or split"
         )
     frames = [frame for path in found for frame in _frames_of_scene(path.parent)]
     if not frames:
-        raise InputError(found[0], "names no image", REMEDY)
+        raise InputError(found[0], "lists no image", REMEDY)
     first: dict[tuple[int, int], Frame] = {}
     for frame in frames:
         if (same := first.setdefault((frame.scene, frame.image), frame)) is not frame:
             both = f"{same.depth} and {frame.depth}"
-            raise InputError(both, "are one image of one scene", "set split to the folder that is meant")
+            raise InputError(both, "are the same image of the same scene", "set split to the intended folder")
     return sorted(frames, key=lambda frame: (frame.scene, frame.image))
 
 
@@ -160,7 +162,9 @@ def without_background(
 def _require_points(points: np.ndarray, annotation: Annotation) -> None:
     if len(points) < FEWEST_POINTS:
         raise TooFewPoints(
-            annotation.mask, f"has depth at {len(points)} pixel(s)", f"{FEWEST_POINTS} are needed: leave it out"
+            annotation.mask,
+            f"has depth at {len(points)} pixel(s)",
+            f"leave it out: at least {FEWEST_POINTS} are needed",
         )
 
 
@@ -170,7 +174,7 @@ class TooFewPoints(InputError):
 
 def _frames_of_scene(folder: Path) -> list[Frame]:
     if not re.fullmatch("[0-9]{1,9}", folder.name):
-        raise InputError(folder, "the name of a scene's folder is no number", "name it as the format does, 000001")
+        raise InputError(folder, "the name of a scene's folder is not a number", "name it like 000001")
     cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
     colours = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
     frames = []

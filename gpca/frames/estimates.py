@@ -76,7 +76,7 @@ class PoseErrors:
         """
         errors = self.of_object.get(object_) or self._of_others()
         if not errors:
-            fault = "no estimator spoke of an object without symmetry"
+            fault = "no estimator has a result for an object without symmetry"
             raise InputError("real_world.datasets", fault, "name more results, or a file of errors")
         return errors[int(random.integers(len(errors)))]
 
@@ -107,9 +107,9 @@ def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.nda
     turns_N_3 = np.stack([columns[name] for name in ("rx", "ry", "rz")], axis=1)
     shifts_N_3 = np.stack([columns[name] for name in ("tx", "ty", "tz")], axis=1)
     if np.linalg.norm(turns_N_3, axis=1).max() > np.pi + 1e-3:
-        raise InputError(path, "holds a rotation beyond half a turn", "give rotation vectors in radians")
+        raise InputError(path, "contains a rotation of more than half a turn", "give rotation vectors in radians")
     if np.linalg.norm(shifts_N_3, axis=1).max() > FARTHEST_MM:
-        raise InputError(path, "holds an error of more than 10 m", "give translations in millimetres")
+        raise InputError(path, "contains an error of more than 10 m", "give translations in millimeters")
     T_N_4_4 = np.tile(np.eye(4), (len(ids), 1, 1))
     T_N_4_4[:, :3, :3] = Rotation.from_rotvec(turns_N_3).as_matrix()
     T_N_4_4[:, :3, 3] = shifts_N_3 / 1000

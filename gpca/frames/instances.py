@@ -71,7 +71,7 @@ class Instances:
         _, scene_I = np.unique(names, return_inverse=True)
         scenes = generator(source, seed, "split").permutation(scene_I.max() + 1)
         if len(scenes) < 2:
-            raise InputError(f"instances of {source}", "all are of one scene", "give frames of two scenes")
+            raise InputError(f"instances of {source}", "all are from one scene", "give frames from at least two scenes")
         sizes_G = np.bincount(scene_I)[scenes]
         n_test = 1 + int(np.sum(np.cumsum(sizes_G)[:-1] < test_share * len(self)))
         is_test = np.isin(scene_I, scenes[: min(n_test, len(scenes) - 1)])
@@ -94,14 +94,14 @@ class Instances:
         kinds |= dict.fromkeys(("dataset", "colour", "init_from"), "U") | {"symmetric": "b"}
         for name, kind in kinds.items():
             if arrays[name].dtype.kind not in kind:
-                raise InputError(path, f"array '{name}' is of type {arrays[name].dtype}", remedy)
+                raise InputError(path, f"array '{name}' has type {arrays[name].dtype}", remedy)
         offsets = arrays["offsets"]
         whole = len(offsets) == len(arrays["scene"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays["points_m"])
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
             raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", remedy)
         pixels = arrays["pixels"]
         if pixels.min() < 0 or np.prod(pixels.max(axis=0) + 1.0) > MOST_PIXELS:
-            raise InputError(path, "'pixels' lie outside of any image", remedy)
+            raise InputError(path, "'pixels' lie outside any image", remedy)
         for i in range(len(arrays["scene"])):
             for name in ("T_camera_object_true", "T_camera_object_init"):
                 require_rigid(arrays[name][i], f"{path}: instance {i}, {name}")

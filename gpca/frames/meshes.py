@@ -54,7 +54,7 @@ def meshes_of(
     for index in sorted(set(shown)):
         name = objects.names[index]
         if name not in surfaces or surfaces[name].faces is None:
-            fault, remedy = "there is no mesh of it among the models", "regenerate the instances from this config"
+            fault, remedy = "has no mesh among the models", "regenerate the instances from this config"
             raise InputError(f"object '{name}'", fault, remedy)
         meshes[index] = MeshScene([(surfaces[name].vertices_m, surfaces[name].triangles)])
     return meshes

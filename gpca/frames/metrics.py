@@ -45,7 +45,7 @@ def collect(
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
         if (of_source := poses.get((source, f"seed{seed}"))) is None:
-            raise InputError(path, "has no file of poses beside it", "regenerate both from the same config")
+            raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
         rows = read_predictions(path)
         for name, test in _parts(path, rows[rows["split"] == "test"], of_source):
             metrics = attribution_metrics(test, concepts_of(rows))

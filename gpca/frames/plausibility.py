@@ -43,19 +43,19 @@ def _scaled_pose(factor: float) -> Undo:
 # What people do to a pose or a camera, and how it is undone: (T_camera_model, points in the camera's frame) -> the same
 # as they were meant.
 FAULTS: dict[str, Undo] = {
-    "cam_t_m2c in metres? the format wants millimetres": _scaled_pose(1000),
-    "cam_t_m2c in centimetres? the format wants millimetres": _scaled_pose(10),
-    "cam_t_m2c in micrometres? the format wants millimetres": _scaled_pose(0.001),
-    "cam_R_m2c column by column? the format wants rows": lambda T, points: (_turned(T), points),
-    "a pose from camera to model? the format wants model to camera": lambda T, points: (inverse(T), points),
-    "OpenGL's camera axes? the format's y points down and z forwards": lambda T, points: (TO_OPENGL @ T, points),
-    "a mirrored image?": lambda T, points: (T, points @ MIRROR),
+    "is cam_t_m2c in meters? the format requires millimeters": _scaled_pose(1000),
+    "is cam_t_m2c in centimeters? the format requires millimeters": _scaled_pose(10),
+    "is cam_t_m2c in micrometers? the format requires millimeters": _scaled_pose(0.001),
+    "is cam_R_m2c listed by columns? the format requires rows": lambda T, points: (_turned(T), points),
+    "is the pose from camera to model? the format requires model to camera": lambda T, points: (inverse(T), points),
+    "are the camera axes OpenGL's? the format's y points down and z forward": lambda T, points: (TO_OPENGL @ T, points),
+    "is the image mirrored?": lambda T, points: (T, points @ MIRROR),
     **{
-        f"depth_scale? the depth fits where it is {factor:g} times as large": _scaled_depth(factor)
+        f"is depth_scale wrong? the depth fits when it is {factor:g} times as large": _scaled_depth(factor)
         for factor in (0.001, 0.01, 0.1, 0.25, 0.5, 2, 4, 10, 100, 1000)
     },
 }
-UNKNOWN = "check its pose, its mask, cam_K and depth_scale"
+UNKNOWN = "check its pose, mask, cam_K and depth_scale"
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def require_of_objects(instances: Instances, objects: ObjectClouds, subject: obj
     """Raise an InputError that names `subject` unless the instances show these objects, where their true poses say."""
     remedy = "regenerate both files in one call"
     if instances.object_index.min() < 0 or instances.object_index.max() >= len(objects):
-        raise InputError(subject, "shows objects that the file of objects does not hold", remedy)
+        raise InputError(subject, "shows objects that the object file does not contain", remedy)
     medians_m = points_on_model(instances, objects, JUDGED_POINTS)
     distances = medians_m / objects.diameters_m[instances.object_index]
     if distances.max() > FARTHEST:

@@ -64,7 +64,7 @@ class Dataset:
                 return bop.models_folder(folder)
             except InputError:
                 continue
-        raise InputError(", ".join(map(str, self.folders)), "has no models/obj_*.ply", "fetch the models too")
+        raise InputError(", ".join(map(str, self.folders)), "has no models/obj_*.ply", "download the models too")
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,12 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CentredM
     """
     ids = sorted({annotation.object_id for frame in frames for annotation in frame.annotations})
     if not ids:
-        raise InputError(dataset.name, "its scene_gt.json name no object in any frame", "check split, or fetch it again")
+        raise InputError(
+            dataset.name, "its scene_gt.json files list no object in any frame", "check split, or fetch it again"
+        )
     folder = dataset.models_folder()
     if unknown := [number for number in ids if not (folder / f"obj_{number:06d}.ply").is_file()]:
-        raise InputError(
-            f"{dataset.name}: object {unknown[0]}", f"there is no model of it in {folder}", "fetch the models again"
-        )
+        raise InputError(f"{dataset.name}: object {unknown[0]}", f"has no model in {folder}", "fetch the models again")
     info = bop.read_models_info(folder / "models_info.json")
     models = {}
     for number, surface in zip(ids, bop.surfaces(folder, dataset.unit, ids), strict=True):
@@ -145,7 +145,7 @@ def read_instances(
             left.
     """
     if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
-        raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results, or another pose")
+        raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results or choose another pose")
     left_out: list[str] = []
     seen: list[tuple[_Objects, Frame, int, dict]] = []
     for dataset, frames, models in datasets.values():
@@ -158,8 +158,8 @@ def read_instances(
         require_usual_form([found.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset])
         seen += of_dataset
     if not seen:
-        reasons = f"; the first: {left_out[0]}" if left_out else ""
-        raise InputError(", ".join(datasets), f"no object of any frame is left{reasons}", "check masks and depth")
+        reasons = f"; the first skipped: {left_out[0]}" if left_out else ""
+        raise InputError(", ".join(datasets), f"no object is left in any frame{reasons}", "check masks and depth")
     # Results last: they are measured against poses that fit what was seen.
     find = _from_results(datasets, seen) if settings.form == "results" else None
     rows = []
@@ -167,7 +167,7 @@ def read_instances(
         init_from, T_init = find(found, frame, n, row) if find else (settings.form, found.initial_pose(frame, n, row))
         rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
     for fault in left_out:
-        print(f"left out: {fault}", file=sys.stderr)
+        print(f"skipped: {fault}", file=sys.stderr)
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")}
     ragged = {name: np.concatenate([row[name] for row in rows]) for name in ("points_m", "pixels")}
     offsets = np.cumsum([0, *(len(row["points_m"]) for row in rows)], dtype=np.int64)

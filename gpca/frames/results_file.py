@@ -75,7 +75,7 @@ def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.n
 def _id(subject: str, row: dict, column: str) -> int:
     text = str(row[column]).strip()
     if not re.fullmatch("[0-9]{1,9}", text):
-        raise InputError(subject, f"{column} is {text[:40]!r}, no whole number", REMEDY)
+        raise InputError(subject, f"{column} is {text[:40]!r}, not a whole number", REMEDY)
     return int(text)
 
 
@@ -86,7 +86,9 @@ def _pose(subject: str, row: dict) -> np.ndarray:
     require_rotation(T_camera_model, subject)
     if T_camera_model[2, 3] <= 0:
         raise InputError(
-            subject, f"t has z = {1e3 * T_camera_model[2, 3]:.6g} mm, not before the camera", "leave out what failed"
+            subject,
+            f"t has z = {1e3 * T_camera_model[2, 3]:.6g} mm, not in front of the camera",
+            "leave out failed estimates",
         )
     return T_camera_model
 
@@ -99,7 +101,7 @@ def _entries(subject: str, row: dict, column: str, count: int) -> np.ndarray:
         raise InputError(subject, f"{column} has {len(texts)} entries, not {count}", "separate them by spaces")
     numbers = np.array(texts, float)
     if not (abs(numbers) < 1e100).all():  # no norm of these overflows
-        raise InputError(subject, f"{column} holds a number beyond all bounds", REMEDY)
+        raise InputError(subject, f"{column} contains a number that is out of bounds", REMEDY)
     return numbers
 
 
@@ -108,9 +110,9 @@ def _require_unit(subject: object, ratio: float, most: float) -> None:
         return
     tenfold = float(np.log10(max(ratio, 1e-9)))
     nearest = round(tenfold) if abs(tenfold - round(tenfold)) < UNIT_OFF else 0
-    unit = {-3: "in metres?", -1: "in centimetres?", 3: "in micrometres?"}.get(nearest, "in another unit?")
+    unit = {-3: "in meters", -1: "in centimeters", 3: "in micrometers"}.get(nearest, "in another unit")
     raise InputError(
         subject,
         f"t is {ratio:.2g} times as long as that of the objects annotated in the image",
-        f"t {unit} the format wants millimetres",
+        f"is t {unit}? the format requires millimeters",
     )

@@ -101,9 +101,9 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
 
 def _require_replaceable(folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
-        raise InputError(folder, "is no folder", "give another name")
+        raise InputError(folder, "is not a folder", "choose another name")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / DESCRIPTION).is_file():
-        raise InputError(folder, "holds something other than scenes, which would be lost", "give another folder")
+        raise InputError(folder, "contains files other than scenes, which would be lost", "choose another folder")
 
 
 def lay_table(
@@ -136,7 +136,7 @@ def lay_table(
         free = (way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
         if (at := next(free, None)) is None:
             fault = f"there is no room for {count} objects {settings.gap_m} m apart"
-            raise InputError("scenes gap_m and objects", fault, "ask for fewer, or nearer ones")
+            raise InputError("scenes gap_m and objects", fault, "lower objects or gap_m")
         T_world_object[:2, 3] += at - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2
         outlines.append(translate(outline, *at))
         standing.append(Placed(int(model), T_world_object))

@@ -41,5 +41,7 @@ def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndar
     rows = read_samples_of_frames(path)
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
-            raise InputError(path, "its samples differ from those of the registrations", "regenerate both from the same config")
+            raise InputError(
+                path, "its samples differ from those of the registrations", "regenerate both from the same config"
+            )
     return numbers(path, rows, "instance", least=0).to_numpy(int)

@@ -31,7 +31,7 @@ def read_images(path: Path) -> dict[int, Any]:
     found: dict[int, Any] = {}
     for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
         if not re.fullmatch("[0-9]{1,9}", key):
-            raise InputError(path, f"its key {key[:40]!r} is no number of an image", REMEDY)
+            raise InputError(path, f"its key {key[:40]!r} is not an image number", REMEDY)
         if int(key) in found:
             raise InputError(path, f"image {int(key)} occurs twice", "keep one of the two")
         found[int(key)] = entry
@@ -44,20 +44,20 @@ def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
     require_camera(camera_3_3, f"{subject}: cam_K")
     (scale,) = _numbers(entry, "depth_scale", 1, subject)
     if not DEPTH_SCALES[0] <= scale <= DEPTH_SCALES[1]:
-        raise InputError(subject, f"depth_scale is {scale:.6g}", "give the millimetres per unit of the depth images")
+        raise InputError(subject, f"depth_scale is {scale:.6g}", "give the millimeters per unit of the depth images")
     return camera_3_3, float(scale)
 
 
 def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
     """Raise an InputError that names `subject` unless K is upper triangular, with focal lengths that can be."""
     if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
-        raise InputError(subject, "is no matrix of a camera", "give fx s cx, 0 fy cy, 0 0 1, row by row")
+        raise InputError(subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
     focal_px = np.diag(camera_3_3)[:2]
     if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
         lengths = " and ".join(f"{length:.6g}" for length in focal_px)
-        raise InputError(subject, f"has the focal lengths {lengths} px", "they are positive; check fx and fy")
+        raise InputError(subject, f"has the focal lengths {lengths} px", "they must be positive; check fx and fy")
     if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
-        raise InputError(subject, "has a skew or principal point beyond any image", "give them in pixels")
+        raise InputError(subject, "has a skew or principal point outside any image", "give them in pixels")
 
 
 def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
@@ -66,12 +66,12 @@ def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
     T_camera_model[:3, :3] = _numbers(entry, "cam_R_m2c", 9, subject).reshape(3, 3)
     translation_mm = _numbers(entry, "cam_t_m2c", 3, subject)
     if abs(translation_mm).max() > FARTHEST_MM:
-        raise InputError(subject, f"cam_t_m2c is {abs(translation_mm).max():.3g} mm", "no camera sees so far")
+        raise InputError(subject, f"cam_t_m2c is {abs(translation_mm).max():.3g} mm", "no camera sees that far")
     T_camera_model[:3, 3] = translation_mm / 1000
     require_rotation(T_camera_model, subject)
     (object_id,) = _numbers(entry, "obj_id", 1, subject)
     if object_id < 0 or object_id > 999_999 or object_id != int(object_id):  # files of models have six digits
-        raise InputError(subject, f"obj_id is {object_id:.6g}", "ids are whole numbers of six digits at most")
+        raise InputError(subject, f"obj_id is {object_id:.6g}", "ids are whole numbers of at most six digits")
     return int(object_id), T_camera_model
 
 
@@ -83,9 +83,9 @@ def _numbers(entry: Any, key: str, count: int, subject: str) -> np.ndarray:
     flat = [number for row in given for number in (row if isinstance(row, list) and count > 1 else [row])]
     for number in flat:
         if isinstance(number, bool) or not isinstance(number, int | float):
-            raise InputError(subject, f"{key} holds {repr(number)[:40]}, which is no number", REMEDY)
+            raise InputError(subject, f"{key} contains {repr(number)[:40]}, which is not a number", REMEDY)
         if not abs(number) < 1e300:  # also NaN, and an integer that no float holds
-            raise InputError(subject, f"{key} holds a number that is not finite", REMEDY)
+            raise InputError(subject, f"{key} contains a number that is not finite", REMEDY)
     if len(flat) != count:
         raise InputError(subject, f"{key} has {len(flat)} numbers, not {count}", REMEDY)
     return np.array(flat, float)

@@ -243,7 +243,7 @@ class Situations:
         if cause == "overlap":
             occluder = self._occluder(clean, random)
             return replace(clean, standing=(*clean.standing, occluder), cause=cause) if occluder else None
-        raise InputError(f"cause '{cause}'", "unknown", "known are noise, pose, overlap")
+        raise InputError(f"cause '{cause}'", "unknown", "choose one of noise, pose, overlap")
 
     def _occluder(self, clean: Situation, random: np.random.Generator) -> Placed | None:
         """Return an object in front of the one in question that hides the wanted share, or None where none does."""

@@ -52,7 +52,7 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
             raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBOURS}")
     names = [content["title"], *content["treatments"], *content["treatments"].values(), *content["gpc"]["classes"]]
     if not all(isinstance(name, str) and name.isprintable() for name in names):
-        raise ValueError("a name is no line of text")
+        raise ValueError("a name is not a line of text")
     if type(content["stand_in"]) is not bool:
         raise ValueError("stand_in is neither true nor false")
     with torch.device("meta"):  # what the options ask for may not fit into the memory
@@ -64,15 +64,15 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
 def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
     for name, (count, least, most) in counts.items():
         if type(count) is not int or not least <= count <= most:
-            raise ValueError(f"{name}: {count!r} is no number from {least} to {most}")
+            raise ValueError(f"{name}: {count!r} is not a number from {least} to {most}")
 
 
 def _require_ranges(ranges: Mapping) -> None:
     if set(ranges) != set(MEASURES):
-        raise ValueError(f"ranges of {', '.join(map(repr, ranges))}, not of {', '.join(MEASURES)}")
+        raise ValueError(f"ranges of {', '.join(map(repr, ranges))}, not {', '.join(MEASURES)}")
     for name, (low, high) in ranges.items():
         if not (type(low) is type(high) is float and 0 <= low <= high):
-            raise ValueError(f"range of {name}: {low!r} to {high!r} is none")
+            raise ValueError(f"range of {name}: {low!r} to {high!r} is not a range")
 
 
 def _require_diagnoser(state: Mapping) -> None:
@@ -93,25 +93,25 @@ def _require_diagnoser(state: Mapping) -> None:
     quantiles, weights, threshold = state["classifier"]["quantiles"], state["error_weights"], state["threshold"]
     features = sum(WIDTHS.values())
     if quantiles.ndim != 2 or len(quantiles) < 2 or quantiles.shape[1] != features:
-        raise ValueError(f"'quantiles' is of shape {tuple(quantiles.shape)}, not of {features} descriptors")
+        raise ValueError(f"'quantiles' has shape {tuple(quantiles.shape)}, not {features} descriptors")
     if (quantiles.diff(dim=0) < 0).any():
-        raise ValueError("'quantiles' fall")
+        raise ValueError("'quantiles' decrease")
     if tuple(weights.shape) != (features + 1,):
-        raise ValueError(f"'error_weights' is of shape {tuple(weights.shape)}, not {(features + 1,)}")
+        raise ValueError(f"'error_weights' has shape {tuple(weights.shape)}, not {(features + 1,)}")
     if type(threshold) is not float or not 0 <= threshold <= 2:
-        raise ValueError(f"threshold: {threshold!r} is no probability")
+        raise ValueError(f"threshold: {threshold!r} is not a probability")
     for gpc in (state["classifier"]["failure"], *causes):
         _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
         check_settings(gpc["settings"], "explainers", "gpca")
         _require_classifier(gpc, features)
         if len(gpc["classes"]) != 2:
-            raise ValueError("a classifier of the pair has not two classes")
+            raise ValueError("a classifier of the pair does not have two classes")
 
 
 def _require_classifier(state: Mapping, d: int) -> None:
     n_classes = len(state["classes"])
     if n_classes < 2 or len(set(state["classes"])) < n_classes:
-        raise ValueError("its concepts are fewer than two, or not all different")
+        raise ValueError("its concepts are fewer than two or not all different")
     m, n = len(state["inducing"]), len(state["labelled"])
     shapes = {
         "scaler_mean": (d,),
@@ -124,14 +124,14 @@ def _require_classifier(state: Mapping, d: int) -> None:
     }
     for name, shape in shapes.items():
         if tuple(state[name].shape) != shape:
-            raise ValueError(f"'{name}' is of shape {tuple(state[name].shape)}, not {shape}")
+            raise ValueError(f"'{name}' has shape {tuple(state[name].shape)}, not {shape}")
     kernel = make_covariance(state["settings"]["kernel"], n_classes, lengthscale=1.0).state_dict()
     require_like(state["kernel"], kernel, "kernel")
     if not all(torch.equal(state["kernel"][name], kernel[name]) for name in kernel if name.endswith("_bound")):
-        raise ValueError("its kernel has other bounds")
+        raise ValueError("its kernel has different bounds")
     if not (state["scaler_scale"] > 0).all():
-        raise ValueError("'scaler_scale' holds what is not above 0")
+        raise ValueError("'scaler_scale' contains values that are not above 0")
     if (torch.diagonal(state["covariance"], dim1=1, dim2=2) < 0).any():
-        raise ValueError("'covariance' holds negative variances")
+        raise ValueError("'covariance' contains negative variances")
     if state["targets"].is_floating_point() or not ((state["targets"] >= 0) & (state["targets"] < n_classes)).all():
-        raise ValueError("'targets' names a concept that is not there")
+        raise ValueError("'targets' names a missing concept")

@@ -112,7 +112,7 @@ class Explainer:
             (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
         told = [*scores_C, *((found.failure, *found.causes.values()) if found else ())]
         if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
-            raise InputError("model", "it gives no finite numbers for these clouds", "make another one")
+            raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
             warnings = self._warnings(clouds, found, at_pose.fitness)
             if T_target_source_init is not None and register is None:
@@ -240,10 +240,10 @@ class Explainer:
         if found is not None and found.unlikeness > 1:
             warnings.append(
                 f"the pair is {found.unlikeness:.1f} times as far from the registrations that the diagnosis was "
-                "learnt from as 99 % of these are from one another"
+                "trained on as 99 % of these are from one another"
             )
         if fitness == 0:
-            warnings.append("no source point is near the target at the initial pose, so the scores mean nothing")
+            warnings.append("no source point is near the target at the initial pose, so the scores are meaningless")
         return warnings
 
     def _inverted(self, clouds: Clouds, at_pose: Outcome) -> list[str]:

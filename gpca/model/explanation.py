@@ -15,7 +15,7 @@ WORDS = {  # what a reader is told of each branch
     "reinitialise": "reinitialise ICP with a broader search",
     "new_view": "change the viewpoint",
     "denoise": "filter and check the sensor",
-    QUEUE: "queue for labelling: tell the cause, and learn it",
+    QUEUE: "queue for labeling, so that the cause can be learned",
 }
 
 
@@ -128,14 +128,14 @@ class Explanation:
         named = " and ".join(found.named) or "nothing is wrong"
         return [
             f"state     {found.state}: {named}",
-            f"failure   probability {found.failure:.3f}, called one from {found.threshold:.3f}",
+            f"failure   probability {found.failure:.3f}, called a failure from {found.threshold:.3f}",
             f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in found.causes.items())}, if it failed",
             f"error     about {found.expected_error:.2g} {self.unit}",
         ]
 
     def _attributed(self) -> list[str]:
         return [
-            "GP-CA as in the paper: the aligned source alone, and a concept whether or not anything is wrong",
+            "GP-CA as in the paper: it sees the aligned source alone and names a concept even where nothing is wrong",
             f"{'':10}{'score':>8}{'variance':>10}",
             *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
             f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",

@@ -91,13 +91,15 @@ class Familiarity:
         if "size" in below | above:
             between = " to ".join(f"{end:.2g}" for end in self.ranges["size"])
             said.append(
-                f"the source is {measured['size']:.2g} times as large as the target, in training it was {between} "
+                f"the source is {measured['size']:.2g} times as large as the target; in training it was {between} "
                 "times: are both in the same unit and scale?"
             )
         if "depth" in above:
-            said.append("the source shows the object from all sides, but GP-CA learnt partial views")
+            said.append("the source shows the object from all sides, but GP-CA was trained on partial views")
         if "depth" in below:
-            said.append("the source shows the object from one side alone, but GP-CA learnt clouds of more of it")
+            said.append(
+                "the source shows the object from one side alone, but GP-CA was trained on clouds that show more of it"
+            )
         if "closure" in below:
             said.append("the target looks like a view from one side: give the whole object")
         return said

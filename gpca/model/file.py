@@ -95,13 +95,13 @@ class Model:
         try:
             content = read_tensors(path)
         except ValueError as fault:
-            raise InputError(path, f"is damaged or no model ({fault})", REMEDY) from fault
+            raise InputError(path, f"is damaged or not a model ({fault})", REMEDY) from fault
         except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
-            raise InputError(path, "is damaged or no model", REMEDY) from fault
+            raise InputError(path, "is damaged or not a model", REMEDY) from fault
         if not isinstance(content, Mapping) or content.get("format") != FORMAT:
-            raise InputError(path, "is no model", REMEDY)
+            raise InputError(path, "is not a model", REMEDY)
         if (version := content.get("version")) != VERSION:
-            raise InputError(path, f"is a model of version {version}, not of version {VERSION}", REMEDY)
+            raise InputError(path, f"is a model of version {version}, not {VERSION}", REMEDY)
         try:
             settings = EncoderSettings(**_renamed(content["encoder_settings"], "points", "draw_points"))
             require_possible(content, settings)
@@ -119,7 +119,7 @@ class Model:
                 **{name: content[name] for name in ("title", "stand_in")},
             )
         except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
-            raise InputError(path, f"is a model with something missing or damaged ({fault})", REMEDY) from fault
+            raise InputError(path, f"is a model with missing or damaged parts ({fault})", REMEDY) from fault
 
 
 def _familiarity(content: Mapping) -> Familiarity | None:
@@ -146,7 +146,7 @@ def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path
         return Path(given)
     if named := os.environ.get(VARIABLE):
         if not Path(named).is_file():
-            raise InputError(f"{VARIABLE}={named}", "no such model", f"correct it, or {REMEDY}")
+            raise InputError(f"{VARIABLE}={named}", "no such model", f"correct it or {REMEDY}")
         return Path(named)
 
     def rank(path: Path) -> tuple:

@@ -76,7 +76,7 @@ class Origin:
         record = _provenance(model)
         found = [match.groups() for path in record["inputs_sha256"] if (match := _READ.search(f"/{path}"))]
         if not found:
-            raise InputError(_beside(model), "names nothing that a model learns from", REMEDY)
+            raise InputError(_beside(model), "lists nothing that a model learns from", REMEDY)
         sources = (_source(model.parent, name, kind == "model_causes", title) for kind, name in found)
         try:
             return cls(record, tuple(sources))
@@ -90,7 +90,7 @@ def _source(run: Path, name: str, diagnosed: bool, title: str) -> Source:
     settings = record["settings"]
     entry = settings.get("entry", {"title": title, "stand_in": "datasets" not in settings})
     if entry.get("stand_in"):
-        raise InputError(objects, "holds objects that the package drew", "ship a model of real objects")
+        raise InputError(objects, "contains objects that the package drew", "ship a model of real objects")
     places = list(record["inputs_sha256"]) or _addresses(settings)
     licences = {licence: None for place in places for licence in _licences_of(place, objects)}
     return Source(name, entry["title"], diagnosed, len(ObjectClouds.load(objects)), tuple(licences))
@@ -105,7 +105,7 @@ def _addresses(settings: Mapping) -> list[str]:
 def _licences_of(place: str, objects: Path) -> list[Licence]:
     known = [licence for words, licence in _licences() if any(word in place for word in words)]
     if not known:
-        fault = f"was made from '{Path(place).name}', of a dataset without a known licence"
+        fault = f"was made from '{Path(place).name}', which is from a dataset without a known license"
         raise InputError(objects, fault, f"add the dataset to {LICENCES}")
     return known
 

@@ -31,7 +31,7 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
     scale = mesh_folder.metres_per(unit)
     require_file(path, "no such file", f"give one of {', '.join(SUFFIXES)}")
     if (suffix := path.suffix.lower()) not in SUFFIXES:
-        raise InputError(path, "is of another format", f"give one of {', '.join(SUFFIXES)}")
+        raise InputError(path, "has an unsupported format", f"give one of {', '.join(SUFFIXES)}")
     if suffix == ".pcd":
         points = pcd.parse(path.read_bytes(), path)
     else:
@@ -55,9 +55,9 @@ def read_pose(path: Path) -> np.ndarray:
     try:
         numbers = [float(word) for word in path.read_text(encoding="utf-8").replace(",", " ").split()]
     except ValueError as fault:
-        raise InputError(path, f"holds something that is no number ({fault})", remedy) from fault
+        raise InputError(path, f"contains something that is not a number ({fault})", remedy) from fault
     if len(numbers) != 16:
-        raise InputError(path, f"holds {len(numbers)} numbers", remedy)
+        raise InputError(path, f"contains {len(numbers)} numbers", remedy)
     T_target_source = np.array(numbers).reshape(4, 4)
     require_rigid(T_target_source, path)
     return T_target_source

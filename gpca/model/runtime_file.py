@@ -34,7 +34,7 @@ def read_runtime(path: str | Path) -> pd.DataFrame:
     """
     rows = read_csv(path, RUNTIME_COLUMNS)
     if unknown := set(rows["component"]) - set(COMPONENTS):
-        raise InputError(path, f"unknown component '{sorted(unknown)[0]}'", f"known are {', '.join(COMPONENTS)}")
+        raise InputError(path, f"unknown component '{sorted(unknown)[0]}'", f"expected one of {', '.join(COMPONENTS)}")
     for column in ("threads", "repeats", "mean_s", "deviation_s", "median_s"):
         rows[column] = numbers(path, rows, column)
     return rows

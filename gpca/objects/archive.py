@@ -49,7 +49,7 @@ class Member:
     def read(self) -> bytes:
         """Return the content; InputError when it is damaged, or too large to be parsed."""
         if self.size > LARGEST_FILE_BYTES:
-            most = f"more than the {LARGEST_FILE_BYTES / 1e9:.3g} GB read"
+            most = f"more than the limit of {LARGEST_FILE_BYTES / 1e9:.3g} GB"
             raise InputError(self.archive, f"member '{self.name}' has {self.size / 1e9:.3g} GB, {most}", REMEDY)
         with _damage_named(self.archive), self.open() as stream:
             return stream.read()
@@ -102,8 +102,8 @@ def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_BY
         with open_archive(path, largest_bytes) as members:
             needed, free = sum(member.size for member in members), shutil.disk_usage(temporary).free
             if needed > free:
-                found = f"unpacks to {needed / 1e9:.3g} GB, and {free / 1e9:.3g} GB of the disk are free"
-                raise InputError(path, found, f"free some, or keep downloads elsewhere than in {folder.parent}")
+                found = f"unpacks to {needed / 1e9:.3g} GB, but {free / 1e9:.3g} GB of the disk are free"
+                raise InputError(path, found, f"free some space or keep downloads outside {folder.parent}")
             _write_list(listed, {member.name: _write(member, content / member.name) for member in members})
         os.replace(content, folder)
     return folder
@@ -140,9 +140,9 @@ def _require_listed(folder: Path, listed: Path) -> None:
     found = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file() or file.is_symlink()}
     for name in sorted({*expected, *(name for name in found if not Path(name).name.startswith("."))}):
         if name not in found:
-            raise InputError(folder / name, "is missing in what was unpacked", remedy)
+            raise InputError(folder / name, "is missing from what was unpacked", remedy)
         if name not in expected:
-            raise InputError(folder / name, "is not of the archive that was unpacked here", remedy)
+            raise InputError(folder / name, "is not from the archive that was unpacked here", remedy)
         if sha256_of_file(folder / name) != expected[name]:
             raise InputError(folder / name, "was changed after it was unpacked", remedy)
 
@@ -183,7 +183,7 @@ def _zip_members(archive: zipfile.ZipFile, path: Path, largest_bytes: int) -> li
         if stat.S_ISLNK(info.external_attr >> 16) or info.flag_bits & 1:
             raise InputError(path, f"member '{info.filename}' is a link or encrypted", REMEDY)
         if not is_bounded(info):
-            raise InputError(path, f"member '{info.filename}' is compressed by another method than deflate", REMEDY)
+            raise InputError(path, f"member '{info.filename}' is compressed by a method other than deflate", REMEDY)
         if not info.is_dir():
             members.append(Member(path, info.filename, info.file_size, partial(archive.open, info)))
     _check_size(sum(member.size for member in members), path, largest_bytes)
@@ -210,7 +210,7 @@ def _tar_members(archive: tarfile.TarFile, path: Path, largest_bytes: int) -> li
     # tarfile takes a tar that is cut between two members, or a damaged header, for the end: a whole one ends in zeros.
     archive.fileobj.seek(archive.offset)
     if archive.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
-        raise tarfile.ReadError("no end mark")
+        raise tarfile.ReadError("no end marker")
     while rest := archive.fileobj.read(1 << 20):  # read on to the end, where gzip keeps the checksum of all
         total += len(rest)
         _check_size(total, path, largest_bytes)

@@ -30,7 +30,7 @@ def require_points(points: np.ndarray, subject: object) -> None:
         raise InputError(subject, "has no points", "fetch or export it again")
     bad = int((~np.isfinite(points)).any(axis=1).sum())
     if bad:
-        raise InputError(subject, f"{bad} of {len(points)} points hold NaN or infinity", "fetch or export it again")
+        raise InputError(subject, f"{bad} of {len(points)} points contain NaN or infinity", "fetch or export it again")
 
 
 def diameter(points: np.ndarray, subject: object) -> float:
@@ -49,7 +49,7 @@ def diameter(points: np.ndarray, subject: object) -> float:
     extents, axes = np.linalg.svd(centred, full_matrices=False)[1:]
     rank = int((extents > 1e-6 * extents[0]).sum())
     if rank < 2:
-        raise InputError(subject, "all its points lie on one point or line", "an object needs a surface")
+        raise InputError(subject, "all its points coincide or lie on one line", "an object needs a surface")
     if len(points) <= FEW_POINTS:
         return float(pdist(points).max())
     # In the plane or space that the points span: Qhull refuses a flat cloud in 3-D.
@@ -114,7 +114,7 @@ def require_size(diameter_m: float, subject: object) -> None:
     """Raise an InputError unless a diameter lies between 1 mm and 10 m, as one in the right unit does."""
     if SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
         return
-    likely = "in millimetres? set unit: mm" if diameter_m > LARGEST_DIAMETER_M else "in metres? set unit: m"
+    likely = "in millimeters? set unit: mm" if diameter_m > LARGEST_DIAMETER_M else "in meters? set unit: m"
     raise InputError(
         subject, f"its diameter is {diameter_m:.4g} m, so the declared unit looks wrong", f"is it {likely}"
     )
@@ -198,9 +198,9 @@ class ObjectClouds:
         points_m, offsets, names = arrays["points_m"], arrays["offsets"], arrays["names"].tolist()
         whole = len(offsets) == len(names) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
         if not whole or not names or not (np.diff(offsets) > 0).all():
-            raise InputError(path, "names, offsets and points do not fit together", remedy)
+            raise InputError(path, "names, offsets and points do not match", remedy)
         if len(set(names)) < len(names):
-            raise InputError(path, "holds two objects of one name", remedy)
+            raise InputError(path, "contains two objects with the same name", remedy)
         parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
         objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)))
         for i, name in enumerate(names):
@@ -215,10 +215,10 @@ class ObjectClouds:
         extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
         if np.abs(points_m).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
             found = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
-            raise InputError(subject, f"{found}, or they are not centred", remedy)
+            raise InputError(subject, f"{found}, or they are not centered", remedy)
         lengths = np.linalg.norm(self.normals(i), axis=1)
         if np.abs(lengths - 1).max() > UNIT_TOLERANCE:
-            raise InputError(subject, "a normal is not of length 1", remedy)
+            raise InputError(subject, "a normal is not of unit length", remedy)
 
     def __len__(self) -> int:
         return len(self.names)

@@ -37,7 +37,7 @@ def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None
     if path.is_file():
         _check(path, sha256, url, f"delete {path} to fetch it again or correct sha256 in the config")
         return path
-    print(f"download {url} to {path}", file=sys.stderr)
+    print(f"downloading {url} to {path}", file=sys.stderr)
     with whole_file(path) as partial:
         _download(url, partial, _remedy(path, location))
         actual = _check(partial, sha256, url, "the download was removed; try again, or correct sha256 in the config")
@@ -51,7 +51,7 @@ def cached_path(url: str, folder: str | Path) -> Path:
     parts = urlsplit(url)
     names = [name for name in parts.path.split("/") if name not in ("", ".", "..")]
     if parts.scheme not in ("http", "https") or not parts.hostname or not names:
-        raise InputError(url, "is not the http or https address of a file", "correct url in the config")
+        raise InputError(url, "is not an http or https address of a file", "correct url in the config")
     if parts.query:
         names[-1] += "_" + re.sub(r"[^\w.-]", "_", parts.query)
     return Path(folder, parts.hostname, *names)
@@ -73,7 +73,7 @@ def _download(url: str, path: Path, remedy: str) -> None:
         _within_limits(lambda: download(url, str(path), None), url, path, remedy)
     except requests.exceptions.HTTPError as fault:
         answer = str(fault) if fault.response is None else f"{fault.response.status_code} {fault.response.reason}"
-        raise InputError(url, f"cannot be fetched: the server answers {answer}", remedy) from fault
+        raise InputError(url, f"cannot be fetched: the server answered {answer}", remedy) from fault
     except (requests.exceptions.ConnectionError, requests.exceptions.Timeout) as fault:
         raise InputError(url, "cannot be reached", remedy) from fault
     except requests.exceptions.RequestException as fault:
@@ -109,4 +109,4 @@ def _within_limits(download: Callable[[], object], url: str, path: Path, remedy:
 
 
 def _remedy(path: Path, location: str | None) -> str:
-    return f"set data_dir to a folder that holds {location or 'the data'}, or fetch it by hand into {path}"
+    return f"set data_dir to a folder that contains {location or 'the data'}, or download it by hand to {path}"

@@ -59,7 +59,7 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
         found |= matches
     for path in sorted(found):
         if not path.name.lower().endswith(tuple(suffixes)):
-            raise InputError(path, "is of another format", f"let files match only {formats}")
+            raise InputError(path, "has an unsupported format", f"let files match {formats} only")
     return sorted(found)
 
 
@@ -92,7 +92,7 @@ def read_surface(path: Path, scale: float) -> Surface:
             raise InputError(path, "has no faces", f"{remedy}, or give the points as PLY")
         return Surface(path.stem, vertices * scale, None, _cloud_normals(loaded, path))
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(path, "a face names a vertex that is not there", remedy)
+        raise InputError(path, "a face refers to a missing vertex", remedy)
     return Surface(path.stem, vertices * scale, faces)
 
 

@@ -35,10 +35,10 @@ def _check_ply(path: Path) -> None:
             corners = [prop[-1] in (b"vertex_index", b"vertex_indices") for prop in properties]
             for i in range(count):
                 if not _fits(row := next(rows, None), lists, corners):
-                    found = "is missing" if row is None else "is not as its header says"
+                    found = "is missing" if row is None else "does not match its header"
                     raise ValueError(f"row {i + 1} of {count} of element {name} {found}")
         if next(rows, None) is not None:
-            raise ValueError("more rows than the header says")
+            raise ValueError("more rows than the header states")
 
 
 def _ply_elements(file) -> list[tuple[str, int, list[list[bytes]]]] | None:
@@ -83,7 +83,7 @@ def _check_off(path: Path) -> None:
         vertices, faces = (_count(word) for word in counts[:2])
         for i in range(vertices):
             if len(next(rows, [])) not in OFF_VERTEX_COLUMNS:
-                raise ValueError(f"vertex {i + 1} of {vertices} is missing or not of 3 coordinates")
+                raise ValueError(f"vertex {i + 1} of {vertices} is missing or does not have 3 coordinates")
         for i in range(faces):
             row = next(rows, [b"0"])
             corners = _count(row[0])
@@ -91,7 +91,7 @@ def _check_off(path: Path) -> None:
                 word.isdigit() for word in row[1 : 1 + corners]
             )
             if corners < 3 or not whole:
-                raise ValueError(f"face {i + 1} of {faces} is missing or not as long as it says")
+                raise ValueError(f"face {i + 1} of {faces} is missing or does not have its stated length")
         if next(rows, None) is not None:
             raise ValueError("more rows than it declares")
 
@@ -105,21 +105,21 @@ def _check_obj(path: Path) -> None:
             vertices += 1
             columns = len(words) - 1
             if columns not in OBJ_VERTEX_COLUMNS or (columns == 4 and float(words[4]) != 1):
-                raise ValueError(f"line {number}: a vertex of {columns} numbers, or of a weight other than 1")
+                raise ValueError(f"line {number}: a vertex has {columns} numbers or a weight other than 1")
         elif words[0] == b"f":
             corners = [int(word.split(b"/")[0]) for word in words[1:]]
             if len(corners) < 3 or 0 in corners:
-                raise ValueError(f"line {number}: a face of {len(corners)} corners, or one that names vertex 0")
+                raise ValueError(f"line {number}: a face has {len(corners)} corners or refers to vertex 0")
             if min(corners) < 0:
                 relative_at = vertices
             used.update(corner if corner > 0 else vertices + 1 + corner for corner in corners)
         others |= words[0] in (b"l", b"p")  # lines and points use vertices, too
     if used and (min(used) < 1 or max(used) > vertices):
-        raise ValueError("a face names a vertex that is not there")
+        raise ValueError("a face refers to a missing vertex")
     if relative_at not in (-1, vertices):
-        raise ValueError("faces count back from vertices that others follow; export it with absolute numbers")
+        raise ValueError("faces use relative numbers before the last vertex; export it with absolute numbers")
     if used and not others and len(used) < (1 - LARGEST_UNUSED_SHARE) * vertices:
-        raise ValueError(f"{vertices - len(used)} of {vertices} vertices belong to no face, as where a file ends early")
+        raise ValueError(f"{vertices - len(used)} of {vertices} vertices belong to no face, as in a truncated file")
 
 
 def _obj_rows(path: Path) -> Iterator[tuple[int, list[bytes]]]:
@@ -135,5 +135,5 @@ def _obj_rows(path: Path) -> Iterator[tuple[int, list[bytes]]]:
 
 def _count(word: bytes) -> int:
     if not word.isdigit():
-        raise ValueError(f"'{word.decode('ascii', 'replace')}' is no count")
+        raise ValueError(f"'{word.decode('ascii', 'replace')}' is not a count")
     return int(word)

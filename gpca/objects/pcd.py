@@ -66,14 +66,14 @@ def _parse_header(content: bytes) -> tuple[_Header, bytes]:
     while "DATA" not in values:
         end = content.find(b"\n", position)
         if end < 0 or end - position > 10_000:
-            raise ValueError("wrong header: no line DATA")
+            raise ValueError("wrong header: no DATA line")
         key, *words = content[position:end].decode("ascii", "replace").split() or ["#"]
         if not key.startswith("#"):
             values[key] = words
         position = end + 1
     for key in ("FIELDS", "SIZE", "TYPE", "WIDTH", "HEIGHT", "POINTS"):
         if not values.get(key):
-            raise ValueError(f"wrong header: no line {key}")
+            raise ValueError(f"wrong header: no {key} line")
     fields = values["FIELDS"]
     sizes = values["SIZE"]
     types = values["TYPE"]
@@ -104,14 +104,14 @@ def _ascii(body: bytes, header: _Header) -> np.ndarray:
         return np.zeros((0, 3))
     table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None)
     if table.shape != (header.points, starts[-1]):
-        raise ValueError(f"the header says {header.points}×{starts[-1]} values, the file holds {table.shape}")
+        raise ValueError(f"the header states {header.points}×{starts[-1]} values, but the file has {table.shape}")
     return table[:, starts[list(header.xyz)]]
 
 
 def _binary(body: bytes, header: _Header) -> np.ndarray:
     if len(body) != header.points * header.dtype.itemsize:
         raise ValueError(
-            f"the header says {header.points * header.dtype.itemsize} bytes of data, the file holds {len(body)}"
+            f"the header states {header.points * header.dtype.itemsize} bytes of data, but the file has {len(body)}"
         )
     table = np.frombuffer(body, header.dtype)
     return np.column_stack([table[str(i)][:, 0] for i in header.xyz]).astype(np.float64)
@@ -124,7 +124,7 @@ def _binary_compressed(body: bytes, header: _Header) -> np.ndarray:
     require_memory(size, compressed, "its compressed data", "")
     columns = _lzf_decompress(body[8 : 8 + compressed], size)
     if not len(columns) == size == header.points * header.dtype.itemsize:
-        raise ValueError("its compressed data is not of the size that the header says")
+        raise ValueError("its compressed data does not have the size that the header states")
     starts = header.points * np.cumsum([0, *(field.itemsize for field in header.columns)])
     arrays = [np.frombuffer(columns, header.dtype[i].base, header.points, int(starts[i])) for i in header.xyz]
     return np.column_stack(arrays).astype(np.float64)

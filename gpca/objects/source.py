@@ -57,7 +57,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
     urls, checksums = _as_list(entry.get("urls") or entry.get("url")), _as_list(entry.get("sha256"))
     if not urls:
         wanted = entry.get("location") or ", ".join(entry.get("files") or ["location"])
-        raise InputError(subject, f"{wanted} is not there", "correct location, or set data_dir to the folder above it")
+        raise InputError(subject, f"{wanted} does not exist", "correct location, or set data_dir to its parent folder")
     if checksums and len(checksums) != len(urls):
         raise InputError(subject, f"has {len(urls)} url(s) but {len(checksums)} sha256", "give one for each, or null")
     return {**entry, "origin": "download"}
@@ -143,7 +143,7 @@ def _found(entry: dict, data_dir: str | None) -> Path | None:
     if (data_dir is None and not folder.is_absolute()) or not (location or patterns) or not folder.exists():
         return None
     if not (folder.is_dir() or folder.is_file()):
-        raise InputError(folder, "is neither folder nor file", "correct location in the config")
+        raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
     return folder if location or all(any(folder.glob(pattern)) for pattern in patterns or ()) else None
 
 
@@ -156,10 +156,10 @@ def require_place(place: str | Path) -> Path:
     try:
         path = Path(place).expanduser()
     except RuntimeError as fault:
-        raise InputError(place, "is the home of nobody", "write the whole path") from fault
+        raise InputError(place, "is the home folder of an unknown user", "write the full path") from fault
     real = path.resolve()
     if any(real.is_relative_to(system) for system in SYSTEM) and not real.is_relative_to("/dev/shm"):
-        raise InputError(place, "is a place of devices, not of data", "name a folder of files")
+        raise InputError(place, "is a folder of devices, not of data", "name a folder of files")
     return path
 
 
@@ -177,7 +177,7 @@ def _module_of(kind: object) -> ModuleType:
     if kind in names and hasattr(module := import_module(f"gpca.objects.{kind}"), "from_entry"):
         return module
     known = ["procedural"] + [name for name in names if hasattr(import_module(f"gpca.objects.{name}"), "from_entry")]
-    raise InputError(f"kind '{kind}'", "there is no such kind of source", f"known are {', '.join(known)}")
+    raise InputError(f"kind '{kind}'", "is not a kind of source", f"choose one of {', '.join(known)}")
 
 
 def _as_list(value: str | list | None) -> list:

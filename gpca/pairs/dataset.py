@@ -132,7 +132,7 @@ class Registrations:
                 raise InputError(path, "has no samples, or a cloud of fewer than 3 points", remedy)
         for name, known in (("split", SPLITS), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
-                raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
+                raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"expected one of {', '.join(known)}")
         for name, within in _possible(arrays).items():
             if not within.all():
                 raise InputError(path, f"'{name}' contains impossible values", remedy)

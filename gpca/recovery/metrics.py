@@ -101,7 +101,7 @@ def read_recovery(path: str | Path) -> pd.DataFrame:
         rows[name] = numbers(path, rows, name).astype(int)
     flags = ("failed", "recovered")
     if not (rows["cause"].isin(CONCEPTS) & rows[[*flags]].isin(("True", "False")).all(axis=1)).all():
-        raise InputError(path, "holds an unknown cause, or a row neither recovered nor not", "regenerate it")
+        raise InputError(path, "contains an unknown cause, or a flag other than True and False", "regenerate it")
     for name in flags:
         rows[name] = rows[name] == "True"
     return rows

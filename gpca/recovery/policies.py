@@ -175,4 +175,4 @@ def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:
     if name != action and action in actions:
         return PolicyEntry(f"Always: {action.replace('_', ' ')}", always_act(action))
     known = ", ".join((*POLICIES, *(ALWAYS + known for known in actions)))
-    raise InputError(f"recovery policy '{name}'", "unknown", f"known are {known}")
+    raise InputError(f"recovery policy '{name}'", "unknown", f"choose one of {known}")

@@ -44,7 +44,7 @@ class Thresholds:
             raise InputError("recovery thresholds", f"{found} are not both in [0, 1]", "they are shares of a score")
         if self.dominant and self.improvement >= self.dominant:
             fault = f"improvement {self.improvement} is not below dominant {self.dominant}"
-            raise InputError("recovery thresholds", fault, "a score cannot fall by more than it is")
+            raise InputError("recovery thresholds", fault, "a score cannot fall by more than its own value")
         if not self.uncertain >= 0 or self.attempts < 1:
             found = f"uncertain {self.uncertain}, attempts {self.attempts}"
             raise InputError("recovery thresholds", found, "give an uncertainty of 0 or more and at least 1 attempt")
@@ -123,7 +123,7 @@ class RecoveryPolicy:
             return Decision(QUEUE, "", f"no concept dominates: {concepts[top]} has {scores_C[top]:.2f}")
         treatable = [c for c, concept in enumerate(concepts) if concept in self.treatments]
         if not treatable or top not in treatable:
-            return Decision(QUEUE, "", f"nothing treats {concepts[top]}")
+            return Decision(QUEUE, "", f"no action treats {concepts[top]}")
         chosen = concepts[min(treatable, key=lambda c: (stale.count(concepts[c]), -scores_C[c]))]
         return Decision(self.treatments[chosen], chosen, f"{chosen} has {scores_C[concepts.index(chosen)]:.2f}")
 

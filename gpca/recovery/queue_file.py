@@ -35,11 +35,13 @@ def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
             rows[name] = numbers(path, rows, name)
         within = (rows["unsolved"] >= 0) & (rows["unsolved"] <= rows["failures"]) & (rows["failures"] > 0)
         if not (within & rows["order"].isin((DOUBTED, DRAWN))).all():
-            raise InputError(path, "holds an unknown order, or more errors than failures", "regenerate it")
+            raise InputError(path, "contains an unknown order, or more errors than failures", "regenerate it")
         mean = rows.groupby(["policy", "order", "labels"], sort=False)[["failures", "unsolved"]].mean()
         parts.append(mean.reset_index())
     if not parts or all(part.empty for part in parts):
-        raise InputError("recovery", "no error by labels", "switch on a policy that learns, and run the step recover")
+        raise InputError(
+            "recovery", "has no error by labels", "switch on a policy that learns and run the step recover"
+        )
     grouped = pd.concat(parts).groupby(["policy", "order", "labels"], sort=False)
     together = grouped[["failures", "unsolved"]].sum()[grouped.size() == len(parts)].reset_index()
     shares = [wilson_interval(row.unsolved, int(row.failures)) for row in together.itertuples()]

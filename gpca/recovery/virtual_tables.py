@@ -46,7 +46,7 @@ def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
         InputError: a cloud of points.
     """
     if surface.faces is None:
-        fault = f"its object '{surface.name}' is a cloud of points, and a camera looks at meshes"
+        fault = f"object '{surface.name}' is a point cloud, but the camera needs a mesh"
         raise InputError("recovery.objects", fault, "name a source of meshes")
     if len(surface.faces) <= most_faces:
         return surface

@@ -182,7 +182,7 @@ def unknown_target(target: str, known: Iterable[str]) -> str:
     """Return the line that answers a misspelt target: the known ones nearest to it, or all."""
     known = sorted(known)
     near = get_close_matches(target, known, n=3, cutoff=0.5)
-    remedy = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+    remedy = f"did you mean {' or '.join(near)}?" if near else f"choose one of {', '.join(known)}"
     return f"gpca: target '{target}': there is no such table, figure or stage; {remedy}"
 
 

@@ -80,7 +80,7 @@ class ShiftedSets:
         remedy = "regenerate it with 'python -m gpca shift'"
         for name, known in (("set", TRAINED_ON), ("split", ("train", "test")), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
-                raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"known are {', '.join(known)}")
+                raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"expected one of {', '.join(known)}")
         if not len(arrays["set"]) or (arrays["distance"] < 0).any():
             raise InputError(path, "has no samples, or negative distances", remedy)
         sets = cls(**{name: arrays[name] for name in shapes})

@@ -43,7 +43,7 @@ def checked_sections(
     """
     known = (*sections, *by_name)
     if unknown := set(settings) - set(known):
-        raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"known are {', '.join(known)}")
+        raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"choose one of {', '.join(known)}")
     given = {name: settings.get(name) or {} for name in known}
     for name, section in sections.items():
         check_settings(given[name], *section)

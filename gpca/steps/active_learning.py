@@ -33,10 +33,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--registrations", required=True, type=Path)
-    parser.add_argument("--embeddings", required=True, type=Path, help="by an encoder that saw every concept")
-    parser.add_argument("--embeddings-without", required=True, type=Path, help="by encoders that never saw one of them")
+    parser.add_argument(
+        "--embeddings", required=True, type=Path, help="embeddings from an encoder that saw every concept"
+    )
+    parser.add_argument(
+        "--embeddings-without", required=True, type=Path, help="embeddings from encoders that never saw one of them"
+    )
     parser.add_argument("--strategies", required=True, nargs="+")
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSV for each strategy, in their order")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="one CSV per strategy, in the same order")
 
 
 def run(options: Namespace) -> None:

@@ -25,10 +25,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
-    parser.add_argument("--embeddings", type=Path, nargs="*", help="for explainers that read them")
-    parser.add_argument("--uncertainty", type=Path, nargs="*", help="for explainers that read a design's outcomes")
-    parser.add_argument("--uncertainty-timings", type=Path, nargs="*", help="CSVs of their seconds")
-    parser.add_argument("--input-timings", required=True, type=Path, nargs="+", help="seconds spent before")
+    parser.add_argument("--embeddings", type=Path, nargs="*", help="embeddings, for explainers that read them")
+    parser.add_argument(
+        "--uncertainty", type=Path, nargs="*", help="outcomes of a design, for explainers that read them"
+    )
+    parser.add_argument("--uncertainty-timings", type=Path, nargs="*", help="CSVs of their run times")
+    parser.add_argument(
+        "--input-timings", required=True, type=Path, nargs="+", help="CSVs of the time spent before this step"
+    )
     parser.add_argument("--predictions", required=True, type=Path, nargs="+")
     parser.add_argument("--timings", required=True, type=Path, nargs="+")
 

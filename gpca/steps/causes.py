@@ -20,8 +20,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
-    parser.add_argument("--candidates", required=True, type=Path, help="CSV of how many candidates were refused")
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds of the observed runs of ICP")
+    parser.add_argument("--candidates", required=True, type=Path, help="CSV of the number of refused candidates")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the run times of ICP on the observed pairs")
 
 
 def run(options: Namespace) -> None:

@@ -16,12 +16,12 @@ from gpca.errors import InputError
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the configs."""
-    parser.add_argument("configs", nargs="*", type=Path, help="merged into the default in this order")
+    parser.add_argument("configs", nargs="*", type=Path, help="config files, merged into the default in this order")
 
 
 def run(options: Namespace) -> None:
     """Lay the configs over the default and check what comes of it."""
     if options.settings:
-        raise InputError("--settings", "check-config has none", "name a file")
+        raise InputError("--settings", "is not used by check-config", "name a config file")
     config, sources = read(with_defaults(*map(read_file, options.configs)), {})
-    print(f"run {config['run']}: sound; sources {', '.join(sources)}; seeds {', '.join(map(str, config['seeds']))}")
+    print(f"run {config['run']}: valid; sources {', '.join(sources)}; seeds {', '.join(map(str, config['seeds']))}")

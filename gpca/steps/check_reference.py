@@ -18,7 +18,9 @@ CONFIG = Path("config/config.yaml")  # as seen from the folder of the suite, whe
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the folders; ``--settings`` replaces keys of the config's section ``reference``."""
     parser.add_argument("folder", type=Path, help="folder of the run, such as results/real")
-    parser.add_argument("--reference", type=Path, help="its reference (default: reference/ beside it, same name)")
+    parser.add_argument(
+        "--reference", type=Path, help="its reference (default: the folder of the same name in reference/ beside it)"
+    )
     parser.add_argument(
         "--config",
         type=Path,
@@ -55,11 +57,11 @@ def _section(config: Path) -> dict:
         raise InputError(config, "no such file", "run this in the folder of the suite, or name the file with --config")
     section = read_mapping(config).get("reference")
     if section is None:
-        raise InputError(config, "has no section reference", f"name another file with --config, as {CONFIG}")
+        raise InputError(config, "has no section 'reference'", f"name another file with --config, such as {CONFIG}")
     needed = [field.name for field in fields(Allowance)]
     if not isinstance(section, dict) or not set(needed) <= set(section):
         raise InputError(
-            config, f"its section reference lacks one of {', '.join(needed)}", f"complete it as in {CONFIG}"
+            config, f"its section 'reference' lacks one of {', '.join(needed)}", f"complete it as in {CONFIG}"
         )
     return section
 

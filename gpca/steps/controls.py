@@ -39,15 +39,21 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--encoder", required=True, type=Path, help="weights of the paper's protocol")
-    parser.add_argument("--embeddings", required=True, type=Path, help="by that encoder")
+    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings from that encoder")
     retrained = (*RETRAINED, *TRAININGS)
-    parser.add_argument("--retrained", nargs="*", default=[], choices=retrained, help="controls with own embeddings")
-    parser.add_argument("--retrained-embeddings", nargs="*", default=[], type=Path, help="theirs, in the same order")
+    parser.add_argument(
+        "--retrained", nargs="*", default=[], choices=retrained, help="controls with their own embeddings"
+    )
+    parser.add_argument(
+        "--retrained-embeddings", nargs="*", default=[], type=Path, help="their embeddings, in the same order"
+    )
     parser.add_argument("--others", nargs="*", default=[], help="names of the other sources")
-    parser.add_argument("--other-registrations", nargs="*", default=[], type=Path, help="theirs, in the same order")
+    parser.add_argument(
+        "--other-registrations", nargs="*", default=[], type=Path, help="their registrations, in the same order"
+    )
     parser.add_argument("--out", required=True, type=Path, help="predictions")
     parser.add_argument("--samples", required=True, type=Path, help="CSV of the test samples' severities and errors")
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds that explainers take")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the run times of the explainers")
 
 
 def run(options: Namespace) -> None:

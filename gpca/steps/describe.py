@@ -22,7 +22,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds, the observed runs included")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the run times, including the observed runs")
 
 
 def run(options: Namespace) -> None:

@@ -29,8 +29,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--causes", required=True, type=Path, nargs="+")
-    parser.add_argument("--read", required=True, type=Path, nargs="+", help="the descriptors or embeddings it reads")
-    parser.add_argument("--read-timings", required=True, type=Path, nargs="+", help="seconds spent on these")
+    parser.add_argument(
+        "--read", required=True, type=Path, nargs="+", help="the descriptors or embeddings that the explainer reads"
+    )
+    parser.add_argument("--read-timings", required=True, type=Path, nargs="+", help="CSVs of the time spent on these")
     parser.add_argument("--predictions", required=True, type=Path, nargs="+")
     parser.add_argument("--timings", required=True, type=Path, nargs="+")
 

@@ -24,11 +24,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the encoder's section of the config, with ``icp``."""
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--registration-timings", required=True, type=Path)
-    parser.add_argument("--encoder", required=True, type=Path, help="weights")
+    parser.add_argument("--encoder", required=True, type=Path, help="encoder weights")
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds, ICP included")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the run times, including ICP")
 
 
 def run(options: Namespace) -> None:

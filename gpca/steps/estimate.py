@@ -28,9 +28,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--estimators", required=True, nargs="+")
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--causes", required=True, type=Path, nargs="+", help="one per seed")
-    parser.add_argument("--samples", required=True, type=Path, nargs="+", help="npz of the reference, one per seed")
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs: reference, then each estimator")
-    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of their seconds, in that order")
+    parser.add_argument(
+        "--samples", required=True, type=Path, nargs="+", help="npz files of the reference, one per seed"
+    )
+    parser.add_argument(
+        "--out", required=True, type=Path, nargs="+", help="CSVs of the reference, then of each estimator"
+    )
+    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of their run times, in that order")
 
 
 def run(options: Namespace) -> None:

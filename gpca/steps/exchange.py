@@ -39,7 +39,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--registrations", required=True, type=Path, nargs="+", help="one per seed")
-    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights, one per seed")
+    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="encoder weights, one per seed")
     parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs of what explainers say, one per seed")
 
 

@@ -23,27 +23,27 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "source", type=Path, nargs="+", help="what was observed: points or a mesh (PLY, PCD, OBJ, STL, OFF)"
     )
-    parser.add_argument("target", type=Path, help="the reference that each of them is aligned to")
+    parser.add_argument("target", type=Path, help="the reference that each source is aligned to")
     parser.add_argument("--init", type=Path, help="text file with the 4×4 numbers of T_target_source")
     parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="unit of files and pose (default m)")
     parser.add_argument("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, the package's)")
     parser.add_argument("--method", help="registration method, such as gicp (default: the model's ICP)")
     parser.add_argument(
         "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
-        help="measure how uncertain the pose is, by an estimator such as brossard; by default Monte-Carlo",
+        help="measure the uncertainty of the pose with an estimator such as brossard (default: Monte-Carlo)",
     )  # fmt: skip
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
-    form.add_argument("--json-lines", action="store_true", help="print one line of JSON for each source")
+    form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
 
 
 def run(options: Namespace) -> None:
     """Read all files, then explain and print one source after the other; all that is no result goes to stderr."""
     torch.set_num_threads(options.threads)
     if options.settings:
-        raise InputError("--settings", "explain has none", "they are in the model; make another one")
+        raise InputError("--settings", "is not used by explain", "make another model to change its settings")
     if len(options.source) > 1 and not options.json_lines:
-        raise InputError("explain", f"{len(options.source)} sources", "print them with --json-lines")
+        raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
     path = model_path(options.model)
     model = Model.load(path)
     T_init = read_pose(options.init) if options.init else None

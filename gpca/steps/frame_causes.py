@@ -57,20 +57,24 @@ def add_arguments(parser: ArgumentParser) -> None:
 
     What explainers learn from is a file of each source, in the same order.
     """
-    parser.add_argument("--source", required=True, help="name of the frames; it seeds the draws")
+    parser.add_argument("--source", required=True, help="name of the frames, which seeds the draws")
     parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--scenes", type=Path, help="the folder that the step scenes wrote, in place of datasets")
-    parser.add_argument("--data-dir", help="folder that holds the datasets; what is there is not downloaded")
+    parser.add_argument("--scenes", type=Path, help="folder written by the step scenes, in place of datasets")
+    parser.add_argument("--data-dir", help="folder with the datasets; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", type=Path, help="where downloads are kept")
     parser.add_argument("--instances", required=True, type=Path)
     parser.add_argument("--objects", required=True, type=Path, help="canonical clouds of the frames' objects")
     parser.add_argument("--causes", required=True, type=Path, nargs="+", help="drawn causes")
-    parser.add_argument("--descriptors", required=True, type=Path, nargs="+", help="theirs")
+    parser.add_argument(
+        "--descriptors", required=True, type=Path, nargs="+", help="their descriptors, in the same order"
+    )
     parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights of encoders trained on them")
-    parser.add_argument("--embeddings", required=True, type=Path, nargs="+", help="theirs by these encoders")
+    parser.add_argument(
+        "--embeddings", required=True, type=Path, nargs="+", help="their embeddings from these encoders"
+    )
     parser.add_argument("--out", required=True, type=Path, help="measured causes of the frames")
-    parser.add_argument("--samples", required=True, type=Path, help="CSV: where each was seen, and what was found")
-    parser.add_argument("--predictions", required=True, type=Path, help="CSV: what every explainer says of each")
+    parser.add_argument("--samples", required=True, type=Path, help="CSV of where each was seen and what was found")
+    parser.add_argument("--predictions", required=True, type=Path, help="CSV of what every explainer says about each")
 
 
 def run(options: Namespace) -> None:
@@ -105,7 +109,9 @@ def _files_of_sources(options: Namespace) -> list[tuple[Path, Path, Path, Path]]
     """Return the files of each source: causes, descriptors, encoder, embeddings."""
     for name in ("descriptors", "encoders", "embeddings"):
         if (found := len(getattr(options, name))) != len(options.causes):
-            raise InputError(f"--{name}", f"{found} file(s) for {len(options.causes)} of causes", "give one for each")
+            raise InputError(
+                f"--{name}", f"{found} file(s) for {len(options.causes)} file(s) of --causes", "give one for each"
+            )
     return list(zip(options.causes, options.descriptors, options.encoders, options.embeddings, strict=True))
 
 

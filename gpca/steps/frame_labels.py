@@ -33,9 +33,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--backbones", required=True, nargs="+")
-    parser.add_argument("--embeddings", required=True, nargs="+", type=Path, help="of each backbone, in their order")
+    parser.add_argument(
+        "--embeddings", required=True, nargs="+", type=Path, help="one file per backbone, in the same order"
+    )
     parser.add_argument("--strategies", required=True, nargs="+", choices=NEW_CONCEPT_STRATEGIES)
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSV for each strategy, in their order")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="one CSV per strategy, in the same order")
 
 
 def run(options: Namespace) -> None:
@@ -45,7 +47,9 @@ def run(options: Namespace) -> None:
     for several, single in (("out", "strategies"), ("embeddings", "backbones")):
         files, names = getattr(options, several), getattr(options, single)
         if len(files) != len(names):
-            raise InputError(f"--{several}", f"{len(files)} file(s) for {len(names)} of --{single}", "give one each")
+            raise InputError(
+                f"--{several}", f"{len(files)} file(s) for {len(names)} value(s) of --{single}", "give one for each"
+            )
     inputs = [options.registrations, *options.embeddings]
     with record_provenance(options.out, inputs, options.settings, seed=options.seed):
         own = FrameLabelSettings(**given["frame_labels"])

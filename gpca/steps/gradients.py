@@ -34,10 +34,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
-    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights")
-    parser.add_argument("--embeddings", required=True, type=Path, nargs="+", help="by these")
-    parser.add_argument("--deletions", required=True, type=Path, nargs="+", help="CSVs: scores without salient points")
-    parser.add_argument("--maps", required=True, type=Path, nargs="+", help="npz of the saliency maps")
+    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="encoder weights")
+    parser.add_argument("--embeddings", required=True, type=Path, nargs="+", help="embeddings from these encoders")
+    parser.add_argument(
+        "--deletions", required=True, type=Path, nargs="+", help="CSVs of the scores without salient points"
+    )
+    parser.add_argument("--maps", required=True, type=Path, nargs="+", help="npz files of the saliency maps")
     parser.add_argument("--tcav", required=True, type=Path, nargs="+", help="CSVs of TCAV's scores and tests")
 
 
@@ -47,7 +49,7 @@ def run(options: Namespace) -> None:
     given = checked_sections(options.settings, SECTIONS)
     settings, encoding = GradientSettings(**given["gradients"]), EncoderSettings(**given["encoder"])
     if encoding.backbone not in DIFFERENTIABLE:
-        fault = "has no gradient in the points once it is trained"
+        fault = "has no gradient with respect to the points once it is trained"
         raise InputError(f"backbone '{encoding.backbone}'", fault, f"use {' or '.join(DIFFERENTIABLE)}")
     files = ("registrations", "encoders", "embeddings", "deletions", "maps", "tcav")
     for seed, *paths in progress(list(per_seed(options, *files)), f"gradients of {options.source}"):

@@ -18,13 +18,13 @@ from gpca.settings import check_settings
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` are parts of the config's section ``real_world``."""
-    parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
-    parser.add_argument("--scenes", type=Path, help="the folder that the step scenes wrote, in place of datasets")
-    parser.add_argument("--data-dir", help="folder that holds the datasets; what is there is not downloaded")
+    parser.add_argument("--source", required=True, help="name of the source, which seeds the draws")
+    parser.add_argument("--scenes", type=Path, help="folder written by the step scenes, in place of datasets")
+    parser.add_argument("--data-dir", help="folder with the datasets; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", type=Path, help="where downloads are kept")
     parser.add_argument("--surface-points", type=SURFACE_POINTS, default=16384, help="points sampled on each model")
     parser.add_argument("--out", required=True, type=Path)
-    parser.add_argument("--objects", required=True, type=Path, help="canonical clouds, to be written")
+    parser.add_argument("--objects", required=True, type=Path, help="output file of the canonical clouds")
 
 
 def run(options: Namespace) -> None:

@@ -34,16 +34,22 @@ COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` are those of the classifier, as of the explainer ``gpca``."""
     parser.add_argument("registrations", type=Path)
-    parser.add_argument("--embeddings", required=True, type=Path, help="as the step embed writes them")
-    parser.add_argument("--labels", required=True, type=Path, help="CSV of the answers; it is appended to")
-    parser.add_argument("--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labelled before")
-    parser.add_argument("--initial", type=COUNT, default=60, help="samples labelled before (default 60)")
-    parser.add_argument("--batch", type=COUNT, default=4, help="questions between two retrainings (default 4)")
-    parser.add_argument("--questions", type=COUNT, default=20, help="at most in this session (default 20)")
-    parser.add_argument("--strategy", default="bald_kmeans", help="picks the questions (default bald_kmeans)")
-    parser.add_argument("--picture", type=Path, default=Path("query.png"), help="redrawn for every question")
-    parser.add_argument("--answers", type=Path, help="a file with an answer on each line, instead of the terminal")
-    parser.add_argument("--predictions", type=Path, help="CSV of what the classifier says of every sample at the end")
+    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings as written by the step embed")
+    parser.add_argument("--labels", required=True, type=Path, help="CSV to which the answers are appended")
+    parser.add_argument(
+        "--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labeled at the start"
+    )
+    parser.add_argument("--initial", type=COUNT, default=60, help="samples labeled at the start (default 60)")
+    parser.add_argument("--batch", type=COUNT, default=4, help="questions between retrainings (default 4)")
+    parser.add_argument("--questions", type=COUNT, default=20, help="largest number of questions (default 20)")
+    parser.add_argument(
+        "--strategy", default="bald_kmeans", help="strategy that picks the questions (default bald_kmeans)"
+    )
+    parser.add_argument("--picture", type=Path, default=Path("query.png"), help="image, redrawn for every question")
+    parser.add_argument("--answers", type=Path, help="file with one answer per line, instead of the terminal")
+    parser.add_argument(
+        "--predictions", type=Path, help="CSV of what the classifier says about every sample at the end"
+    )
 
 
 def run(options: Namespace) -> None:
@@ -60,7 +66,7 @@ def run(options: Namespace) -> None:
     session = Session(h_S_d, keys, start, labels, settings, options.strategy)
     answers = _answers(options.answers)
     asked = 0
-    print(f"{len(start)} labelled at the start, {len(session.answered)} answered before, {len(keys)} samples")
+    print(f"{len(start)} labeled at the start, {len(session.answered)} answered before, {len(keys)} samples")
     print("answer with a concept or with " + ", ".join(f"{name} ({what})" for name, what in COMMANDS.items()))
     while asked < options.questions and (questions := session.ask(min(options.batch, options.questions - asked))):
         for question in questions:
@@ -90,7 +96,7 @@ def _answers(path: Path | None):
     if path is None:
         return sys.stdin
     if not path.is_file():
-        raise InputError(path, "no such file", "give a text file with an answer on each line")
+        raise InputError(path, "no such file", "give a text file with one answer per line")
     return path.open(encoding="utf-8")
 
 
@@ -130,7 +136,7 @@ def _ask(session: Session, registrations: Registrations, question: Question, pic
 def _retrain(session: Session) -> None:
     learnt = session.retrain()
     answers = "1 answer" if learnt == 1 else f"{learnt} answers"
-    print(f"  learnt {answers}; concepts: {', '.join(session.gpc.classes)}")
+    print(f"  learned {answers}; concepts: {', '.join(session.gpc.classes)}")
 
 
 def _finish(session: Session, registrations: Registrations, options: Namespace) -> None:

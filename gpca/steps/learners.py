@@ -24,7 +24,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--learners", required=True, nargs="+")
     parser.add_argument("--sets", required=True, type=Path, nargs="+", help="files of the step shift, one per seed")
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one learner after the other")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one learner after another")
 
 
 def run(options: Namespace) -> None:

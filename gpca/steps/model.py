@@ -41,17 +41,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config."""
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--title", required=True, help="title of the objects, as explanations show it")
+    parser.add_argument("--title", required=True, help="title of the objects, shown in explanations")
     parser.add_argument("--stand-in", action="store_true", help="the objects were drawn by the package")
     parser.add_argument("--registrations", required=True, type=Path)
-    parser.add_argument("--encoder", required=True, type=Path, help="weights")
-    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings by that encoder")
+    parser.add_argument("--encoder", required=True, type=Path, help="encoder weights")
+    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings from that encoder")
     parser.add_argument(
         "--causes",
         required=True,
         type=Path,
         nargs="+",
-        help="measured causes, a file per source; the observed cloud moves",
+        help="measured causes, one file per source; the observed cloud moves",
     )
     parser.add_argument(
         "--descriptors", required=True, type=Path, nargs="+", help="their descriptors, in the same order"
@@ -63,7 +63,7 @@ def run(options: Namespace) -> None:
     """Fit both classifiers and write them with the encoder and the policy."""
     torch.set_num_threads(options.threads)
     given = checked_sections(options.settings, SECTIONS)
-    require_files(options, "descriptors", len(options.causes), "of causes")
+    require_files(options, "descriptors", len(options.causes), "file(s) of --causes")
     inputs = [options.registrations, options.encoder, options.embeddings, *options.causes, *options.descriptors]
     with record_provenance([options.out], inputs, options.settings, seed=options.seed):
         icp, own = given["registrations"].get("icp", {}), given["model"]

@@ -58,15 +58,23 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--registrations", required=True, type=Path)
-    parser.add_argument("--encoders", nargs="*", default=[], type=Path, help="weights by other samples and sources")
-    parser.add_argument("--encoders-of", nargs="*", default=[], choices=FROM_OTHERS, help="which, in the same order")
+    parser.add_argument(
+        "--encoders", nargs="*", default=[], type=Path, help="weights trained on other samples and sources"
+    )
+    parser.add_argument(
+        "--encoders-of",
+        nargs="*",
+        default=[],
+        choices=FROM_OTHERS,
+        help="what each encoder was trained on, in the same order",
+    )
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--causes", required=True, type=Path)
-    parser.add_argument("--descriptors", required=True, type=Path, help="of the causes")
-    parser.add_argument("--cause-encoder", required=True, type=Path, help="weights, trained on the causes")
-    parser.add_argument("--cause-embeddings", required=True, type=Path, help="by that encoder")
+    parser.add_argument("--descriptors", required=True, type=Path, help="descriptors of the causes")
+    parser.add_argument("--cause-encoder", required=True, type=Path, help="weights trained on the causes")
+    parser.add_argument("--cause-embeddings", required=True, type=Path, help="embeddings from that encoder")
     parser.add_argument("--strategies", required=True, nargs="+", choices=NEW_CONCEPT_STRATEGIES)
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSV for each strategy, in their order")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="one CSV per strategy, in the same order")
 
 
 def run(options: Namespace) -> None:
@@ -74,8 +82,8 @@ def run(options: Namespace) -> None:
     torch.set_num_threads(options.threads)
     given = checked_sections(options.settings, SECTIONS)
     own = NewConceptSettings.from_dict(given["new_concepts"])
-    require_files(options, "out", len(options.strategies), "of --strategies")
-    require_files(options, "encoders", len(options.encoders_of), "of --encoders-of")
+    require_files(options, "out", len(options.strategies), "value(s) of --strategies")
+    require_files(options, "encoders", len(options.encoders_of), "value(s) of --encoders-of")
     inputs = [options.registrations, *options.encoders, options.objects, options.causes, options.descriptors]
     inputs += [options.cause_encoder, options.cause_embeddings]
     with record_provenance(options.out, inputs, options.settings, seed=options.seed):
@@ -160,7 +168,7 @@ class _Work:
             self._own.geometry_candidates,
         )
         if drawn is None:
-            why = f"of {self._own.geometry_candidates} candidates of a split none fails without a cause"
+            why = f"none of {self._own.geometry_candidates} candidates of a split fails without a cause"
             _leave_out(self._options.source, GEOMETRY, why)
         return drawn
 
@@ -182,4 +190,4 @@ def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str 
 
 
 def _leave_out(source: str, name: str, why: str) -> None:
-    print(f"new concepts of {source}: '{name}' is left out: {why}", file=sys.stderr)
+    print(f"new concepts of {source}: '{name}' is skipped: {why}", file=sys.stderr)

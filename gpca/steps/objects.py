@@ -14,8 +14,8 @@ from gpca.settings import check_settings
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the source's entry of the config."""
-    parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
-    parser.add_argument("--data-dir", help="folder that holds the data; what is there is not downloaded")
+    parser.add_argument("--source", required=True, help="name of the source, which seeds the draws")
+    parser.add_argument("--data-dir", help="folder with the data; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", help="where downloads are kept")
     parser.add_argument("--surface-points", type=SURFACE_POINTS, default=16384, help="points sampled on each mesh")
     parser.add_argument("--out", required=True, type=Path)

@@ -32,7 +32,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare files; ``--settings`` holds the group's `choices`, the `sizes`, and sections of the config by name."""
     parser.add_argument("--group", required=True, choices=GROUPS)
     for kind in KINDS:
-        parser.add_argument(f"--{kind}", nargs="*", default=[], type=Path, help="named by source, method and seed")
+        parser.add_argument(
+            f"--{kind}", nargs="*", default=[], type=Path, help="files named by source, method and seed"
+        )
     parser.add_argument("--out", required=True, type=Path, help="tidy CSV")
 
 

@@ -34,13 +34,15 @@ SOURCE = "recovery"  # names every random number of this step, tables included
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files; ``--settings`` holds the sections of the config that are read."""
     parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--data-dir", help="folder that holds the objects' data; what is there is not downloaded")
+    parser.add_argument("--data-dir", help="folder with the objects' data; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", help="where downloads are kept")
-    parser.add_argument("--out", required=True, type=Path, help="CSV: a row per failure, policy and step")
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of their seconds")
-    parser.add_argument("--queue", required=True, type=Path, help="CSV of the error by the labels of queued cases")
-    parser.add_argument("--policy", required=True, type=Path, help="JSON of the thresholds chosen")
-    parser.add_argument("--example", required=True, type=Path, help="npz of one failure, for the figure")
+    parser.add_argument("--out", required=True, type=Path, help="CSV with a row per failure, policy and step")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of their run times")
+    parser.add_argument(
+        "--queue", required=True, type=Path, help="CSV of the error by the number of labeled queued cases"
+    )
+    parser.add_argument("--policy", required=True, type=Path, help="JSON file of the chosen thresholds")
+    parser.add_argument("--example", required=True, type=Path, help="npz file of one failure, for the figure")
 
 
 def run(options: Namespace) -> None:

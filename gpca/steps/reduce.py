@@ -22,7 +22,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--reduction", required=True)
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
-    parser.add_argument("--embeddings", required=True, type=Path, nargs="+", help="as the step embed writes them")
+    parser.add_argument(
+        "--embeddings", required=True, type=Path, nargs="+", help="embeddings as written by the step embed"
+    )
     parser.add_argument("--out", required=True, type=Path, nargs="+")
 
 

@@ -25,8 +25,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--methods", required=True, nargs="+")
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--registrations", required=True, type=Path, nargs="+", help="one per seed")
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one method after the other")
-    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of their seconds, in that order")
+    parser.add_argument("--out", required=True, type=Path, nargs="+", help="CSVs, one method after another")
+    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of their run times, in that order")
 
 
 def run(options: Namespace) -> None:

@@ -19,7 +19,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds of every ICP")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the run times of ICP")
 
 
 def run(options: Namespace) -> None:

@@ -24,8 +24,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--model", required=True, type=Path)
-    parser.add_argument("--registrations", required=True, type=Path, help="that the model learnt from")
-    parser.add_argument("--embeddings", required=True, type=Path, help="by its encoder")
+    parser.add_argument("--registrations", required=True, type=Path, help="registrations that the model was trained on")
+    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings from its encoder")
     parser.add_argument("--out", required=True, type=Path)
 
 

@@ -14,8 +14,8 @@ from gpca.settings import check_settings
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the config's section ``real_world.scenes``."""
-    parser.add_argument("--source", required=True, help="name of the source; it seeds the draws")
-    parser.add_argument("--out", required=True, type=Path, help="folder; an existing one is replaced")
+    parser.add_argument("--source", required=True, help="name of the source, which seeds the draws")
+    parser.add_argument("--out", required=True, type=Path, help="output folder; an existing one is replaced")
 
 
 def run(options: Namespace) -> None:
@@ -24,7 +24,7 @@ def run(options: Namespace) -> None:
     # It is replaced as a whole, so it has to be one that this step has written.
     provenance = Path(f"{options.out.absolute()}.provenance.json")
     if options.out.is_dir() and any(options.out.iterdir()) and not provenance.is_file():
-        raise InputError(options.out, "is a folder that this step did not make", "name another, or empty it")
+        raise InputError(options.out, "exists but was not made by this step", "name another folder or empty it")
     settings = SceneSettings.from_dict(options.settings)
     with record_provenance([options.out], [], options.settings, folders=True):
         surfaces = (surface for family in settings.families for surface in procedural.surfaces(family))

@@ -28,10 +28,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
     parser.add_argument(
-        "--other-registrations", type=Path, nargs="*", help="of another source; without them that set is left out"
+        "--other-registrations",
+        type=Path,
+        nargs="*",
+        help="registrations of another source; without them, that set is left out",
     )
     parser.add_argument("--embeddings", required=True, type=Path, nargs="+")
-    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights")
+    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="encoder weights")
     parser.add_argument("--out", required=True, type=Path, nargs="+")
 
 

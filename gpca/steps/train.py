@@ -26,8 +26,10 @@ from gpca.steps import checked_with_icp
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the encoder's section of the config, with ``icp``."""
-    parser.add_argument("--registrations", required=True, type=Path, nargs="+", help="several are taken together")
-    parser.add_argument("--poses", type=Path, help="CSV of depth frames, whose instances are held out whole")
+    parser.add_argument(
+        "--registrations", required=True, type=Path, nargs="+", help="one or more files, trained on together"
+    )
+    parser.add_argument("--poses", type=Path, help="CSV of depth frames, whose instances are held out as a whole")
     parser.add_argument("--start", type=Path, help="weights to start from")
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)

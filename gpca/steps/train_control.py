@@ -43,7 +43,7 @@ def run(options: Namespace) -> None:
     with record_provenance([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
         registrations = Registrations.load(options.registrations)
         if why := left_out(options.control, registrations, settings, encoder.backbone):
-            print(f"control '{options.control}' of {options.source} is left out: {why}", file=sys.stderr)
+            print(f"control '{options.control}' of {options.source} is skipped: {why}", file=sys.stderr)
             arrays, curve = nothing()
         else:
             axes = (options.source, options.seed, settings, encoder, checkpoint)

@@ -31,7 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--weights", required=True, type=Path)
     parser.add_argument("--curve", required=True, type=Path, help="CSV of the training curve")
     parser.add_argument("--out", required=True, type=Path, help="embeddings")
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of the seconds, ICP included")
+    parser.add_argument("--timings", required=True, type=Path, help="CSV of the run times, including ICP")
 
 
 def run(options: Namespace) -> None:

@@ -24,7 +24,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
     parser.add_argument("--out", required=True, type=Path, nargs="+")
     parser.add_argument("--tables", required=True, type=Path, nargs="+", help="CSVs of the uncertainties")
-    parser.add_argument("--timings", required=True, type=Path, nargs="+", help="CSVs of the seconds of every condition")
+    parser.add_argument(
+        "--timings", required=True, type=Path, nargs="+", help="CSVs of the run times of every condition"
+    )
 
 
 def run(options: Namespace) -> None:

@@ -23,7 +23,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--registrations", required=True, type=Path)
     parser.add_argument("--source", required=True)
     parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--concepts", nargs="+", choices=CONCEPTS, default=CONCEPTS, help="held out in turn")
+    parser.add_argument(
+        "--concepts", nargs="+", choices=CONCEPTS, default=CONCEPTS, help="concepts to hold out, one at a time"
+    )
     parser.add_argument("--out", required=True, type=Path)
 
 

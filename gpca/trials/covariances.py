@@ -53,7 +53,9 @@ def read_estimates(path: str | Path) -> pd.DataFrame:
     for name in COVARIANCE:
         rows[name] = numbers(path, rows, name, needed=told)
     if not rows["failed"].isin(("True", "False")).all():
-        raise InputError(path, "holds a row neither failed nor not", f"regenerate it with '{MADE_BY}'")
+        raise InputError(
+            path, "column 'failed' contains values other than True and False", f"regenerate it with '{MADE_BY}'"
+        )
     rows["failed"] = rows["failed"] == "True"
     return rows
 

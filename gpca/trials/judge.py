@@ -56,8 +56,8 @@ class Judges:
         """
         index, name = int(registrations.object_index[row]), str(registrations.object_name[row])
         if index >= len(self._objects) or str(self._objects.names[index]) != name:
-            fault = f"object {index} is not '{name}', as the registrations have it"
-            raise InputError(self._subject, fault, "give those that the registrations were made of")
+            fault = f"object {index} is not '{name}', as in the registrations"
+            raise InputError(self._subject, fault, "give the objects that the registrations were made from")
         if index not in self._made:
             self._made[index] = Judge(self._objects, index)
         return self._made[index]

@@ -29,6 +29,6 @@ def read_trials(path: str | Path) -> pd.DataFrame:
     for name in (*SEVERITIES, *MEASURED):
         rows[name] = numbers(path, rows, name, least=0)
     if not (rows["concept"].isin(CONCEPTS) & rows["success"].isin(("True", "False"))).all():
-        raise InputError(path, "holds an unknown cause, or a row neither a success nor none", "regenerate it")
+        raise InputError(path, "contains an unknown cause, or a success other than True and False", "regenerate it")
     rows["success"] = rows["success"] == "True"
     return rows

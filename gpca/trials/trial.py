@@ -55,7 +55,7 @@ def try_methods(
     start = settings.global_start
     require_global(start)
     if start not in made:
-        raise InputError("method_pairs.global_start", f"'{start}' is not among the methods", "add it, or name another")
+        raise InputError("method_pairs.global_start", f"'{start}' is not among the methods", "add it or name another")
     rows = _chosen(registrations, source, settings.samples)
     of_objects = Judges(objects, f"objects of {source}")
     judges = [of_objects.of(registrations, row) for row in rows]

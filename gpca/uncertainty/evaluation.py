@@ -32,7 +32,7 @@ def design_rows(registrations: Registrations, design: str, samples: int | None) 
     if samples is not None:
         chosen &= (registrations.split != "test") | (registrations.sample < samples)
     if not chosen.any():
-        raise InputError(f"uncertainty '{design}'", "no registrations to evaluate", "raise their number")
+        raise InputError(f"uncertainty '{design}'", "has no registrations to evaluate", "increase their number")
     return np.flatnonzero(chosen)
 
 

@@ -63,7 +63,7 @@ class KnobbedSource:
         """
         for name, value, most in zip(Knobs._fields, knobs, MOST, strict=True):
             if not 0 <= value <= most:
-                raise InputError(f"knob '{name}'", f"{value} is outside [0, {most}]", "give a value inside")
+                raise InputError(f"knob '{name}'", f"{value} is outside [0, {most}]", "give a value within it")
         kept = np.sort(self._order[: max(3, round(len(self._order) * (1 - knobs.overlap)))])
         return (self._source + knobs.noise * self._jitter)[kept]
 

@@ -108,7 +108,7 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
     shape = outcomes.uncertainty.shape
     remedy = "regenerate it with 'python -m gpca uncertainty'"
     if len(rows) != np.prod(shape):
-        raise InputError(path, f"holds {len(rows)} rows, not {shape[0]} samples × {shape[1]} conditions", remedy)
+        raise InputError(path, f"has {len(rows)} rows, not {shape[0]} samples × {shape[1]} conditions", remedy)
     expected = {"sample": outcomes.sample[:, None], "split": outcomes.split[:, None], "condition": np.arange(shape[1])}
     for name, values in expected.items():
         found = (rows[name] if name == "split" else numbers(path, rows, name)).to_numpy().reshape(shape)

@@ -82,7 +82,9 @@ def test_identical_samples_still_give_different_rows(name, labelled):
 
 
 def test_an_unknown_strategy_is_named_with_the_known():
-    with pytest.raises(InputError, match=r"strategy 'bold': unknown; known are random, random_stratified, entropy,"):
+    with pytest.raises(
+        InputError, match=r"strategy 'bold': unknown; choose one of random, random_stratified, entropy,"
+    ):
         selected("bold", make_pool(), 4)
     with pytest.raises(InputError, match="bald_kmeans"):
         require_strategy("")

@@ -79,7 +79,7 @@ def test_curves_of_no_backbone_are_refused(tmp_path):
     path.parent.mkdir(parents=True)
     step = {"labels": 0, "new_labels": 0, "accuracy": 1, "accuracy_new": 1, "epochs": 0}
     write_curves(path, {("pair", "overlap"): [step]}, POOL_COLUMNS)
-    with pytest.raises(InputError, match="learning curves of depth frames: are of no backbone"):
+    with pytest.raises(InputError, match="learning curves of depth frames: cover no backbone"):
         collect_labels([path], [], (0.7,))
 
 

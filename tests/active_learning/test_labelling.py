@@ -54,11 +54,11 @@ def test_the_same_answer_twice_is_no_conflict(path):
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ("3,train,pose\n3,train,noise\n", r"labels.csv, line 3: 'noise' contradicts 'pose' before; remove one of them"),
+        ("3,train,pose\n3,train,noise\n", r"labels.csv, line 3: 'noise' contradicts the earlier 'pose'; remove one"),
         ("77,train,pose\n", r"line 2: no sample '77' of split 'train'"),
         ("3,test,pose\n", r"line 2: no sample '3' of split 'test'"),
         ("-3,train,pose\n", r"line 2: no sample '-3'"),
-        ("3,train,two words\n", r"line 2: 'two words' is no name of a concept"),
+        ("3,train,two words\n", r"line 2: 'two words' is not a valid concept name"),
         ("3,tra", r"line 2: no sample '3' of split 'tra'"),
     ],
 )
@@ -116,5 +116,5 @@ def test_an_interrupted_session_continues_with_what_it_knew(path):
 
 
 def test_one_known_concept_is_too_few():
-    with pytest.raises(InputError, match="fewer than two labelled concepts"):
+    with pytest.raises(InputError, match="fewer than two labeled concepts"):
         Session(H, KEYS, {KEYS[0]: "noise"}, LabelFile("nowhere.csv", {}), SETTINGS)

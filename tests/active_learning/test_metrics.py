@@ -104,14 +104,14 @@ def test_metrics_are_tidy_and_gains_are_paired_with_random_of_the_same_start(fil
     [
         ("", r"seed3.csv: is empty"),
         ("setting,held_out,labels,accuracy\n", r"column 'accuracy_new' is missing"),
-        ("setting,held_out,labels,accuracy,accuracy_new\n", r"holds no rows"),
+        ("setting,held_out,labels,accuracy,accuracy_new\n", r"has no rows"),
         (
             "setting,held_out,labels,accuracy,accuracy_new\na,b,0,x,1\n",
-            r"'accuracy' holds something that is not a finite",
+            r"'accuracy' contains values that are not finite",
         ),
         (
             "setting,held_out,labels,accuracy,accuracy_new\na,b,0,inf,1\n",
-            r"'accuracy' holds something that is not a fin",
+            r"'accuracy' contains values that are not fin",
         ),
     ],
 )

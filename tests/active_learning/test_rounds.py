@@ -100,19 +100,19 @@ def test_a_rare_concept_has_its_share_as_far_as_there_are_samples(embedded, init
 
 
 def test_a_share_that_leaves_no_sample_of_the_concept_is_named(embedded):
-    with pytest.raises(InputError, match="leaves no pool"):
+    with pytest.raises(InputError, match="leaves none of"):
         make_task(embedded, "overlap", SETTINGS, "tiny", 0, new_share=0.01)
 
 
 @pytest.mark.parametrize("initial", [24, 26, 200])
 def test_too_few_training_samples_are_named(embedded, initial):
-    with pytest.raises(InputError, match=rf"{initial} labelled samples of noise and pose: leaves no pool of 36 "):
+    with pytest.raises(InputError, match=rf"{initial} labeled samples of noise and pose: leaves none of 36 "):
         make_task(embedded, "overlap", dataclasses.replace(SETTINGS, initial=initial), "tiny", 0)
 
 
 def test_a_concept_without_training_samples_cannot_be_held_out(embedded):
     without = embedded.subset(np.flatnonzero((embedded.concept != "overlap") | (embedded.split == "test")))
-    with pytest.raises(InputError, match="leaves no pool of 24 training samples"):
+    with pytest.raises(InputError, match="leaves none of 24 training samples"):
         make_task(without, "overlap", SETTINGS, "tiny", 0)
 
 

@@ -70,7 +70,7 @@ def test_the_order_is_that_of_the_axes(plain):
 @pytest.mark.parametrize("arrivals, quiet", [(181, 0), (150, 121), (220, 30), (30, 30), (30, 40), (31, 30)])
 def test_a_pool_too_small_for_the_stream_is_named(plain, arrivals, quiet):
     with pytest.raises(
-        InputError, match=rf"a stream of {arrivals} arrivals: needs more than a pool of 120 known and 60"
+        InputError, match=rf"a stream of {arrivals} arrivals: needs a larger pool than 120 known and 60"
     ):
         arrival_order(plain, StreamSettings(arrivals=arrivals, quiet=quiet), "blobs", 0)
 

@@ -30,9 +30,9 @@ def test_a_pose_outside_moves_points_as_it_does_inside():
 @pytest.mark.parametrize(
     ("points", "unit", "message"),
     [
-        (BOX[:10], "m", "target: holds 10 points; give 64 or more"),
-        (np.where(np.arange(500)[:, None] == 7, np.nan, BOX), "m", "target: 1 of 500 points hold NaN"),
-        (BOX * [1, 0, 0], "m", "all its points lie on one point or line"),
+        (BOX[:10], "m", "target: has 10 points; give 64 or more"),
+        (np.where(np.arange(500)[:, None] == 7, np.nan, BOX), "m", "target: 1 of 500 points contain NaN"),
+        (BOX * [1, 0, 0], "m", "all its points coincide or lie on one line"),
         (BOX * 1000, "m", "diameter is 1300 m, .*unit: mm"),
         (BOX * 1e-3, "mm", "diameter is 1.3e-06 m, .*unit: m"),
         (BOX, "inch", "unit 'inch'"),

@@ -58,10 +58,10 @@ def test_directions_are_unit_and_favour_no_side():
 @pytest.mark.parametrize(
     ("T_b_a", "message"),
     [
-        (np.eye(3), r"my pose: the pose is of shape \(3, 3\)"),
-        (np.diag([1.0, 1.0, -1.0, 1.0]), "my pose: the pose is no rigid transform"),
-        (np.full((4, 4), np.nan), "my pose: the pose is no rigid transform"),
-        (pose().T, "its last row has to be 0 0 0 1"),
+        (np.eye(3), r"my pose: the pose has shape \(3, 3\)"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "my pose: the pose is not a rigid transform"),
+        (np.full((4, 4), np.nan), "my pose: the pose is not a rigid transform"),
+        (pose().T, "its last row must be 0 0 0 1"),
     ],
 )
 def test_what_is_no_rigid_transform_is_refused(T_b_a, message):

@@ -199,9 +199,9 @@ def test_an_explainer_of_a_subset_is_judged_on_it(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "expected"),
     [
-        ({"uncertainty_clean": "low"}, "'uncertainty_clean' holds something that is not a finite number"),
-        ({"uncertainty_observed": np.inf}, "'uncertainty_observed' holds something that is not a finite number"),
-        ({"sample": 3}, "holds a sample twice"),
+        ({"uncertainty_clean": "low"}, "'uncertainty_clean' contains values that are not finite numbers"),
+        ({"uncertainty_observed": np.inf}, "'uncertainty_observed' contains values that are not finite numbers"),
+        ({"sample": 3}, "contains a sample twice"),
         ({"split": "tset"}, "'split'"),
         ({"sample": [0, 1, 2, 3, 5]}, "lacks test sample 4 of .*gpca/seed0.csv"),
     ],

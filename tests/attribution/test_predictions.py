@@ -75,7 +75,7 @@ def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path):
     fewer = SimpleNamespace(sample=sample.sample[:1], split=sample.split[:1])
     other = SimpleNamespace(sample=sample.sample, split=sample.split[::-1])
     for wrong in (fewer, other):
-        with pytest.raises(InputError, match="does not hold the seconds of these samples") as caught:
+        with pytest.raises(InputError, match="does not contain the times of these samples") as caught:
             read_timings(path, wrong)
         assert str(path) in str(caught.value)
 
@@ -86,9 +86,9 @@ def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path):
         ("sample,split,icp_seconds\n3,test,0.5\n", "column 'seconds' is missing"),
         (
             "sample,split,seconds,icp_seconds\n3,test,soon,0.5\n",
-            "'seconds' holds something that is not a finite number",
+            "'seconds' contains values that are not finite numbers",
         ),
-        ("sample,split,seconds,icp_seconds\n3,test,0.5,\n", "'icp_seconds' holds something that is not a finite"),
+        ("sample,split,seconds,icp_seconds\n3,test,0.5,\n", "'icp_seconds' contains values that are not finite"),
     ],
 )
 def test_faulty_timings_are_refused_in_one_line(tmp_path, text, expected):
@@ -112,8 +112,8 @@ def test_faulty_timings_are_refused_in_one_line(tmp_path, text, expected):
         ({"variance_pose": "wide"}, "'variance_pose'"),
         ({"icp_calls": "many"}, "'icp_calls'"),
         ({"icp_calls": np.nan}, "'icp_calls'"),
-        ({"icp_calls": -1}, "'icp_calls' holds numbers below 0"),
-        ({"variance_pose": -0.1}, "'variance_pose' holds numbers below 0"),
+        ({"icp_calls": -1}, "'icp_calls' contains numbers below 0"),
+        ({"variance_pose": -0.1}, "'variance_pose' contains numbers below 0"),
         ({"score_pose": np.inf}, "'score_pose'"),
     ],
 )

@@ -17,8 +17,8 @@ def test_the_array_comes_back_as_doubles(registrations):
 @pytest.mark.parametrize(
     ("array", "fault"),
     [
-        (lambda n: np.full((n, 4), np.nan), "holds NaN or infinity"),
-        (lambda n: np.full((n, 4), np.inf), "holds NaN or infinity"),
+        (lambda n: np.full((n, 4), np.nan), "contains NaN or infinity"),
+        (lambda n: np.full((n, 4), np.inf), "contains NaN or infinity"),
         (lambda n: np.zeros((n, 0)), r"has shape \(54, 0\), not 54×any"),
         (lambda n: np.zeros(n), r"has shape \(54,\), not 54×any"),
         (lambda n: np.zeros((n - 1, 4)), r"has shape \(53, 4\), not 54×any"),

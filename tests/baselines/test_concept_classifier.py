@@ -29,5 +29,5 @@ def test_a_concept_absent_from_training_scores_0_and_the_others_keep_their_colum
 
 @pytest.mark.parametrize("rows", [[0, 3, 6], []])
 def test_training_on_fewer_than_two_concepts_is_refused(rows):
-    with pytest.raises(InputError, match="training registrations: fewer than two concepts"):
+    with pytest.raises(InputError, match="training registrations: cover fewer than two concepts"):
         ConceptClassifier(LogisticRegression()).fit(X[rows], CONCEPT_N[rows])

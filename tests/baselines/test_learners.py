@@ -117,5 +117,5 @@ def test_few_samples_of_a_concept_are_enough_for_an_svm_but_not_one(name, embedd
     for concept in CONCEPTS:
         few += train[embedded.concept[train] == concept][:3].tolist()
     assert np.isfinite(explained(name, embedded, np.array(few)).scores_N_C).all()
-    with pytest.raises(InputError, match="hold a single sample of a concept; give at least two"):
+    with pytest.raises(InputError, match="have a single sample of a concept; give at least two"):
         explained(name, embedded, np.array(few[:7]))

@@ -97,7 +97,7 @@ def test_a_seed_repeats_every_byte_and_a_concept_absent_from_training_scores_0(n
 
 def test_a_covariance_of_nan_or_none_at_all_is_refused(attached):
     nan = np.full_like(attached.attached["covariance"], np.nan)
-    with pytest.raises(InputError, match="array 'covariance': holds NaN"):
+    with pytest.raises(InputError, match="array 'covariance': contains NaN"):
         features(replace(attached, attached={"covariance": nan}), FLOOR)
     with pytest.raises(InputError, match="array 'covariance': is not attached"):
         features(replace(attached, attached={}), FLOOR)

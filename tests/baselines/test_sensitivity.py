@@ -155,7 +155,7 @@ def test_where_no_knob_changes_anything_no_concept_is_named(name, registrations)
 def test_an_uncertainty_that_is_missing_or_nan_is_refused(name, registrations):
     arrays = dict(with_uncertainty(name, registrations).attached)
     nan = np.full_like(arrays["uncertainty"], np.nan)
-    with pytest.raises(InputError, match="array 'uncertainty': holds NaN"):
+    with pytest.raises(InputError, match="array 'uncertainty': contains NaN"):
         explain(name, replace(registrations, attached={**arrays, "uncertainty": nan}))
     del arrays["uncertainty"]
     with pytest.raises(InputError, match="array 'uncertainty': is not attached"):

@@ -150,7 +150,7 @@ def test_an_array_that_is_missing_or_nan_is_refused(attached, name):
     arrays = dict(attached.attached)
     arrays[name] = arrays[name].astype(float)
     arrays[name][3, 2] = np.nan
-    with pytest.raises(InputError, match=f"array '{name}': holds NaN"):
+    with pytest.raises(InputError, match=f"array '{name}': contains NaN"):
         explain("shap_additive", replace(attached, attached=arrays))
     del arrays[name]
     with pytest.raises(InputError, match=f"array '{name}': is not attached"):

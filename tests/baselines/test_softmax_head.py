@@ -27,5 +27,5 @@ def test_scores_are_the_softmax_of_the_logits_even_of_large_ones(registrations):
 
 
 def test_nan_logits_are_refused(registrations):
-    with pytest.raises(InputError, match="array 'head_logits': holds NaN"):
+    with pytest.raises(InputError, match="array 'head_logits': contains NaN"):
         explain(registrations, np.full((len(registrations), 3), np.nan))

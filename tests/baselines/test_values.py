@@ -96,7 +96,7 @@ def test_a_remedy_without_effect_in_training_scores_a_finite_number(attached):
 
 
 def test_an_unknown_worth_is_refused():
-    with pytest.raises(InputError, match=r"setting 'worth': unknown 'fitness'; known are uncertainty, residual"):
+    with pytest.raises(InputError, match=r"setting 'worth': unknown 'fitness'; choose one of uncertainty, residual"):
         ScaledValues(single_drops, ONE_AT_A_TIME, "fitness")
     with pytest.raises(InputError, match="setting 'worth'"):
         explainer_entry("shap_removal").make("tiny", 0, worth="")
@@ -128,7 +128,7 @@ def test_a_concept_absent_from_training_scores_0(name, absent, attached):
 
 @pytest.mark.parametrize("name", LEARNED)
 def test_learning_from_one_concept_alone_is_refused(name, attached):
-    with pytest.raises(InputError, match="training registrations: fewer than two concepts"):
+    with pytest.raises(InputError, match="training registrations: cover fewer than two concepts"):
         fitted(name, attached.subset(np.flatnonzero(attached.concept == "noise")))
 
 
@@ -186,7 +186,7 @@ def test_a_worth_that_is_missing_or_nan_is_refused(name, array, attached):
     explainer = fitted(name, attached)
     nan = with_arrays(attached, **{array: np.full((len(attached), 8), np.nan)})
     without = replace(attached, attached={key: value for key, value in attached.attached.items() if key != array})
-    for registrations, fault in ((nan, "holds NaN"), (without, "is not attached")):
+    for registrations, fault in ((nan, "contains NaN"), (without, "is not attached")):
         with pytest.raises(InputError, match=f"array '{array}': {fault}"):
             explainer.explain(registrations)
         with pytest.raises(InputError, match=f"array '{array}': {fault}"):

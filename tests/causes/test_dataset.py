@@ -43,22 +43,22 @@ def at(*index, value):
 
 FAULTS = [
     ("error", lambda a: a[:, :4], "array 'error' is 20×4, not 20×8"),
-    ("error", at(0, 0, value=np.nan), "array 'error' holds NaN"),
-    ("error", at(0, 0, value=-0.1), "'error' holds what cannot be"),
-    ("error", at(0, 0, value=0.6), "'error' holds what cannot be"),
+    ("error", at(0, 0, value=np.nan), "array 'error' contains NaN"),
+    ("error", at(0, 0, value=-0.1), "'error' contains impossible values"),
+    ("error", at(0, 0, value=0.6), "'error' contains impossible values"),
     ("error_again", lambda a: a[:-1], "array 'error_again' is 7×8, not 8×8"),
-    ("uncertainty", at(0, 0, value=1.0), "'uncertainty' holds what cannot be"),
-    ("applied", lambda a: a.astype(float), "array 'applied' is of type float64"),
-    ("applied", lambda a: ~a, "'error' holds what cannot be"),
-    ("fitness_runs", lambda a: a + 1.5, "'fitness_runs' holds what cannot be"),
-    ("inlier_rmse_runs", lambda a: a - 1, "'inlier_rmse_runs' holds what cannot be"),
-    ("T_target_source_runs", lambda a: a[::-1], "'T_target_source_runs' holds what cannot be"),
+    ("uncertainty", at(0, 0, value=1.0), "'uncertainty' contains impossible values"),
+    ("applied", lambda a: a.astype(float), "array 'applied' has type float64"),
+    ("applied", lambda a: ~a, "'error' contains impossible values"),
+    ("fitness_runs", lambda a: a + 1.5, "'fitness_runs' contains impossible values"),
+    ("inlier_rmse_runs", lambda a: a - 1, "'inlier_rmse_runs' contains impossible values"),
+    ("T_target_source_runs", lambda a: a[::-1], "'T_target_source_runs' contains impossible values"),
     ("T_target_source_runs", lambda a: a[:, :, :3], "array 'T_target_source_runs' is 20×13×3×4"),
-    ("object_name", lambda a: np.full_like(a, "one"), "'object_name' holds what cannot be"),
-    ("nominal_limit", lambda a: a * 10, "'failed_limit' holds what cannot be"),
-    ("cause_limit", lambda a: -a, "'cause_limit' holds what cannot be"),
-    ("severity_outliers", lambda a: a + 2, "'severity_outliers' holds what cannot be"),
-    ("candidate", lambda a: a - 10**6, "'candidate' holds what cannot be"),
+    ("object_name", lambda a: np.full_like(a, "one"), "'object_name' contains impossible values"),
+    ("nominal_limit", lambda a: a * 10, "'failed_limit' contains impossible values"),
+    ("cause_limit", lambda a: -a, "'cause_limit' contains impossible values"),
+    ("severity_outliers", lambda a: a + 2, "'severity_outliers' contains impossible values"),
+    ("candidate", lambda a: a - 10**6, "'candidate' contains impossible values"),
     ("truth", None, "array 'symmetric' is missing"),
     ("concept", lambda a: np.full(len(a), "dust"), "unknown concept 'dust'"),
 ]
@@ -76,4 +76,4 @@ def test_faulty_files_are_refused_with_their_name(file, name, damage, message):
     with pytest.raises(InputError, match=message) as caught:
         Causes.load(file)
     assert str(caught.value).startswith(f"{file}: ")
-    assert "python -m gpca causes" in str(caught.value) or "known are" in str(caught.value)
+    assert "python -m gpca causes" in str(caught.value) or "choose one of" in str(caught.value)

@@ -93,7 +93,7 @@ def test_a_candidate_does_not_depend_on_how_many_are_wanted(four, causes):
 
 def test_a_group_that_cannot_be_filled_ends_with_a_line(four):
     weak = CauseSeverities(noise=(0, 0), outliers=(0, 0))
-    message = "causes of four, seed 100, train: 120 candidates gave 0 of 2 samples that are failed by noise; raise"
+    message = "causes of four, seed 100, train: 120 candidates yielded 0 of 2 samples that failed from noise; raise"
     with pytest.raises(InputError, match=message):
         draw_causes(four, "four", 100, CauseSettings(**FEW, severities=weak, candidates=10))
 

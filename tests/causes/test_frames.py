@@ -115,12 +115,12 @@ def test_the_model_is_what_the_camera_would_see_where_icp_starts(seen, tiny, mes
 
 def test_what_has_no_mesh_or_lies_beside_it_is_refused_or_left_out(seen, tiny, models, meshes, capsys):
     without = {"tiny": {number: model for number, model in models["tiny"].items() if UNKNOWN not in model.surface.name}}
-    with pytest.raises(InputError, match=f"object 'tiny {UNKNOWN}': there is no mesh of it among the models"):
+    with pytest.raises(InputError, match=f"object 'tiny {UNKNOWN}': has no mesh among the models"):
         meshes_of(without, tiny[1], seen.object_index.tolist())
     beside = replace(seen, points_m=seen.points_m + np.float32([5, 0, 0]))
-    with pytest.raises(InputError, match="no instance of the frames can be measured"):
+    with pytest.raises(InputError, match="no instance in the frames can be measured"):
         measured(beside, tiny[1], meshes)
-    assert "instance 0 is left out: its pixels see nothing of the mesh" in capsys.readouterr().err
+    assert "instance 0 is skipped: its pixels show none of the mesh" in capsys.readouterr().err
 
 
 def test_as_many_instances_are_drawn_as_are_wanted(tiny):

@@ -75,11 +75,20 @@ def test_what_is_off_when_clean_is_wanted_only_where_it_has_a_share():
 @pytest.mark.parametrize(
     ("rare", "said"),
     [
-        (["noise"], "failed by noise; raise causes.severities.noise or causes.severities.outliers, lower causes.poi"),
-        (["pose", False], "failed by pose alone; raise causes.severities.rotation_deg or causes.severities.translat"),
-        (["overlap", True], "failed by overlap among several causes; raise causes.severities.crop, widen causes.sev"),
-        (["nominal"], "nominal; lower causes.severities, raise causes.limits.nominal, or give some of causes.shares"),
-        (["borderline"], "borderline; raise causes.limits.failed, or give some of causes.shares.borderline to anoth"),
+        (
+            ["noise"],
+            "failed from noise; raise causes.severities.noise or causes.severities.outliers, lower causes.poi",
+        ),
+        (
+            ["pose", False],
+            "samples that failed from pose alone; raise causes.severities.rotation_deg or causes.severities.translat",
+        ),
+        (
+            ["overlap", True],
+            "failed from overlap among several causes; raise causes.severities.crop, widen causes.sev",
+        ),
+        (["nominal"], "nominal; lower causes.severities, raise causes.limits.nominal, or move part of causes.shares"),
+        (["borderline"], "borderline; raise causes.limits.failed, or move part of causes.shares.borderline to anoth"),
     ],
 )
 def test_who_gives_up_says_which_group_is_rare_and_what_to_widen(rare, said):

@@ -4,15 +4,15 @@ from gpca.causes.settings import CauseSettings, CauseSeverities
 from gpca.errors import InputError
 
 FAULTS = [
-    ({"limits": {"nominal": 0.05}}, "causes limits: nominal 0.05 is above failed 0.03; give a larger limit of failed"),
-    ({"shares": {"nominal": 0.5}}, "causes shares: they add up to 1.2; let them add up to 1"),
-    ({"points": [512, 128]}, r"causes points: \[512, 128\] runs downwards; swap"),
+    ({"limits": {"nominal": 0.05}}, "causes limits: nominal 0.05 exceeds failed 0.03; raise failed or lower nominal"),
+    ({"shares": {"nominal": 0.5}}, "causes shares: add up to 1.2; make them add up to 1"),
+    ({"points": [512, 128]}, r"causes points: \[512, 128\] is in descending order; swap"),
     (
         {"points": [64, 128], "severities": {"crop": [0.2, 0.9]}},
-        "of 64 points the largest crop leaves 6; raise causes.p",
+        "the largest crop leaves 6 of 64 points; raise causes.p",
     ),
-    ({"severities": {"outliers": [0.2, 0.1]}}, r"severity outliers: \[0.2, 0.1\] runs downwards"),
-    ({"several": [0.7, 0.3]}, r"causes several: \[0.7, 0.3\] runs downwards"),
+    ({"severities": {"outliers": [0.2, 0.1]}}, r"severity outliers: \[0.2, 0.1\] is in descending order"),
+    ({"several": [0.7, 0.3]}, r"causes several: \[0.7, 0.3\] is in descending order"),
     ({"starts": 12}, "'starts': 12; give at least 13"),
 ]
 

@@ -58,7 +58,9 @@ def test_objects_whose_clean_pairs_are_off_are_left_out_by_name(subjects, capsys
     left, _ = measure_clean_pairs([*subjects[:1], wrong, *subjects[2:]], "four", 100, SETTINGS)
     assert names(left) == [name for name in names(subjects) if name != wrong.name]
     said = capsys.readouterr().err
-    assert "causes of four: object '019_pitcher_base' is left out: 5 of 5 clean pairs are off by 2 % of the d" in said
+    assert (
+        "causes of four: object '019_pitcher_base' is skipped: 5 of 5 clean pairs have an error of at least 2 %" in said
+    )
 
 
 def test_they_stay_where_that_kind_is_asked_for(subjects, capsys):
@@ -66,7 +68,8 @@ def test_they_stay_where_that_kind_is_asked_for(subjects, capsys):
     asked = replace(SETTINGS, shares=Shares(nominal=0.1, geometry=0.2))
     assert measure_clean_pairs(wrong, "four", 100, asked)[0] == wrong
     with pytest.raises(
-        InputError, match=r"of every object nearly all clean pairs are off by 2 % .*; raise causes.limits.nomi"
+        InputError,
+        match=r"nearly all clean pairs of every object have an error of at least 2 % .*; raise causes.limits.nomi",
     ):
         measure_clean_pairs(wrong, "four", 100, SETTINGS)
     assert len(capsys.readouterr().err.splitlines()) == len(wrong)

@@ -138,7 +138,7 @@ def test_repeated_and_few_points_can_be_fitted():
 
 
 def test_an_unknown_kernel_is_named():
-    with pytest.raises(InputError, match=r"kernel 'linear': unknown; known are rbf, matern32, polynomial"):
+    with pytest.raises(InputError, match=r"kernel 'linear': unknown; choose one of rbf, matern32, polynomial"):
         GPCSettings("linear")
 
 
@@ -232,7 +232,7 @@ def test_two_classes_can_be_added():
 
 @pytest.mark.parametrize("name", ["", "pose"])
 def test_a_class_without_a_name_of_its_own_is_not_added(gpc, name):
-    with pytest.raises(InputError, match=f"concept '{name}': is empty or known already"):
+    with pytest.raises(InputError, match=f"concept '{name}': is empty or already known"):
         gpc.grow(name)
     assert gpc.classes == CLASSES
 

@@ -69,7 +69,7 @@ def test_files_are_read_back_with_source_and_seed(grid, tmp_path):
 def test_bad_files_are_named(grid, tmp_path):
     path = tmp_path / "kernels/tiny/seed0.csv"
     write_grid(path, grid.assign(nll=np.nan))
-    with pytest.raises(InputError, match="column 'nll' holds something that is not a finite number"):
+    with pytest.raises(InputError, match="column 'nll' contains values that are not finite numbers"):
         read_grids([path])
     write_grid(path, grid.drop(columns="ece"))
     with pytest.raises(InputError, match="column 'ece' is missing"):

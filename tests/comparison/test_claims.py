@@ -54,14 +54,14 @@ def test_a_claim_is_compared_in_every_source(tmp_path):
     ("changes", "message"),
     [
         ({"name": 3}, "claim 1 has no name"),
-        ({"test": "better"}, "claim best: unknown test 'better'; known are greater, less, not_worse, equivalent"),
+        ({"test": "better"}, "claim best: unknown test 'better'; expected one of greater, less, not_worse, equivalent"),
         ({"unit": "points"}, "claim best: unknown unit 'points'"),
         ({"margin": -1}, "claim best: 'margin' is '-1'; give a number of at least 0"),
         ({"margin": 0.5, "ratio": True}, "claim best: 'margin' is '0.5'; give a number of at least 1"),
-        ({"sentence": None, "extra": 1}, "claim best: unknown key 'extra'; known are name, sentence, place, test"),
+        ({"sentence": None, "extra": 1}, "claim best: unknown key 'extra'; use only name, sentence, place, test"),
         ({"of": {"in_file": "metrics.csv"}}, "name its in_file, in_table, source, method, metric, concept"),
         ({"of": CLAIM["of"] | {"in_file": "other.csv"}}, "claim best: unknown in_file 'other.csv'"),
-        ({"comparisons": [{"one": "a", "other": "b"}]}, "claim best: a comparison has the keys one, other"),
+        ({"comparisons": [{"one": "a", "other": "b"}]}, "claim best: has a comparison with the keys one, other"),
     ],
 )
 def test_a_wrong_claim_is_named(tmp_path, changes, message):
@@ -71,15 +71,15 @@ def test_a_wrong_claim_is_named(tmp_path, changes, message):
 
 
 def test_a_claim_is_whole_and_stands_once(tmp_path):
-    with pytest.raises(InputError, match="claim best: stands twice"):
+    with pytest.raises(InputError, match="claim best: appears twice"):
         read(tmp_path, CLAIM, CLAIM)
     for name in ("margin", "of"):
-        with pytest.raises(InputError, match=f"claim best: lacks '{name}'; give it"):
+        with pytest.raises(InputError, match=f"claim best: lacks '{name}'; add it"):
             read(tmp_path, {key: value for key, value in CLAIM.items() if key != name})
     told = {key: CLAIM[key] for key in ("name", "sentence", "place")}
     with pytest.raises(InputError, match="claim best: lacks 'note'"):
         read(tmp_path, told)
     assert read(tmp_path, told | {"note": "nobody ran it"})[0].compared == ()
-    with pytest.raises(InputError, match="holds no claims"):
+    with pytest.raises(InputError, match="has no claims"):
         read(tmp_path)
     assert CLAIMS.is_file()

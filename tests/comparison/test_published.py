@@ -107,31 +107,31 @@ def test_times_come_in_seconds():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"table": "VIII"}, "line 2: unknown table 'VIII'; known are I, II, III, IV, V, VI, VII, text"),
-        ({"row": "Tea Cup"}, "line 2: unknown row 'Tea Cup'; known are Coffee Cup, LINEMOD, YCB"),
-        ({"column": "LIME"}, "line 2: unknown column 'LIME'; known are SHAP, SA, GP-CA"),
-        ({"unit": "permille"}, "line 2: unknown unit 'permille'; known are %, labels, "),
+        ({"table": "VIII"}, "line 2: unknown table 'VIII'; expected one of I, II, III, IV, V, VI, VII, text"),
+        ({"row": "Tea Cup"}, "line 2: unknown row 'Tea Cup'; expected one of Coffee Cup, LINEMOD, YCB"),
+        ({"column": "LIME"}, "line 2: unknown column 'LIME'; expected one of SHAP, SA, GP-CA"),
+        ({"unit": "permille"}, "line 2: unknown unit 'permille'; expected one of %, labels, "),
         ({"value": "many"}, "line 2: 'value' is 'many' and not a finite number; give one"),
         ({"value": "nan"}, "line 2: 'value' is 'nan' and not a finite number; give one"),
         ({"value": ""}, "line 2: 'value' is '' and not a finite number; give one"),
         ({"upper": "inf"}, "line 2: 'upper' is 'inf' and not a finite number; give one"),
-        ({"upper": "31.3"}, "line 2: 'upper' 31.3 lies below 'value' 31.4; swap them"),
-        ({"value": "31.45"}, "line 2: a value with more digits than 1 decimals"),
-        ({"decimals": "-1"}, "line 2: a value with more digits than -1 decimals"),
+        ({"upper": "31.3"}, "line 2: 'upper' 31.3 is below 'value' 31.4; swap them"),
+        ({"value": "31.45"}, "line 2: has a value with more than 1 decimals"),
+        ({"decimals": "-1"}, "line 2: has a value with more than -1 decimals"),
         ({"decimals": "1.0"}, "line 2: 'decimals' is '1.0'; give a whole number"),
         ({"decimals": ""}, "line 2: 'decimals' is ''; give a whole number"),
         ({"paper_n": "few"}, "line 2: 'paper_n' is 'few'; give a whole number"),
         ({"paper_n": "-5"}, "line 2: 'paper_n' is '-5'; give a whole number"),
         ({"paper_n": "20"}, "line 2: no share of 20 samples rounds to 31.4 %; correct 'paper_n'"),
-        ({"same_as": "I / YCB / SHAP"}, "line 2: 'same_as' I / YCB / SHAP is no number above; take names of this"),
+        ({"same_as": "I / YCB / SHAP"}, "line 2: 'same_as' I / YCB / SHAP is not a number above; use a name from this"),
         ({"place": " "}, "line 2: 'place' is empty; fill it in"),
         ({"table": TEXT, "row": ""}, "line 2: 'row' is empty; fill it in"),
-        ({"in_file": "metric.csv"}, "line 2: unknown in_file 'metric.csv'; known are metrics.csv, "),
-        ({"statistic": "median"}, "line 2: unknown statistic 'median'; known are mean, deviation"),
-        ({"metric": "a/b/c"}, "line 2: 'metric' is 'a/b/c'; give one, or one divided by another"),
-        ({"metric": "a/"}, "line 2: 'metric' is 'a/'; give one, or one divided by another"),
+        ({"in_file": "metric.csv"}, "line 2: unknown in_file 'metric.csv'; expected one of metrics.csv, "),
+        ({"statistic": "median"}, "line 2: unknown statistic 'median'; expected one of mean, deviation"),
+        ({"metric": "a/b/c"}, "line 2: 'metric' is 'a/b/c'; give one metric, or one divided by another"),
+        ({"metric": "a/"}, "line 2: 'metric' is 'a/'; give one metric, or one divided by another"),
         ({"concept": ""}, "line 2: names a counterpart, but 'concept' is empty"),
-        (NO_COUNTERPART, "line 2: neither a counterpart nor a note that says why there is none"),
+        (NO_COUNTERPART, "line 2: has neither a counterpart nor a note that explains why"),
     ],
 )
 def test_a_bad_line_is_named(tmp_path, changes, message):
@@ -145,7 +145,7 @@ def test_a_bad_line_is_named(tmp_path, changes, message):
 
 def test_a_cell_twice_names_both_lines(tmp_path):
     path = written(tmp_path / "published.csv", LINE, LINE | {"column": "SA"}, LINE | {"value": "30.0"})
-    with pytest.raises(InputError, match="line 4: holds I / YCB / SHAP again; line 2 has it"):
+    with pytest.raises(InputError, match="line 4: repeats I / YCB / SHAP; it is on line 2"):
         read_published(path)
 
 
@@ -153,12 +153,12 @@ def test_a_cell_twice_names_both_lines(tmp_path):
     ("content", "message"),
     [
         (None, "no such file"),
-        (b"", "line 1: other columns; they have to be table,row,column,value,"),
-        (b"table,row\nI,YCB\n", "line 1: other columns"),
-        (",".join(PUBLISHED_COLUMNS).encode() + b"\n", "holds no numbers"),
-        (",".join(PUBLISHED_COLUMNS).encode() + b"\nI,YCB,SHAP\n", "line 2: 3 fields for 19 columns"),
-        (",".join(PUBLISHED_COLUMNS).encode() + b'\nI,"YCB\n', "is no readable CSV file"),
-        (b"\xff\xfe\x00", "is no readable CSV file"),
+        (b"", "line 1: has other columns; they must be table,row,column,value,"),
+        (b"table,row\nI,YCB\n", "line 1: has other columns"),
+        (",".join(PUBLISHED_COLUMNS).encode() + b"\n", "has no numbers"),
+        (",".join(PUBLISHED_COLUMNS).encode() + b"\nI,YCB,SHAP\n", "line 2: has 3 fields for 19 columns"),
+        (",".join(PUBLISHED_COLUMNS).encode() + b'\nI,"YCB\n', "is not a readable CSV file"),
+        (b"\xff\xfe\x00", "is not a readable CSV file"),
     ],
 )
 def test_a_file_that_is_none_is_refused(tmp_path, content, message):
@@ -193,9 +193,9 @@ def test_the_first_reason_that_fits_counts():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"table": "VIII"}, "line 3: VIII / * / SHAP is no printed number; take names of published.csv, or *"),
-        ({"row": "Tea*"}, "line 3: I / Tea* / SHAP is no printed number"),
-        ({"column": "shap"}, "line 3: I / * / shap is no printed number"),
+        ({"table": "VIII"}, "line 3: VIII / * / SHAP is not a printed number; use names from published.csv, or *"),
+        ({"row": "Tea*"}, "line 3: I / Tea* / SHAP is not a printed number"),
+        ({"column": "shap"}, "line 3: I / * / shap is not a printed number"),
         ({"reason": ""}, "line 3: 'reason' is empty; say what was found, or remove the line"),
     ],
 )
@@ -209,7 +209,9 @@ def test_a_reason_of_nothing_is_refused(tmp_path, changes, message):
 def test_a_reason_with_a_comma_out_of_quotes_is_refused(tmp_path):
     path = tmp_path / "reasons.csv"
     path.write_text("table,row,column,reason\nI,*,SHAP,first, second\n")
-    with pytest.raises(InputError, match="line 2: 5 fields for 4 columns; put a text with a comma in quotes"):
+    with pytest.raises(
+        InputError, match="line 2: has 5 fields for 4 columns; put text that contains a comma in quotes"
+    ):
         read_reasons(NUMBERS, path)
 
 

@@ -84,5 +84,5 @@ def test_what_was_judged_is_read_back_or_refused(tmp_path):
     found.to_csv(path, index=False)
     pd.testing.assert_frame_equal(read_judged(path), found, check_dtype=False)
     path.write_text(path.read_text().replace("50.0", "half"))
-    with pytest.raises(InputError, match="column 'published' holds something that is not a finite number"):
+    with pytest.raises(InputError, match="column 'published' contains values that are not finite numbers"):
         read_judged(path)

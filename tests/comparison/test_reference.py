@@ -66,9 +66,7 @@ def _kind():
     return "".join(f"{name} {describe()[name]}, " for name in ("family", "model") if describe()[name])
 
 
-@pytest.mark.parametrize(
-    ("device", "told"), [("Some cores", "Some cores"), (None, "on a processor that is not recorded")]
-)
+@pytest.mark.parametrize(("device", "told"), [("Some cores", "Some cores"), (None, "on an unrecorded processor")])
 def test_records_of_earlier_versions_name_their_processor_or_none(folders, capsys, device, told):
     path = folders[1] / "metrics.csv.provenance.json"
     path.write_text(json.dumps({"config_sha256": {"seeds": "c0ffee"}, "device": device}))
@@ -127,7 +125,7 @@ def test_the_largest_difference_is_measured_by_what_is_allowed(folders):
     change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,1.0\n")
     change(folders[0] / "metrics.csv", "noise,all,0,50\n", "noise,all,0,52\n")
     assert outcomes(folders)["metrics.csv"].detail == (
-        "2 of 4 values differ, 1 by more than rounding usually does; at most, "
+        "2 of 4 values differ, 1 by more than rounding usually explains; at most, "
         "attribution / ycb / gpca / accuracy / all: +0.05, where 0.04743 is allowed "
         "(10 of 200 samples, where 9 are expected at most)"
     )
@@ -152,7 +150,7 @@ def test_times_are_not_compared(folders):
 
 
 @pytest.mark.parametrize(
-    ("folder", "told"), [(0, "lacks 1 of 2 values, such as ycb / b"), (1, "has beyond the reference 1 of 2")]
+    ("folder", "told"), [(0, "lacks 1 of 2 values, such as ycb / b"), (1, "adds to the reference 1 of 2")]
 )
 def test_other_rows_are_different(folders, folder, told):
     path = folders[folder] / "tables/table1.csv"
@@ -187,7 +185,7 @@ def test_a_reference_of_another_config_is_refused(folders, capsys):
     change(folders[1] / "metrics.csv.provenance.json", "c0ffee", "tea")
     assert check(folders) == 2
     line = one_line(capsys)
-    other = f"metrics.csv was made with another section 'seeds' of the config than {folders[0] / 'metrics.csv'}"
+    other = f"metrics.csv was made with a different config section 'seeds' than {folders[0] / 'metrics.csv'}"
     assert f"{folders[1]}: {other}" in line
     (folders[0] / "metrics.csv.provenance.json").unlink()
     assert check(folders) == 0
@@ -203,13 +201,13 @@ def test_a_section_that_is_newer_than_the_reference_is_no_other_config(folders):
 @pytest.mark.parametrize(
     ("broken", "content", "message"),
     [
-        ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; make it anew"),
-        ("metrics.csv", "attribution\n", "holds no rows; make it anew"),
-        ("metrics.csv", "", "is empty; make it anew"),
+        ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; regenerate it"),
+        ("metrics.csv", "attribution\n", "has no rows; regenerate it"),
+        ("metrics.csv", "", "is empty; regenerate it"),
         (
             "metrics.csv",
             ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n",
-            "'value' is 'nan' and not a finite number; make it anew",
+            "'value' is 'nan' and not a finite number; regenerate it",
         ),
         (
             "metrics.csv",
@@ -222,8 +220,8 @@ def test_a_section_that_is_newer_than_the_reference_is_no_other_config(folders):
             ",".join(HEADS) + "\nycb,gpca,many,1,2,5,100,False\n",
             "'mean' is 'many' and not a finite number",
         ),
-        ("metrics.csv.provenance.json", "{", "is no provenance record; make its result anew"),
-        ("metrics.csv.provenance.json", "[]", "is no provenance record; make its result anew"),
+        ("metrics.csv.provenance.json", "{", "is not a provenance record; regenerate its result"),
+        ("metrics.csv.provenance.json", "[]", "is not a provenance record; regenerate its result"),
     ],
 )
 def test_a_broken_file_is_named(folders, capsys, broken, content, message):
@@ -239,7 +237,7 @@ def test_no_run_and_no_reference(folders, capsys):
     assert "nix: no such folder; make it with 'snakemake -j2 all'" in one_line(capsys)
     shutil.rmtree(folders[1])
     assert check(folders) == 2
-    assert "tiny: holds no reference" in one_line(capsys)
+    assert "tiny: has no reference" in one_line(capsys)
 
 
 def test_settings_replace_the_configs(folders, capsys):
@@ -249,7 +247,7 @@ def test_settings_replace_the_configs(folders, capsys):
     assert check(folders, "--settings", '{"tolerances": {"shares": 1}}') == 2
     assert "setting tolerances.shares: unknown; did you mean share?" in one_line(capsys)
     assert check(folders, "--settings", '{"tolerances": {}}') == 2
-    assert "config key reference.tolerances: no kind" in one_line(capsys)
+    assert "config key reference.tolerances: has no kind" in one_line(capsys)
 
 
 def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, capsys, tmp_path, monkeypatch):
@@ -265,8 +263,8 @@ def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, c
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("seeds: [0]", "holds no section reference"),
-        ("- a list", "holds no keys at its top level"),
+        ("seeds: [0]", "has no section 'reference'"),
+        ("- a list", "has no keys at its top level"),
         ("a: b: c", "is neither YAML nor JSON"),
         ("reference: {tolerances: {}}", "lacks one of tolerances, half_widths, flipped, deviations, ratio, beyond"),
         ("reference: 3", "lacks one of tolerances, half_widths, flipped, deviations, ratio, beyond"),

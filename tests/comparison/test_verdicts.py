@@ -116,7 +116,7 @@ def test_a_lower_bound_is_judged_only_where_it_is_beyond():
 
 @pytest.mark.parametrize("given", [(3, 1), (-1, 1), (0.9, 2, True)])
 def test_tolerances_have_an_order(given):
-    with pytest.raises(InputError, match="it has to be"):
+    with pytest.raises(InputError, match="must satisfy"):
         Tolerance(*given)
 
 
@@ -197,7 +197,7 @@ def test_a_printed_deviation_belongs_to_the_mean_of_the_same_counterpart_and_is_
 
 
 def test_a_unit_without_tolerance_is_named():
-    with pytest.raises(InputError, match=r"comparison\.tolerances: no unit '%'; give its tolerance"):
+    with pytest.raises(InputError, match=r"comparison\.tolerances: has no unit '%'; add its tolerance"):
         compare([number()], {}, OBJECTS, {}, [])
 
 

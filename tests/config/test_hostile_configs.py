@@ -18,24 +18,24 @@ def unfolding(first, line, depth=6):
 
 
 TEXTS = {
-    "bomb of lists": (unfolding("[x]", lambda a: f"[{', '.join([a] * 10)}]"), "unfold"),
+    "bomb of lists": (unfolding("[x]", lambda a: f"[{', '.join([a] * 10)}]"), "expand"),
     "bomb of mappings": (
         unfolding("{x: 1}", lambda a: "{" + ", ".join(f"k{i}: {a}" for i in range(10)) + "}"),
-        "unfold",
+        "expand",
     ),
-    "bomb of merges": (unfolding("{x: 1}", lambda a: f"{{<<: [{', '.join([a] * 10)}]}}", 9), "unfold"),
-    "alias to itself": ("registrations: &r {icp: *r}", "line 1", "holds itself"),
-    "list in itself": ("seeds: &s [0, *s]", "line 1", "holds itself"),
-    "merge of itself": ("encoders: &e\n  <<: *e\n", "holds itself"),
+    "bomb of merges": (unfolding("{x: 1}", lambda a: f"{{<<: [{', '.join([a] * 10)}]}}", 9), "expand"),
+    "alias to itself": ("registrations: &r {icp: *r}", "line 1", "contains itself"),
+    "list in itself": ("seeds: &s [0, *s]", "line 1", "contains itself"),
+    "merge of itself": ("encoders: &e\n  <<: *e\n", "contains itself"),
     "nested lists": ("seeds: " + "[" * 3000 + "]" * 3000, "nested too deeply"),
     "nested JSON": ('{"seeds": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deeply"),
     "chain of aliases": (
         "\n".join(["a0: &a0 []", *(f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 3000))]),
-        "unfold",
+        "expand",
     ),
-    "key twice": ("seeds: [0]\nrun: a\nseeds: [1]", "line 3: key 'seeds' stands twice"),
-    "nested key twice": ("registrations:\n  train: 36\n  train: 90\n", "line 3: key 'train' stands twice"),
-    "key twice in JSON": ('{"seeds": [0], "seeds": [1]}', "key 'seeds' stands twice"),
+    "key twice": ("seeds: [0]\nrun: a\nseeds: [1]", "line 3: key 'seeds' appears twice"),
+    "nested key twice": ("registrations:\n  train: 36\n  train: 90\n", "line 3: key 'train' appears twice"),
+    "key twice in JSON": ('{"seeds": [0], "seeds": [1]}', "key 'seeds' appears twice"),
     "empty": ("", "no keys"),
     "comment": ("# nothing\n", "no keys"),
     "list": ("- 1\n- 2\n", "no keys"),
@@ -53,9 +53,9 @@ TEXTS = {
     "date": ("run: 2024-01-01", "run", "is a date"),
     "bytes": ("run: !!binary aGVsbG8=", "run", "is a bytes"),
     "set": ("seeds: !!set {0, 1}", "seeds", "is a set"),
-    "number as name": ("sources: {1: {title: x, kind: procedural, family: ycb}}", "sources.1", "is no text"),
-    "switch as name": ("encoders: {on: {backbone: dgcnn}}", "encoders.True", "is no text"),
-    "nothing as name": ("learners: {~: {}}", "learners.None", "is no text"),
+    "number as name": ("sources: {1: {title: x, kind: procedural, family: ycb}}", "sources.1", "is not text"),
+    "switch as name": ("encoders: {on: {backbone: dgcnn}}", "encoders.True", "is not text"),
+    "nothing as name": ("learners: {~: {}}", "learners.None", "is not text"),
     "list as name": ("? [a, b]\n: 1\n", "neither YAML nor JSON"),
     "too long": ("#" * (LARGEST_BYTES + 1), "bytes"),
 }
@@ -100,9 +100,9 @@ def learner(**settings):
 VALUES = [
     # the run's own folder
     ({"run": "smoke\n"}, "run", "control character"),
-    ({"run": "reference"}, "run", "take another name"),
-    ({"run": "Reference"}, "run", "take another name"),
-    ({"run": "logs"}, "run", "take another name"),
+    ({"run": "reference"}, "run", "choose another name"),
+    ({"run": "Reference"}, "run", "choose another name"),
+    ({"run": "logs"}, "run", "choose another name"),
     ({"run": ""}, "run"),
     ({"run": "."}, "run"),
     ({"run": "a/b"}, "run"),
@@ -124,7 +124,7 @@ VALUES = [
     ({"causes": {"points": [1024, 128]}}, "causes: causes points", "downwards"),
     ({"causes": {"severities": {"crop": [0.2, 0.95]}}}, "the largest crop leaves 6"),
     ({"causes": {"severities": {"outliers": [0.1, 0]}}}, "severity outliers", "downwards"),
-    ({"causes": {"limits": {"failed": 0.01}}}, "nominal 0.02 is above failed 0.01"),
+    ({"causes": {"limits": {"failed": 0.01}}}, "nominal 0.02 exceeds failed 0.01"),
     ({"causes": {"limits": {"nominal": 0}}}, "causes.limits.nominal"),
     ({"causes": {"shares": {"geometry": 0.5}}}, "causes shares", "add up to 1.5"),
     ({"causes": {"icp_points": 512}}, "causes.icp_points", "unknown"),
@@ -138,7 +138,7 @@ VALUES = [
     ({"encoders": {"dgcnn": {"head": "three_layer"}}}, "encoders.dgcnn.head", "one of"),
     ({"controls": {"folds": 1}}, "controls.folds", "minimum"),
     ({"controls": {"success": 0}}, "controls.success"),
-    ({"controls": {"explainers": {"shap_removal": {}}}}, "controls.explainers.shap_removal", "more of Monte-Carlo ICP"),
+    ({"controls": {"explainers": {"shap_removal": {}}}}, "controls.explainers.shap_removal", "more Monte-Carlo ICP"),
     ({"controls": {"explainers": {"gpca": {"iteration": 3}}}}, "controls.explainers.gpca", "iteration"),
     ({"controls": {"explainers": {"nobody": {}}}}, "controls.explainers.nobody", "unknown"),
     ({"controls": {"explainers": {"nobody": False}}}, "controls.explainers", "no explainer 'nobody'"),
@@ -173,22 +173,22 @@ VALUES = [
     (source(location="/proc/self"), "sources.mine", "devices"),
     (source(location="/sys"), "sources.mine", "devices"),
     (source(location="link"), "sources.mine", "devices"),
-    (source(location="fifo"), "sources.mine", "neither folder nor file"),
-    (source(location="nowhere"), "sources.mine", "is not there"),
+    (source(location="fifo"), "sources.mine", "neither a folder nor a file"),
+    (source(location="nowhere"), "sources.mine", "does not exist"),
     (source(location=""), "sources.mine.location"),
     (source(location="a\0b"), "sources.mine.location", "control character"),
     (source(location="x" * 5000), "sources.mine", "too long"),
-    (source(location="~nobody_of_this_name/parts"), "sources.mine", "home of nobody"),
+    (source(location="~nobody_of_this_name/parts"), "sources.mine", "home folder of an unknown user"),
     ({"data_dir": "/dev"}, "data_dir", "devices"),
     ({"data_dir": "/proc"}, "data_dir", "devices"),
     ({"data_dir": ""}, "data_dir"),
     ({"data_dir": "x" * 5000}, "too long"),
-    ({"data_dir": "~nobody_of_this_name"}, "data_dir", "home of nobody"),
+    ({"data_dir": "~nobody_of_this_name"}, "data_dir", "home folder of an unknown user"),
     ({"data_dir": "mine.yaml"}, "mine.yaml", "no such folder"),
     ({"data_dir": 3}, "data_dir"),
     ({"downloads": "/dev"}, "downloads", "devices"),
     ({"downloads": "/dev/null/here"}, "downloads", "devices"),
-    ({"downloads": "mine.yaml/here"}, "downloads", "is no folder"),
+    ({"downloads": "mine.yaml/here"}, "downloads", "is not a folder"),
     # patterns
     (source(files=["/etc/*.ply"]), "sources.mine", "/etc/*.ply"),
     (source(files=[""]), "sources.mine.files.0"),
@@ -225,5 +225,5 @@ def test_configs_are_laid_over_each_other_as_snakemake_does_it():
 @pytest.mark.parametrize("text", ["run: mine\n", '{"run":\n\t"mine"}', "\ufeffrun: mine\n", "run: mine # café\n"])
 def test_a_sound_config_says_so(tmp_path, text):
     (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
-    with pytest.raises(AssertionError, match="status 0: run mine: sound"):
+    with pytest.raises(AssertionError, match="status 0: run mine: valid"):
         refusal(["check-config", "mine.yaml"], tmp_path)

@@ -176,7 +176,7 @@ def test_jobs_that_outlived_their_snakemake_are_waited_for(here, start, monkeypa
     monkeypatch.setattr(restart.time, "sleep", end)
     clear_leftovers([])
     assert capsys.readouterr().err == (
-        f"gpca: waits for jobs of a killed run to end; 'kill {job.pid}' ends them at once\n"
+        f"gpca: waiting for jobs of a killed run to end; 'kill {job.pid}' ends them at once\n"
     )
     assert files(here / ".snakemake") == set(KEPT)
 

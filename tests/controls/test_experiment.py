@@ -49,8 +49,8 @@ def test_what_a_source_does_not_admit_is_left_out_and_named(registrations, capsy
     assert set(found["control"]) == {"paper", "shuffled"}
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
-        "controls of tiny: 'unseen_objects' is left out: it needs 5 objects or more, there are 3",
-        "controls of tiny: 'transfer' is left out: it needs two sources or more",
+        "controls of tiny: 'unseen_objects' is skipped: it needs at least 5 objects, but there are 3",
+        "controls of tiny: 'transfer' is skipped: it needs at least two sources",
     ]
 
 

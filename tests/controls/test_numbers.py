@@ -113,7 +113,7 @@ def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
         ("a", "gpca_pair", "seconds", 100): 0.01,
     }
     write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [-1], "seconds": [0.01]}))
-    with pytest.raises(InputError, match="'learning_seconds' holds numbers below 0"):
+    with pytest.raises(InputError, match="'learning_seconds' contains numbers below 0"):
         collect_costs([path])
 
 
@@ -124,7 +124,7 @@ def test_views_of_one_instance_are_one_object(files):
 def test_an_unknown_control_is_refused(tmp_path):
     path = tmp_path / "controls" / "a" / "seed100.csv"
     write_csv(path, said("a", "a", "gravity", "gpca", 3))
-    with pytest.raises(InputError, match="unknown control 'gravity'; known are density"):
+    with pytest.raises(InputError, match="unknown control 'gravity'; expected one of density"):
         read_controls([path])
     with pytest.raises(InputError, match="no files were given"):
         read_controls([])
@@ -162,8 +162,8 @@ def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"crop": 0.9}, r"'crop' holds 0.9, outside its bins from 0.2 to 0.6"),
-        ({"sample": 7}, "holds a sample twice"),
+        ({"crop": 0.9}, r"'crop' contains 0.9, outside its bins from 0.2 to 0.6"),
+        ({"sample": 7}, "contains a sample twice"),
         ({"sample": np.arange(30) + 1}, "lack test samples"),
     ],
 )

@@ -87,16 +87,18 @@ def test_shuffled_labels_say_nothing_of_the_concept(six):
 def test_what_a_source_does_not_admit_is_said(six, registrations):
     settings = ControlSettings(draw_points=(32, 64))
     assert left_out("unseen_objects", six, settings, "dgcnn") is None
-    assert left_out("unseen_objects", registrations, settings, "dgcnn") == "it needs 5 objects or more, there are 3"
+    assert (
+        left_out("unseen_objects", registrations, settings, "dgcnn") == "it needs at least 5 objects, but there are 3"
+    )
     assert left_out("density", six, settings, "dgcnn") is None
-    assert left_out("density", six, settings, "pointnet") == "backbone 'pointnet' takes clouds of one size only"
+    assert left_out("density", six, settings, "pointnet") == "backbone 'pointnet' accepts clouds of one size only"
     fewest = np.diff(six.offsets).min()
-    assert left_out("random_draws", six, settings, "pointnet") == "backbone 'pointnet' takes clouds of one size only"
+    assert left_out("random_draws", six, settings, "pointnet") == "backbone 'pointnet' accepts clouds of one size only"
     assert left_out("two_layer_head", six, settings, "pointnet") is None
-    words = f"its smallest draw has 200 points, and a cloud has {fewest}"
+    words = f"its smallest draw has 200 points, but a cloud has only {fewest}"
     assert left_out("density", six, replace(settings, draw_points=(200, 512)), "dgcnn") == words
 
 
 def test_a_range_that_runs_downwards_is_refused():
-    with pytest.raises(InputError, match=r"\[64, 32\] runs downwards"):
+    with pytest.raises(InputError, match=r"\[64, 32\] is in descending order"):
         ControlSettings.from_dict({"draw_points": [64, 32], "explainers": {}})

@@ -37,9 +37,9 @@ def test_a_file_is_read_as_it_was_written_and_only_for_its_own_samples(causes, d
     described[0].save(path)
     read = Descriptors.load(path, causes.registrations)
     assert all(np.array_equal(read.groups[name], described[0].groups[name]) for name in GROUPS)
-    with pytest.raises(InputError, match="holds other samples than the registrations"):
+    with pytest.raises(InputError, match="its samples differ from those of the registrations"):
         Descriptors.load(path, causes.registrations.subset(np.arange(5)))
     arrays = dict(np.load(path))
     np.savez(path, **arrays | {"motion": arrays["motion"] * np.nan})
-    with pytest.raises(InputError, match="array 'motion' holds NaN"):
+    with pytest.raises(InputError, match="array 'motion' contains NaN"):
         Descriptors.load(path, causes.registrations)

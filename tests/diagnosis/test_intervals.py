@@ -33,5 +33,5 @@ def test_a_run_is_collected_written_and_read(causes, tmp_path):
     assert (right["value"], right["rival"]) == (1.0, "always_pose")
     assert np.isnan(read[read["method"] == CEILING]["difference"]).all()
     (tmp_path / "intervals.csv").write_text((tmp_path / "intervals.csv").read_text().replace(",1.0,", ",one,", 1))
-    with pytest.raises(InputError, match="holds something that is not a finite number"):
+    with pytest.raises(InputError, match="contains values that are not finite numbers"):
         read_intervals(tmp_path / "intervals.csv")

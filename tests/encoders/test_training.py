@@ -126,7 +126,7 @@ def test_weights_survive_the_file_and_others_are_refused(tmp_path, unbroken):
 @pytest.mark.parametrize(
     ("changed", "expected"),
     [
-        ({"backbone": "dgcn"}, "backbone 'dgcn': unknown; known are .*dgcnn"),
+        ({"backbone": "dgcn"}, "backbone 'dgcn': unknown; choose one of .*dgcnn"),
         ({"options": {"neighbours": 8}}, "backbone 'dgcnn': .*neighbours"),
         ({"draw_points": 16, "options": {"k": 20}}, "cloud of 16 points: has no 20 neighbours"),
     ],

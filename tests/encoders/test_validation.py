@@ -79,5 +79,5 @@ def test_validation_says_the_loss_of_what_was_held_out(registrations):
 
 
 def test_patience_needs_samples_held_out():
-    with pytest.raises(InputError, match="'patience': needs samples held out; set validation_share above 0"):
+    with pytest.raises(InputError, match="'patience': needs held-out samples; set validation_share above 0"):
         EncoderSettings(patience=2)

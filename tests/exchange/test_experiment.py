@@ -171,7 +171,7 @@ def test_each_method_is_learnt_from_and_asked_about_and_a_failed_registration_co
 def test_what_a_design_other_than_additive_asks_cannot_be_exchanged():
     for name in ("shap_additive", "residuals_forest", "gpca_pair", "gpca"):
         require_exchangeable(name)
-    with pytest.raises(InputError, match=r"'shap_removal': reads design 'removal', of which estimators have no part"):
+    with pytest.raises(InputError, match=r"'shap_removal': reads design 'removal', which estimators do not provide"):
         require_exchangeable("shap_removal")
 
 

@@ -62,7 +62,7 @@ def test_methods_are_judged_by_what_was_learnt_from_and_over_all_others(path):
 
 def test_what_is_neither_is_refused(path):
     path.write_text(path.read_text().replace("estimator,", "encoder,", 1))
-    with pytest.raises(InputError, match="exchanges 'encoder'; known are method, estimator"):
+    with pytest.raises(InputError, match="exchanges 'encoder'; expected method or estimator"):
         collect([path])
     with pytest.raises(InputError, match="no files were given"):
         collect([])

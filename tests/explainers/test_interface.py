@@ -53,7 +53,7 @@ def test_every_entry_can_be_headed_and_fed():
 
 
 def test_an_unknown_explainer_is_refused_with_the_known_ones():
-    with pytest.raises(InputError, match=r"explainer 'shapley': unknown; known are .*gpca_paper, gpca"):
+    with pytest.raises(InputError, match=r"explainer 'shapley': unknown; choose one of .*gpca_paper, gpca"):
         explainer_entry("shapley")
 
 

@@ -74,7 +74,7 @@ def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, dama
     pixels[60, 40:70] = 255
     save(mask, pixels)
     instances, _ = read(damaged, tmp_path / "objects.npz")
-    assert f"left out: {mask}: has depth at" in (told := capsys.readouterr().err)
+    assert f"skipped: {mask}: has depth at" in (told := capsys.readouterr().err)
     assert "64 are needed" in told
     assert len(instances) == len(tiny[0]) - 1
     frame = next(frame for frame in read_frames([damaged]) if (frame.scene, frame.image) == (1, 0))
@@ -88,7 +88,7 @@ FAULTS = {
     "no colour": (lambda f: (f / SCENE / "rgb/000001.png").unlink(), "rgb/000001.png: no such image"),
     "no camera": (lambda f: (f / SCENE / "scene_camera.json").unlink(), "scene_camera.json: no such file"),
     "half unpacked": (lambda f: [p.unlink() for p in (f / SCENE / "depth").iterdir()], "may be half unpacked"),
-    "no scene": (lambda f: [p.unlink() for p in f.rglob("scene_gt.json")], "holds no test"),
+    "no scene": (lambda f: [p.unlink() for p in f.rglob("scene_gt.json")], "has no test"),
     "broken JSON": (lambda f: (f / SCENE / "scene_gt.json").write_text("{"), "scene_gt.json: is not a scene's JSON"),
     "camera of another image": (
         lambda f: edit(f / SCENE / "scene_camera.json", lambda c: c.pop("1")),
@@ -104,11 +104,11 @@ FAULTS = {
     ),
     "no measurement": (
         lambda f: save(f / SCENE / "depth/000000.png", np.zeros((120, 160), np.uint16)),
-        "depth/000000.png: holds no depth: every pixel is 0",
+        "depth/000000.png: has no depth: every pixel is 0",
     ),
     "colour for depth": (
         lambda f: save(f / SCENE / "depth/000000.png", np.ones((120, 160, 3), np.uint8)),
-        "is a colour image, not depth",
+        "is a color image, not depth",
     ),
     "truncated depth": (
         lambda f: (f / SCENE / "depth/000000.png").write_bytes((f / SCENE / "depth/000000.png").read_bytes()[:999]),
@@ -116,17 +116,17 @@ FAULTS = {
     ),
     "unknown object": (
         lambda f: edit(f / SCENE / "scene_gt.json", lambda g: g["0"][0].update(obj_id=77)),
-        "tiny: object 77: there is no model of it in",
+        "tiny: object 77: has no model in",
     ),
     "no rotation": (
         lambda f: edit(f / SCENE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0, -1])),
-        "scene_gt.json: image 0, object 1: the pose is no rigid transform",
+        "scene_gt.json: image 0, object 1: the pose is not a rigid transform",
     ),
     "eight numbers": (
         lambda f: edit(f / SCENE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0])),
         "image 0, object 1: cam_R_m2c has 8 numbers, not 9",
     ),
-    "no models": (lambda f: [p.unlink() for p in (f / "models").glob("*.ply")], "holds no models/obj_"),
+    "no models": (lambda f: [p.unlink() for p in (f / "models").glob("*.ply")], "has no models/obj_"),
 }
 
 
@@ -149,5 +149,5 @@ def test_models_and_frames_may_come_in_archives_of_their_own(scenes, tmp_path):
     assert [frame.depth.name for frame in apart.frames()] == [frame.depth.name for frame in whole.frames()]
     models = read_models(apart, apart.frames())
     assert models.keys() == read_models(whole, whole.frames()).keys()
-    with pytest.raises(InputError, match="holds no models/obj_"):
+    with pytest.raises(InputError, match="has no models/obj_"):
         read_models(Dataset("tiny", folders[1:]), apart.frames())

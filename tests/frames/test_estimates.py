@@ -45,7 +45,7 @@ def test_errors_are_those_of_the_object_or_of_others_without_symmetry():
 
     assert drawn(("a", 2)) == {0.2}
     assert drawn(("b", 7)) == {0.1, 0.3}
-    with pytest.raises(InputError, match="no estimator spoke of an object without symmetry"):
+    with pytest.raises(InputError, match="no estimator has a result for an object without symmetry"):
         PoseErrors(symmetric=()).draw(("a", 1), random)
 
 
@@ -66,10 +66,10 @@ def test_a_file_of_errors_is_read_in_metres_and_of_known_objects(tmp_path):
 @pytest.mark.parametrize(
     ("row", "expected"),
     [
-        ("48,1,1.5,x,0,0,0,0,0,0", "'obj_id' holds something that is no whole number"),
-        ("48,1,1,x,0,0,180,0,0,0", "holds a rotation beyond half a turn; give rotation vectors in radians"),
-        ("48,1,1,x,0,0,0,0,0,1e9", "holds an error of more than 10 m; give translations in millimetres"),
-        ("48,1,1,x,0,nan,0,0,0,0", "column 'ry' holds something that is not a finite number"),
+        ("48,1,1.5,x,0,0,0,0,0,0", "'obj_id' contains values that are not whole numbers"),
+        ("48,1,1,x,0,0,180,0,0,0", "contains a rotation of more than half a turn; give rotation vectors in radians"),
+        ("48,1,1,x,0,0,0,0,0,1e9", "contains an error of more than 10 m; give translations in millimeters"),
+        ("48,1,1,x,0,nan,0,0,0,0", "column 'ry' contains values that are not finite numbers"),
     ],
 )
 def test_a_faulty_file_of_errors_is_refused(tmp_path, row, expected):

@@ -9,7 +9,7 @@ from ..hostile import refusal
 
 SETTINGS = {
     "no room": ({"gap_m": 1.0, "objects": [8, 8]}, "there is no room for 8 objects 1.0 m apart"),
-    "downwards": ({"objects": [5, 2]}, "scenes objects: [5, 2] runs downwards"),
+    "downwards": ({"objects": [5, 2]}, "scenes objects: [5, 2] is in descending order"),
     "a family that is none": ({"families": ["spoons"]}, "family 'spoons': no such procedural family"),
     "no family": ({"families": []}, "families"),
     "no scene": ({"count": 0}, "count"),
@@ -33,7 +33,11 @@ def test_scenes_replace_nothing_but_scenes(tmp_path):
     (tmp_path / "home").mkdir()
     (tmp_path / "home/thesis.tex").write_text("five years")
     (tmp_path / "file").write_text("x")
-    for out, words in (("home", "did not make"), (".", "did not make"), ("file", "no folder")):
+    for out, words in (
+        ("home", "was not made by this step"),
+        (".", "was not made by this step"),
+        ("file", "is not a folder"),
+    ):
         refusal(["scenes", "--source", "tiny", "--out", out], tmp_path, out, words, "another")
 
 

@@ -48,28 +48,28 @@ IMAGES = {
     "depth of a palette": (
         DEPTH, lambda p: Image.fromarray(COLOURS).quantize(16).save(p), "is 8-bit depth: 16 bits expected"
     ),
-    "depth of colours": (DEPTH, lambda p: save(p, COLOURS), "is a colour image, not depth"),
-    "depth with opacity": (DEPTH, lambda p: Image.new("LA", SHAPE[::-1]).save(p), "is a colour image, not depth"),
+    "depth of colours": (DEPTH, lambda p: save(p, COLOURS), "is a color image, not depth"),
+    "depth with opacity": (DEPTH, lambda p: Image.new("LA", SHAPE[::-1]).save(p), "is a color image, not depth"),
     "depth as JPEG": (DEPTH, lambda p: Image.fromarray(COLOURS[..., 0]).save(p, "JPEG"), "is 8-bit depth"),
-    "no depth anywhere": (DEPTH, lambda p: save(p, 0 * FLAT), "holds no depth: every pixel is 0"),
-    "NaN depth": (DEPTH, as_tiff(np.full(SHAPE, np.nan, np.float32)), "holds no depth: every pixel is 0"),
-    "negative depth": (DEPTH, as_tiff(np.full(SHAPE, -0.7, np.float32)), "holds negative or infinite depth"),
-    "infinite depth": (DEPTH, as_tiff(np.full(SHAPE, np.inf, np.float32)), "holds negative or infinite depth"),
-    "depth cut": (DEPTH, halves, "is truncated or no readable image"),
-    "depth empty": (DEPTH, lambda p: p.write_bytes(b""), "is truncated or no readable image"),
-    "depth a flipped byte": (DEPTH, flipped, "is truncated or no readable image"),
-    "depth a script": (DEPTH, postscript, "is truncated or no readable image"),
-    "depth a GIF": (DEPTH, lambda p: Image.fromarray(COLOURS).save(p, "GIF"), "is truncated or no readable image"),
+    "no depth anywhere": (DEPTH, lambda p: save(p, 0 * FLAT), "has no depth: every pixel is 0"),
+    "NaN depth": (DEPTH, as_tiff(np.full(SHAPE, np.nan, np.float32)), "has no depth: every pixel is 0"),
+    "negative depth": (DEPTH, as_tiff(np.full(SHAPE, -0.7, np.float32)), "contains negative or infinite depth"),
+    "infinite depth": (DEPTH, as_tiff(np.full(SHAPE, np.inf, np.float32)), "contains negative or infinite depth"),
+    "depth cut": (DEPTH, halves, "is truncated or not a readable image"),
+    "depth empty": (DEPTH, lambda p: p.write_bytes(b""), "is truncated or not a readable image"),
+    "depth a flipped byte": (DEPTH, flipped, "is truncated or not a readable image"),
+    "depth a script": (DEPTH, postscript, "is truncated or not a readable image"),
+    "depth a GIF": (DEPTH, lambda p: Image.fromarray(COLOURS).save(p, "GIF"), "is truncated or not a readable image"),
     "depth a bomb": (DEPTH, bomb(8500), "too many for a frame"),
     "depth turned": (DEPTH, lambda p: save(p, FLAT.T), "is 160×120 but depth is 120×160"),
     "mask small": (MASK, lambda p: save(p, np.full((60, 80), 255, np.uint8)), "is 80×60 but depth is 160×120"),
     "depth a larger bomb": (DEPTH, bomb(9500), "too many for a frame"),
     "mask a bomb": (MASK, bomb(13_500, "L"), "too many for a frame"),
-    "mask cut": (MASK, halves, "is truncated or no readable image"),
-    "mask of text": (MASK, lambda p: p.write_text("255"), "is truncated or no readable image"),
-    "mask a picture": (MASK, lambda p: save(p, COLOURS), "is no mask: most of its pixels differ"),
-    "mask of depth": (MASK, lambda p: save(p, np.arange(19200, dtype=np.uint16).reshape(SHAPE)), "is no mask"),
-    "mask everywhere": (MASK, lambda p: save(p, np.full(SHAPE, 255, np.uint8)), "lie", "check its pose, its mask"),
+    "mask cut": (MASK, halves, "is truncated or not a readable image"),
+    "mask of text": (MASK, lambda p: p.write_text("255"), "is truncated or not a readable image"),
+    "mask a picture": (MASK, lambda p: save(p, COLOURS), "is not a mask: most of its pixel values differ"),
+    "mask of depth": (MASK, lambda p: save(p, np.arange(19200, dtype=np.uint16).reshape(SHAPE)), "is not a mask"),
+    "mask everywhere": (MASK, lambda p: save(p, np.full(SHAPE, 255, np.uint8)), "lie", "check its pose, mask"),
 }  # fmt: skip
 
 
@@ -84,7 +84,9 @@ def test_an_image_that_is_none(damaged, name):
 def test_a_dataset_whose_masks_are_all_empty(damaged):
     for path in damaged.rglob("mask_visib/*.png"):
         save(path, np.zeros(SHAPE, np.uint8))
-    refusal(instances(), damaged.parent, "no object of any frame is left; the first:", "has depth at 0 pixel(s)")
+    refusal(
+        instances(), damaged.parent, "no object is left in any frame; the first skipped:", "has depth at 0 pixel(s)"
+    )
 
 
 def of_one(change):
@@ -162,26 +164,38 @@ def other_image(folder):
         shutil.copy(path, path.with_name(path.name.replace("000001_", "000000_")))
 
 
-METRES, CENTIMETRES = "cam_t_m2c in metres? the format wants millimetres", "cam_t_m2c in centimetres?"
+METRES, CENTIMETRES = "is cam_t_m2c in meters? the format requires millimeters", "is cam_t_m2c in centimeters?"
 PLACES = {
     "t in metres": (of_all(scaled(1e-3)), METRES),
     "one t in metres": (of_one(scaled(1e-3)), METRES),
     "t in centimetres": (of_all(scaled(0.1)), CENTIMETRES),
-    "one t in micrometres": (of_one(scaled(1e3)), "cam_t_m2c in micrometres?"),
-    "one t of zeros": (of_one(scaled(0)), "check its pose, its mask, cam_K and depth_scale"),
+    "one t in micrometres": (of_one(scaled(1e3)), "is cam_t_m2c in micrometers?"),
+    "one t of zeros": (of_one(scaled(0)), "check its pose, mask, cam_K and depth_scale"),
     "one t mirrored": (of_one(scaled(-1)), ""),
     "one t beside": (of_one(moved), "check its pose"),
-    "R by columns": (of_all(turned), "cam_R_m2c column by column? the format wants rows"),
-    "OpenGL": (of_all(to_opengl), "OpenGL's camera axes?"),
-    "camera to model": (of_all(inverted), "a pose from camera to model?"),
-    "half the scale": (with_camera(depth_scale(0.5)), "depth_scale? the depth fits where it is 2 times as large"),
-    "twice the scale": (with_camera(depth_scale(2)), "depth_scale? the depth fits where it is 0.5 times as large"),
-    "tenfold scale": (with_camera(depth_scale(10)), "depth_scale? the depth fits where it is 0.1 times as large"),
-    "scale in metres": (with_camera(depth_scale(1e-3)), "depth_scale? the depth fits where it is 1000 times as large"),
-    "no centre": (with_camera(corner), "check its pose, its mask, cam_K"),
-    "centre outside": (with_camera(outside), "check its pose, its mask, cam_K"),
-    "too long a lens": (with_camera(long), "check its pose, its mask, cam_K"),
-    "images mirrored": (flip, "a mirrored image?"),
+    "R by columns": (of_all(turned), "is cam_R_m2c listed by columns? the format requires rows"),
+    "OpenGL": (of_all(to_opengl), "camera axes OpenGL's?"),
+    "camera to model": (of_all(inverted), "is the pose from camera to model?"),
+    "half the scale": (
+        with_camera(depth_scale(0.5)),
+        "is depth_scale wrong? the depth fits when it is 2 times as large",
+    ),
+    "twice the scale": (
+        with_camera(depth_scale(2)),
+        "is depth_scale wrong? the depth fits when it is 0.5 times as large",
+    ),
+    "tenfold scale": (
+        with_camera(depth_scale(10)),
+        "is depth_scale wrong? the depth fits when it is 0.1 times as large",
+    ),
+    "scale in metres": (
+        with_camera(depth_scale(1e-3)),
+        "is depth_scale wrong? the depth fits when it is 1000 times as large",
+    ),
+    "no centre": (with_camera(corner), "check its pose, mask, cam_K"),
+    "centre outside": (with_camera(outside), "check its pose, mask, cam_K"),
+    "too long a lens": (with_camera(long), "check its pose, mask, cam_K"),
+    "images mirrored": (flip, "is the image mirrored?"),
     "another image": (other_image, ""),
 }
 

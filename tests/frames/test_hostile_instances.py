@@ -42,10 +42,10 @@ def put(value, *where):
 
 
 ARRAYS = {
-    "an object that is not there": ("object_index", put(99, 0), "objects that the file of objects does not hold"),
-    "a negative object": ("object_index", put(-1, 0), "objects that the file of objects does not hold"),
-    "objects as fractions": ("object_index", lambda a: a + 0.5, "array 'object_index' is of type float64"),
-    "objects as words": ("object_index", lambda a: a.astype(str), "array 'object_index' is of type <U"),
+    "an object that is not there": ("object_index", put(99, 0), "objects that the object file does not contain"),
+    "a negative object": ("object_index", put(-1, 0), "objects that the object file does not contain"),
+    "objects as fractions": ("object_index", lambda a: a + 0.5, "array 'object_index' has type float64"),
+    "objects as words": ("object_index", lambda a: a.astype(str), "array 'object_index' has type <U"),
     "poses in millimetres": (
         "T_camera_object_true",
         lambda a: a * ([[1e0, 1, 1, 1e3]] * 3 + [[1] * 4]),
@@ -54,22 +54,26 @@ ARRAYS = {
     "poses of zeros": (
         "T_camera_object_true",
         lambda a: 0 * a,
-        "instance 0, T_camera_object_true: the pose is no rigid",
+        "instance 0, T_camera_object_true: the pose is not a rigid",
     ),
-    "poses mirrored": ("T_camera_object_init", lambda a: a * [[[-1, 1, 1, 1]]], "it is mirrored, of determinant -1"),
-    "a pose of NaN": ("T_camera_object_init", put(np.nan, 3, 0, 0), "'T_camera_object_init' holds NaN"),
-    "a pose of another last row": ("T_camera_object_init", put(5, 2, 3, 0), "its last row has to be 0 0 0 1"),
-    "complex poses": ("T_camera_object_true", lambda a: a + 0j, "is of type complex128"),
+    "poses mirrored": (
+        "T_camera_object_init",
+        lambda a: a * [[[-1, 1, 1, 1]]],
+        "it is mirrored: its determinant is -1",
+    ),
+    "a pose of NaN": ("T_camera_object_init", put(np.nan, 3, 0, 0), "'T_camera_object_init' contains NaN"),
+    "a pose of another last row": ("T_camera_object_init", put(5, 2, 3, 0), "its last row must be 0 0 0 1"),
+    "complex poses": ("T_camera_object_true", lambda a: a + 0j, "has type complex128"),
     "a focal length below zero": ("camera_3_3", put(-5, 1, 0, 0), "instance 1, camera_3_3: has the focal lengths -5"),
     "points in millimetres": ("points_m", lambda a: 1000 * a, "was measured"),
     "points all equal": ("points_m", lambda a: 0 * a, "was measured"),
-    "points of infinity": ("points_m", put(np.inf, 0, 0), "'points_m' holds NaN or infinity"),
+    "points of infinity": ("points_m", put(np.inf, 0, 0), "'points_m' contains NaN or infinity"),
     "fewer pixels than points": ("pixels", lambda a: a[:-1], "array 'pixels' is"),
-    "negative pixels": ("pixels", put(-1, 0, 0), "'pixels' lie outside of any image"),
-    "pixels that would fill the memory": ("pixels", put(2**31 - 1, 0), "'pixels' lie outside of any image"),
+    "negative pixels": ("pixels", put(-1, 0, 0), "'pixels' lie outside any image"),
+    "pixels that would fill the memory": ("pixels", put(2**31 - 1, 0), "'pixels' lie outside any image"),
     "offsets backwards": ("offsets", lambda a: a[::-1], "'offsets' do not match"),
-    "one scene": ("scene", lambda a: 0 * a, "all are of one scene"),
-    "symmetry as words": ("symmetric", lambda a: a.astype(str), "array 'symmetric' is of type <U"),
+    "one scene": ("scene", lambda a: 0 * a, "all are from one scene"),
+    "symmetry as words": ("symmetric", lambda a: a.astype(str), "array 'symmetric' has type <U"),
 }
 
 
@@ -84,7 +88,7 @@ def test_instances_that_cannot_be(tiny, folder, name):
 @pytest.mark.parametrize("content", [b"", b"PK", b"scene,image\n1,2\n"])
 def test_a_file_that_holds_no_instances(folder, content):
     (folder / "instances.npz").write_bytes(content)
-    refusal(CALL, folder, "instances.npz: is not a readable npz archive; make it anew")
+    refusal(CALL, folder, "instances.npz: is not a readable npz archive; regenerate it")
 
 
 def test_no_file_of_instances(folder):
@@ -94,4 +98,4 @@ def test_no_file_of_instances(folder):
 def test_instances_beside_the_objects_of_another_source(tiny, objects, folder):
     tiny[0].save(folder / "instances.npz")
     objects.save(folder / "objects.npz", "other")
-    refusal(CALL, folder, "instances.npz", "make both files anew")
+    refusal(CALL, folder, "instances.npz", "regenerate both files")

@@ -9,7 +9,7 @@ import pytest
 from ..hostile import refusal
 from .damage import CAMERA, SCENE, TRUTH, edit, instances
 
-NOT_FINITE = "holds a number that is not finite"
+NOT_FINITE = "contains a number that is not finite"
 ROTATION = [1, 0, 0, 0, 1, 0, 0, 0, 1]
 
 
@@ -23,30 +23,30 @@ CAMERAS = {
     "both negative": ("cam_K", camera_values(-150, y=-150), "focal lengths -150 and -150 px"),
     "tiny focal length": ("cam_K", camera_values(1e-200), "focal lengths 1e-200 and 150 px"),
     "huge focal length": ("cam_K", camera_values(1e200), "focal lengths 1e+200 and 150 px"),
-    "NaN": ("cam_K", camera_values(math.nan), "NaN is no number"),
-    "infinity": ("cam_K", camera_values(u=-math.inf), "-Infinity is no number"),
+    "NaN": ("cam_K", camera_values(math.nan), "NaN is not a number"),
+    "infinity": ("cam_K", camera_values(u=-math.inf), "-Infinity is not a number"),
     "an integer without end": ("cam_K", camera_values(10**400), NOT_FINITE),
-    "columns": ("cam_K", [150, 0, 0, 0, 150, 0, 79.5, 59.5, 1], "is no matrix of a camera; give fx s cx"),
-    "homogeneous zero": ("cam_K", camera_values(last=(0, 0, 0)), "is no matrix of a camera"),
-    "rotated": ("cam_K", camera_values(below=3.0), "is no matrix of a camera"),
-    "principal point on the moon": ("cam_K", camera_values(u=1e9), "principal point beyond any image"),
+    "columns": ("cam_K", [150, 0, 0, 0, 150, 0, 79.5, 59.5, 1], "is not a camera matrix; give fx s cx"),
+    "homogeneous zero": ("cam_K", camera_values(last=(0, 0, 0)), "is not a camera matrix"),
+    "rotated": ("cam_K", camera_values(below=3.0), "is not a camera matrix"),
+    "principal point on the moon": ("cam_K", camera_values(u=1e9), "principal point outside any image"),
     "eight numbers": ("cam_K", camera_values()[:8], "cam_K has 8 numbers, not 9"),
     "ten numbers": ("cam_K", [*camera_values(), 0], "cam_K has 10 numbers, not 9"),
     "a number for a list": ("cam_K", 150.0, "cam_K has 1 numbers, not 9"),
-    "words": ("cam_K", "150 0 79.5 0 150 59.5 0 0 1", "which is no number"),
-    "numbers as words": ("cam_K", ["150", *camera_values()[1:]], "cam_K holds '150', which is no number"),
-    "booleans": ("cam_K", [*camera_values()[:8], True], "cam_K holds True, which is no number"),
-    "null": ("cam_K", None, "cam_K holds None, which is no number"),
-    "lists in lists": ("cam_K", [[[150]], *camera_values()[1:]], "which is no number"),
-    "a map": ("cam_K", {"fx": 150}, "which is no number"),
+    "words": ("cam_K", "150 0 79.5 0 150 59.5 0 0 1", "which is not a number"),
+    "numbers as words": ("cam_K", ["150", *camera_values()[1:]], "cam_K contains '150', which is not a number"),
+    "booleans": ("cam_K", [*camera_values()[:8], True], "cam_K contains True, which is not a number"),
+    "null": ("cam_K", None, "cam_K contains None, which is not a number"),
+    "lists in lists": ("cam_K", [[[150]], *camera_values()[1:]], "which is not a number"),
+    "a map": ("cam_K", {"fx": 150}, "which is not a number"),
     "scale zero": ("depth_scale", 0, "depth_scale is 0"),
     "scale negative": ("depth_scale", -0.1, "depth_scale is -0.1"),
-    "scale NaN": ("depth_scale", math.nan, "NaN is no number"),
-    "scale infinite": ("depth_scale", math.inf, "Infinity is no number"),
+    "scale NaN": ("depth_scale", math.nan, "NaN is not a number"),
+    "scale infinite": ("depth_scale", math.inf, "Infinity is not a number"),
     "scale huge": ("depth_scale", 1e30, "depth_scale is 1e+30"),
-    "scale a word": ("depth_scale", "0.1", "depth_scale holds '0.1', which is no number"),
-    "scale true": ("depth_scale", True, "depth_scale holds True, which is no number"),
-    "scale a list": ("depth_scale", [0.1], "depth_scale holds [0.1], which is no number"),
+    "scale a word": ("depth_scale", "0.1", "depth_scale contains '0.1', which is not a number"),
+    "scale true": ("depth_scale", True, "depth_scale contains True, which is not a number"),
+    "scale a list": ("depth_scale", [0.1], "depth_scale contains [0.1], which is not a number"),
 }
 
 
@@ -58,27 +58,27 @@ def test_a_camera_that_cannot_be(damaged, name):
 
 
 POSES = {
-    "R of NaN": ("cam_R_m2c", [math.nan] * 9, "NaN is no number"),
-    "R of zeros": ("cam_R_m2c", [0] * 9, "not at right angles, or not of length 1"),
-    "R of huge numbers": ("cam_R_m2c", [1e200] * 9, "not at right angles, or not of length 1"),
-    "R scaled": ("cam_R_m2c", [1.01, 0, 0, 0, 1.01, 0, 0, 0, 1.01], "not at right angles, or not of length 1"),
-    "R sheared": ("cam_R_m2c", [1, 0.1, 0, 0, 1, 0, 0, 0, 1], "not at right angles"),
-    "R mirrored": ("cam_R_m2c", [-1, 0, 0, 0, 1, 0, 0, 0, 1], "it is mirrored, of determinant -1"),
+    "R of NaN": ("cam_R_m2c", [math.nan] * 9, "NaN is not a number"),
+    "R of zeros": ("cam_R_m2c", [0] * 9, "not orthogonal or not of unit length"),
+    "R of huge numbers": ("cam_R_m2c", [1e200] * 9, "not orthogonal or not of unit length"),
+    "R scaled": ("cam_R_m2c", [1.01, 0, 0, 0, 1.01, 0, 0, 0, 1.01], "not orthogonal or not of unit length"),
+    "R sheared": ("cam_R_m2c", [1, 0.1, 0, 0, 1, 0, 0, 0, 1], "not orthogonal"),
+    "R mirrored": ("cam_R_m2c", [-1, 0, 0, 0, 1, 0, 0, 0, 1], "it is mirrored: its determinant is -1"),
     "R a quaternion": ("cam_R_m2c", [0, 0, 0, 1], "cam_R_m2c has 4 numbers, not 9"),
-    "R of words": ("cam_R_m2c", ["x"] * 9, "cam_R_m2c holds 'x', which is no number"),
-    "R of booleans": ("cam_R_m2c", [True, *ROTATION[1:]], "cam_R_m2c holds True"),
-    "t of NaN": ("cam_t_m2c", [0, 0, math.nan], "NaN is no number"),
+    "R of words": ("cam_R_m2c", ["x"] * 9, "cam_R_m2c contains 'x', which is not a number"),
+    "R of booleans": ("cam_R_m2c", [True, *ROTATION[1:]], "cam_R_m2c contains True"),
+    "t of NaN": ("cam_t_m2c", [0, 0, math.nan], "NaN is not a number"),
     "t beyond floats": ("cam_t_m2c", [0, 0, 10**400], NOT_FINITE),
     "t beyond sight": ("cam_t_m2c", [0, 0, 1e12], "cam_t_m2c is 1e+12 mm"),
     "t of two": ("cam_t_m2c", [0, 700], "cam_t_m2c has 2 numbers, not 3"),
     "t homogeneous": ("cam_t_m2c", [0, 0, 700, 1], "cam_t_m2c has 4 numbers, not 3"),
-    "t null": ("cam_t_m2c", None, "cam_t_m2c holds None"),
+    "t null": ("cam_t_m2c", None, "cam_t_m2c contains None"),
     "id negative": ("obj_id", -1, "obj_id is -1"),
     "id a fraction": ("obj_id", 1.5, "obj_id is 1.5"),
     "id huge": ("obj_id", 10**30, "obj_id is 1e+30"),
-    "id true": ("obj_id", True, "obj_id holds True"),
-    "id a name": ("obj_id", "brick", "obj_id holds 'brick'"),
-    "id a way out": ("obj_id", "../../1", "obj_id holds '../../1'"),
+    "id true": ("obj_id", True, "obj_id contains True"),
+    "id a name": ("obj_id", "brick", "obj_id contains 'brick'"),
+    "id a way out": ("obj_id", "../../1", "obj_id contains '../../1'"),
 }
 
 
@@ -92,12 +92,12 @@ def test_an_annotation_that_cannot_be(damaged, name):
 
 def test_an_object_without_a_model(damaged):
     edit(damaged.parent / TRUTH, lambda truth: truth["0"][1].update(obj_id=77))
-    refusal(instances(), damaged.parent, "object 77", "there is no model of it", "fetch the models anew")
+    refusal(instances(), damaged.parent, "object 77", "has no model in", "fetch the models again")
 
 
 TRUTHS = {
-    "a list": ("[]", "holds no object at the top"),
-    "a number": ("1", "holds no object at the top"),
+    "a list": ("[]", "its top level is not an object"),
+    "a number": ("1", "its top level is not an object"),
     "nothing": ("", "is not a scene's JSON file"),
     "half": ('{"0": [{"obj_id": 1', "is not a scene's JSON file"),
     "no UTF-8": (b'{"\xff": []}', "is not a scene's JSON file ('utf-8' codec"),
@@ -105,18 +105,18 @@ TRUTHS = {
     "deep lists": ('{"0": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
     "deep maps": ('{"0": ' * 100_000 + "1" + "}" * 100_000, "nested too deep"),
     "many digits": ('{"0": ' + "9" * 5000 + "}", "is not a scene's JSON file"),
-    "an image twice": ('{"0": [], "0": []}', "key '0' stands twice"),
+    "an image twice": ('{"0": [], "0": []}', "key '0' appears twice"),
     "an image twice in other words": ('{"0": [], "00": []}', "image 0 occurs twice"),
-    "a negative image": ('{"-1": []}', "its key '-1' is no number of an image"),
-    "an image with an underline": ('{"1_0": []}', "its key '1_0' is no number"),
-    "an image in other digits": ('{"١": []}', "is no number of an image"),
-    "a path for an image": ('{"../0": []}', "its key '../0' is no number"),
+    "a negative image": ('{"-1": []}', "its key '-1' is not an image number"),
+    "an image with an underline": ('{"1_0": []}', "its key '1_0' is not an image number"),
+    "an image in other digits": ('{"١": []}', "is not an image number"),
+    "a path for an image": ('{"../0": []}', "its key '../0' is not an image number"),
     "a map of objects": ('{"0": {"1": 2}}', "image 0 has no list of objects"),
     "null": ('{"0": null}', "image 0 has no list of objects"),
     "a word for an object": ('{"0": ["obj_id"]}', "image 0, object 0: has no cam_R_m2c"),
     "an object of nothing": ('{"0": [{}]}', "image 0, object 0: has no cam_R_m2c"),
     "an image that is not there": ('{"7": []}', "has no image 7"),
-    "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' stands twice"),
+    "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' appears twice"),
 }
 
 
@@ -180,11 +180,11 @@ def twice(folder):
 
 
 FOLDERS = {
-    "scenes without images": (empty, "names no image"),
-    "images without objects": (without_objects, "name no object in any frame"),
-    "a scene with a name": (named, "test/first: the name of a scene's folder is no number"),
-    "a scene in two folders": (twice, "are one image of one scene; set split"),
-    "no scenes": (lambda folder: (folder / "test").rename(folder / "train"), "holds no test*/<scene>/scene_gt.json"),
+    "scenes without images": (empty, "lists no image"),
+    "images without objects": (without_objects, "list no object in any frame"),
+    "a scene with a name": (named, "test/first: the name of a scene's folder is not a number"),
+    "a scene in two folders": (twice, "are the same image of the same scene; set split"),
+    "no scenes": (lambda folder: (folder / "test").rename(folder / "train"), "has no test*/<scene>/scene_gt.json"),
 }
 
 
@@ -197,7 +197,7 @@ def test_a_folder_that_is_no_dataset(damaged, name):
 
 @pytest.mark.parametrize("location", ["nowhere", "tiny/models/models_info.json", "tiny/models"])
 def test_a_location_without_scenes(damaged, location):
-    refusal(instances(scenes=location), damaged.parent, f"{location}: holds no test*/<scene>/scene_gt.json")
+    refusal(instances(scenes=location), damaged.parent, f"{location}: has no test*/<scene>/scene_gt.json")
 
 
 def test_what_a_real_dataset_may_have_is_no_fault(scenes, tmp_path):

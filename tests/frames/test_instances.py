@@ -38,7 +38,7 @@ def test_both_splits_have_frames_whatever_the_share(tiny, share):
 
 def test_frames_of_one_scene_cannot_be_split(tiny):
     alike = changed_columns(tiny[0], {"scene": np.zeros(len(tiny[0]), int)})
-    with pytest.raises(InputError, match="all are of one scene"):
+    with pytest.raises(InputError, match="all are from one scene"):
         alike.split("tiny", 0, 0.4)
 
 
@@ -54,7 +54,7 @@ def test_instances_survive_their_file(tiny, tmp_path):
     ("spoilt", "expected"),
     [
         ({"offsets": lambda a: a[:-1]}, "'offsets' do not match"),
-        ({"points_m": lambda a: np.full_like(a, np.nan)}, "'points_m' holds NaN"),
+        ({"points_m": lambda a: np.full_like(a, np.nan)}, "'points_m' contains NaN"),
         ({"T_camera_object_init": lambda a: a[:, :3]}, "'T_camera_object_init' is"),
         ({"colour": None}, "'colour' is missing"),
     ],

@@ -52,9 +52,9 @@ def test_seen_unseen_and_datasets_are_judged_apart(tmp_path):
 
 def test_files_that_do_not_belong_together_are_refused(tmp_path):
     said = predictions(tmp_path, REAL_WORLD)
-    with pytest.raises(InputError, match="has no file of poses beside it"):
+    with pytest.raises(InputError, match="has no pose file beside it"):
         collect([said], [poses(tmp_path, source="other")])
     with pytest.raises(InputError, match="lacks samples of"):
         collect([said], [poses(tmp_path, sample=[0, 1, 2, 7])])
-    with pytest.raises(InputError, match="'in_training' holds something other than True and False"):
+    with pytest.raises(InputError, match="'in_training' contains values other than True and False"):
         collect([said], [poses(tmp_path, in_training="perhaps")])

@@ -35,20 +35,20 @@ FAULTS = {
     "no column R": ((f"1,0,3,0.2,{ONE}",), "scene_id,im_id,obj_id,score,t\n", "column 'R' is missing"),
     "eight entries": (("1,0,3,0.2,1 0 0 0 1 0 0 0,1 2 3,-1",), HEAD, "line 2: R has 8 entries, not 9"),
     "two entries": ((f"1,0,3,0.2,{ONE},1 2,-1",), HEAD, "line 2: t has 2 entries, not 3"),
-    "words": ((f"1,0,3,0.2,{ONE},1 2 x,-1",), HEAD, "t holds something other than finite numbers"),
+    "words": ((f"1,0,3,0.2,{ONE},1 2 x,-1",), HEAD, "t contains values that are not finite numbers"),
     "a mirror": (
         ("1,0,3,0.2,1 0 0 0 1 0 0 0 -1,1 2 900,-1",),
         HEAD,
-        "line 2: the pose is no rigid transform: it is mirrored",
+        "line 2: the pose is not a rigid transform: it is mirrored",
     ),
-    "NaN": ((f"1,0,3,0.2,{ONE},1 2 nan,-1",), HEAD, "t holds something other than finite"),
+    "NaN": ((f"1,0,3,0.2,{ONE},1 2 nan,-1",), HEAD, "t contains values other than finite"),
     "an image that is not there": (
         (f"1,0,3,1,{ONE},1 2 800,1", f"1,8,3,1,{ONE},1 2 800,1"),
         HEAD,
         "line 3: the dataset has no image 8",
     ),
-    "no number": ((f"1,0,cup,1,{ONE},1 2 3,1",), HEAD, "line 2: obj_id is 'cup', no whole number"),
-    "no rows": ((), HEAD, "holds no rows"),
+    "no number": ((f"1,0,cup,1,{ONE},1 2 3,1",), HEAD, "line 2: obj_id is 'cup', not a whole number"),
+    "no rows": ((), HEAD, "has no rows"),
 }
 
 

@@ -75,6 +75,6 @@ def test_models_list_what_leaves_their_shape_as_it_is(scenes):
 
 
 def test_ranges_that_run_downwards_are_refused():
-    with pytest.raises(InputError, match=r"distance_m: \[0.9, 0.5\] runs downwards"):
+    with pytest.raises(InputError, match=r"distance_m: \[0.9, 0.5\] is in descending order"):
         SceneSettings.from_dict({"distance_m": [0.9, 0.5]})
     assert SceneSettings.from_dict({"noise": {"scale": 0.0, "dropout": 0.0}}).noise == PERFECT

@@ -99,7 +99,7 @@ def test_no_room_for_a_cause_and_ranges_that_run_downwards_are_refused(shelf):
     crowded = SituationSettings(scenes=scene_settings(objects=(5, 5)))  # the whole shelf is on the table
     with pytest.raises(InputError, match="no room for cause 'overlap'"):
         Situations(shelf, crowded, ("tiny", 0, "test")).draw("overlap", 0)
-    with pytest.raises(InputError, match=r"hidden: \[0.9, 0.5\] runs downwards"):
+    with pytest.raises(InputError, match=r"hidden: \[0.9, 0.5\] is in descending order"):
         SituationSettings(hidden=(0.9, 0.5))
     with pytest.raises(InputError, match="cause 'fog': unknown"):
         Situations(shelf, SETTINGS, ("tiny", 0, "test")).draw("fog", 0)

@@ -78,7 +78,7 @@ def test_scenes_are_drawn_by_a_command(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("given", "expected"),
     [
-        ({"datasets": {"tiny": {"location": "/nowhere/at/all"}}}, "/nowhere/at/all is not there"),
+        ({"datasets": {"tiny": {"location": "/nowhere/at/all"}}}, "/nowhere/at/all does not exist"),
         ({"datasets": {"tiny": {"location": "/", "results": "/lost.csv"}}}, "/lost.csv: no such results file; correct"),
         ({"datasets": {"tiny": {"place": "x"}}}, "setting datasets.tiny.place: unknown"),
         ({"initial_pose": {"form": "guess"}}, "setting initial_pose.form: 'guess' is not one of"),

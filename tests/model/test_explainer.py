@@ -79,7 +79,7 @@ def test_the_initial_pose_is_where_icp_starts(explainer, pair):
     assert not here.notes
     lost = explainer.explain(source + 5, target)
     assert lost.fitness == 0
-    assert "no source point is near the target at the initial pose, so the scores mean nothing" in lost.warnings
+    assert "no source point is near the target at the initial pose, so the scores are meaningless" in lost.warnings
 
 
 def test_more_points_than_in_the_training_are_left_out_and_said_so(explainer, pair):
@@ -100,7 +100,7 @@ def test_many_are_explained_as_one_by_one_and_a_fault_names_its_pair(explainer, 
     ):
         assert many.scores == one.scores
         np.testing.assert_array_equal(many.T_target_source, one.T_target_source)
-    with pytest.raises(InputError, match="pair 1: source: holds 10 points"):
+    with pytest.raises(InputError, match="pair 1: source: has 10 points"):
         list(explainer.explain_many([(source, target), (source[:10], target)], diagnose=False))
 
 
@@ -111,16 +111,16 @@ def changed(**changes):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda s, t: changed(source_points=s[:10])(s, t), "source: holds 10 points; give 64"),
-        (lambda s, t: changed(target_points=t[:10])(s, t), "target: holds 10 points"),
-        (lambda s, t: changed(source_points=s * np.nan)(s, t), "source: .*hold NaN"),
+        (lambda s, t: changed(source_points=s[:10])(s, t), "source: has 10 points; give 64"),
+        (lambda s, t: changed(target_points=t[:10])(s, t), "target: has 10 points"),
+        (lambda s, t: changed(source_points=s * np.nan)(s, t), "source: .*contain NaN"),
         (lambda s, t: changed(source_points=s[:, :2])(s, t), "source: has no points"),
         (lambda s, t: changed(source_points=10 * s)(s, t), "source: is .* times as large as the target; give both"),
         (lambda s, t: changed(source_points=s / 10)(s, t), "source: is 0.* times as large as the target"),
         (changed(unit="mm"), "target: its diameter is"),
         (changed(unit="feet"), "unit 'feet'"),
-        (changed(T_target_source_init=2 * np.eye(4)), "initial pose: the pose is no rigid transform"),
-        (changed(T_target_source_init=np.eye(3)), r"initial pose: the pose is of shape \(3, 3\)"),
+        (changed(T_target_source_init=2 * np.eye(4)), "initial pose: the pose is not a rigid transform"),
+        (changed(T_target_source_init=np.eye(3)), r"initial pose: the pose has shape \(3, 3\)"),
     ],
 )
 def test_bad_input_is_one_line(explainer, pair, change, message):

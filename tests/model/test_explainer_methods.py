@@ -45,7 +45,7 @@ def test_a_failed_registration_is_noted(explainer, pair):
     source, target = pair
     lost = explainer.explain(source + 5, target, method="point_to_plane")
     assert lost.notes[0].startswith("point_to_plane failed: no source point has a target point within 0.1 diameters")
-    assert any("so the scores mean nothing" in warning for warning in lost.warnings)
+    assert any("so the scores are meaningless" in warning for warning in lost.warnings)
     assert lost.fitness == 0
 
 

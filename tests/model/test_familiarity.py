@@ -102,7 +102,7 @@ def test_good_input_of_shapes_that_were_not_learnt_raises_no_warning(learnt, uns
 def test_whole_clouds_are_unlike_partial_views_and_the_other_way_round(learnt, clouds, unseen):
     for target, source in clouds + unseen:
         assert warned(learnt["views"], [(source, target)]) == [
-            "the source shows the object from all sides, but GP-CA learnt partial views"
+            "the source shows the object from all sides, but GP-CA was trained on partial views"
         ]
     said = warned(learnt["wholes"], views(clouds + unseen))
     assert sum("from one side alone" in line for line in said) >= 0.7 * 42

@@ -85,12 +85,12 @@ def changed(**changes):
     ("spoil", "message"),
     [
         (lambda path: path.unlink(), "no such model; make one with 'make results'"),
-        (lambda path: os.truncate(path, 1000), "is damaged or no model"),
-        (lambda path: path.write_bytes(pickle.dumps(print, protocol=2)), "is damaged or no model"),
-        (lambda path: torch.save({"weights": torch.zeros(3)}, path), "is no model"),
-        (changed(version=7), "is a model of version 7, not of version 3; make one with"),
-        (changed(gpc=None), "something missing or damaged .*'gpc'"),
-        (changed(encoder={}), "something missing or damaged"),
+        (lambda path: os.truncate(path, 1000), "is damaged or not a model"),
+        (lambda path: path.write_bytes(pickle.dumps(print, protocol=2)), "is damaged or not a model"),
+        (lambda path: torch.save({"weights": torch.zeros(3)}, path), "is not a model"),
+        (changed(version=7), "is a model of version 7, not 3; make one with"),
+        (changed(gpc=None), "missing or damaged parts .*'gpc'"),
+        (changed(encoder={}), "missing or damaged parts"),
     ],
 )
 def test_a_file_that_is_no_model_of_this_version_is_one_line(path, spoil, message):

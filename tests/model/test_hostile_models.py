@@ -89,7 +89,7 @@ CONTENTS = {
     "attempts without end": put("thresholds/attempts", 10**12),
     "treatments of a list": put("treatments", ["denoise"]),
     "an action of a number": put("treatments/noise", 5),
-    "a list that holds itself": holds_itself,
+    "a list that contains itself": holds_itself,
     "a title of two lines": put("title", "Mugs\nTraceback"),
     "a title of a number": put("title", 7),
     "a doubtful stand-in": put("stand_in", "no"),
@@ -110,7 +110,7 @@ CONTENTS = {
 TO_EXPLAIN = [  # what would take the time, the memory or the terminal of who explains
     "one weight of infinity", "a tensor without its data", "draws of 1e9", "draws of the encoder of 1e9",
     "1e9 points drawn", "a width of 1e9", "neighbours of 1e9", "a negative distance", "1e9 iterations",
-    "a title of two lines", "a list that holds itself",
+    "a title of two lines", "a list that contains itself",
 ]  # fmt: skip
 
 

@@ -44,12 +44,12 @@ def test_a_mesh_is_sampled_in_its_own_frame_and_measured_by_its_vertices(tmp_pat
     ("make", "unit", "message"),
     [
         (lambda f: f / "lost.ply", "m", "lost.ply: no such file; give one of .ply"),
-        (lambda f: written(f, "few.ply", POINTS[:10]), "m", "few.ply: holds 10 points; give 64 or more"),
-        (lambda f: written(f, "few.pcd", POINTS[:10]), "m", "few.pcd: holds 10 points"),
-        (lambda f: written(f, "nan.ply", np.where(POINTS > 0.29, np.nan, POINTS)), "m", "nan.ply: .* hold NaN"),
+        (lambda f: written(f, "few.ply", POINTS[:10]), "m", "few.ply: has 10 points; give 64 or more"),
+        (lambda f: written(f, "few.pcd", POINTS[:10]), "m", "few.pcd: has 10 points"),
+        (lambda f: written(f, "nan.ply", np.where(POINTS > 0.29, np.nan, POINTS)), "m", "nan.ply: .* contain NaN"),
         (lambda f: written(f, "mm.ply", 1e3 * POINTS), "m", "mm.ply: its diameter is .* m, so the declared unit"),
         (lambda f: written(f, "m.ply"), "mm", "m.ply: its diameter is .* m, so the declared unit"),
-        (lambda f: written(f, "cloud.ply").rename(f / "cloud.xyz"), "m", "cloud.xyz: is of another format"),
+        (lambda f: written(f, "cloud.ply").rename(f / "cloud.xyz"), "m", "cloud.xyz: has an unsupported format"),
     ],
 )
 def test_a_file_that_cannot_be_right_is_one_line(tmp_path, make, unit, message):
@@ -69,12 +69,12 @@ def test_a_pose_is_16_numbers_however_they_are_parted(tmp_path):
     ("text", "message"),
     [
         (None, "no such file"),
-        ("1 0 0", "holds 3 numbers; give 4×4"),
-        ("one " * 16, "is no number"),
-        (" ".join(map(str, (2 * np.eye(4)).ravel())), "the pose is no rigid transform"),
-        (" ".join(map(str, np.diag([-1, 1, 1, 1]).ravel())), "the pose is no rigid transform"),
-        (" ".join(["nan"] * 16), "the pose is no rigid transform"),
-        (" ".join(map(str, np.diag([1, 1, 1, 5]).ravel())), "the pose is no rigid transform"),
+        ("1 0 0", "contains 3 numbers; give 4×4"),
+        ("one " * 16, "is not a number"),
+        (" ".join(map(str, (2 * np.eye(4)).ravel())), "the pose is not a rigid transform"),
+        (" ".join(map(str, np.diag([-1, 1, 1, 1]).ravel())), "the pose is not a rigid transform"),
+        (" ".join(["nan"] * 16), "the pose is not a rigid transform"),
+        (" ".join(map(str, np.diag([1, 1, 1, 5]).ravel())), "the pose is not a rigid transform"),
     ],
 )
 def test_what_is_no_pose(tmp_path, text, message):

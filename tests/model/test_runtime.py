@@ -44,7 +44,7 @@ def test_the_file_is_read_as_it_was_written(runtime, tmp_path):
 
 @pytest.mark.parametrize(
     ("column", "value", "message"),
-    [("component", "cooling", "unknown component 'cooling'"), ("mean_s", "long", "column 'mean_s' holds something")],
+    [("component", "cooling", "unknown component 'cooling'"), ("mean_s", "long", "column 'mean_s' contains values")],
 )
 def test_a_spoilt_file_is_one_line(runtime, tmp_path, column, value, message):
     write_csv(tmp_path / "runtime.csv", runtime.astype(object).assign(**{column: value}))

@@ -70,7 +70,7 @@ def add(folder):
 
 
 CHANGES = {change: "top.txt: was changed", lengthen: "info.json: was changed"}
-CHANGES |= {lose: "obj_000001.ply: is missing", add: "obj_000002.ply: is not of the archive"}
+CHANGES |= {lose: "obj_000001.ply: is missing", add: "obj_000002.ply: is not from the archive"}
 
 
 @FORMATS

@@ -72,5 +72,5 @@ def test_bad_models_info(folder, content):
 def test_missing_and_empty_folder(tmp_path):
     with pytest.raises(InputError, match="nowhere: no such folder"):
         list(surfaces(tmp_path / "nowhere"))
-    with pytest.raises(InputError, match="holds no models"):
+    with pytest.raises(InputError, match="has no models"):
         list(surfaces(tmp_path))

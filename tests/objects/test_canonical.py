@@ -102,7 +102,7 @@ FAULTS = {
     "one point": (Surface("part", np.ones((1, 3)), None), "1 point"),
     "63 points": (Surface("part", view().vertices_m[:63], None), "64 or more"),
     "one line": (Surface("part", np.outer(np.linspace(0, 0.1, 80), [1, 2, 3]), None), "line"),
-    "same point": (Surface("part", np.ones((80, 3)), None), "point or line"),
+    "same point": (Surface("part", np.ones((80, 3)), None), "or lie on one line"),
     "nan": (with_nan(), "NaN"),
     "zero area": (Surface("part", box().vertices_m * [1, 0, 0], box().faces), "no area"),
     "no faces": (Surface("part", box().vertices_m, np.zeros((0, 3), np.int64)), "no area"),
@@ -147,7 +147,7 @@ def test_inconsistent_file_is_refused(tmp_path):
     arrays = dict(np.load(path))
     for offsets in ([0, 128], [0, 128, 500], [0, 600, 528], [1, 128, 528]):
         np.savez(path, **{**arrays, "offsets": np.array(offsets)})
-        with pytest.raises(InputError, match="do not fit together"):
+        with pytest.raises(InputError, match="do not match"):
             ObjectClouds.load(path)
     with pytest.raises(InputError, match="no such file"):
         ObjectClouds.load(tmp_path / "other.npz")

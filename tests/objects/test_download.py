@@ -60,7 +60,7 @@ def test_no_network(tmp_path, monkeypatch):
             fetch(url, None, tmp_path, location="bop/lm")
     by_hand = tmp_path / "127.0.0.1" / "lm_models.zip"
     assert str(caught.value) == (
-        f"{url}: cannot be reached; set data_dir to a folder that holds bop/lm, or fetch it by hand into {by_hand}"
+        f"{url}: cannot be reached; set data_dir to a folder that contains bop/lm, or download it by hand to {by_hand}"
     )
     assert files(tmp_path) == []
 
@@ -74,7 +74,7 @@ def test_file_fetched_by_hand_needs_no_network(tmp_path):
 
 
 def test_error_answer_and_interrupted_transfer(server, tmp_path):
-    with pytest.raises(InputError, match=r"none\.zip: .*the server answers 404"):
+    with pytest.raises(InputError, match=r"none\.zip: .*the server answered 404"):
         fetch(f"{server.url}/none.zip", None, tmp_path)
     with pytest.raises(InputError, match=r"short\.zip: "):
         fetch(f"{server.url}/short.zip", None, tmp_path)

@@ -105,7 +105,7 @@ BROKEN = {
     "none.ply": (ascii_ply(np.zeros((0, 3))), "no points"),
     "nan.ply": (ascii_ply([(0, 0, 0), (0, "nan", 0), (1, 0, 0)], [(0, 1, 2)]), "NaN"),
     "inf.obj": (b"v 0 0 0\nv 0 inf 0\nv 1 0 0\nf 1 2 3\n", "NaN or infinity"),
-    "wild.ply": (ascii_ply([(0, 0, 0), (0, 1, 0), (1, 0, 0)], [(0, 1, 3)]), "vertex that is not there"),
+    "wild.ply": (ascii_ply([(0, 0, 0), (0, 1, 0), (1, 0, 0)], [(0, 1, 3)]), "refers to a missing vertex"),
     "wild.obj": (b"v 0 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 9\n", "readable"),
     "points.obj": (b"v 0 0 0\nv 0 1 0\nv 1 0 0\n", "no faces"),
     "text.ply": (b"hello\n", "readable"),
@@ -137,7 +137,7 @@ def test_files_in(tmp_path):
 def test_missing_and_empty_folder_and_unit(tmp_path):
     with pytest.raises(InputError, match="nowhere: no such folder"):
         files_in(tmp_path / "nowhere", None, SUFFIXES)
-    with pytest.raises(InputError, match=f"{tmp_path}: the folder holds none of"):
+    with pytest.raises(InputError, match=f"{tmp_path}: the folder has none of"):
         from_entry({"unit": "m"}, tmp_path)
     assert (metres_per("m"), metres_per("cm"), metres_per("mm")) == (1, 0.01, 0.001)
     for unit in ("inch", None):

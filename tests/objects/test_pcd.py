@@ -73,7 +73,7 @@ def test_organised_cloud_drops_missing_depth():
 
 
 def test_nan_in_an_unorganised_cloud():
-    with pytest.raises(InputError, match=r"view\.pcd: 1 of 4 points hold NaN"):
+    with pytest.raises(InputError, match=r"view\.pcd: 1 of 4 points contain NaN"):
         parse(ascii_pcd(ROWS), "view.pcd")
 
 

@@ -76,20 +76,22 @@ def test_empty_folder_is_a_fault_and_no_download(tmp_path):
     (tmp_path / "bop" / "toy").mkdir(parents=True)
     resolved = resolve(BOP, str(tmp_path))
     assert resolved["origin"] == "local"
-    with pytest.raises(InputError, match="holds no models"):
+    with pytest.raises(InputError, match="has no models"):
         list(surfaces(resolved, tmp_path))
 
 
 @pytest.mark.parametrize("kind", ["bob", "archive", "canonical", "../bop", "shapes.ycb", "", None])
 def test_unknown_kind(kind):
-    with pytest.raises(InputError, match=r"no such kind of source; known are procedural, bop, mesh_folder.*, uw_rgbd"):
+    with pytest.raises(
+        InputError, match=r"is not a kind of source; choose one of procedural, bop, mesh_folder.*, uw_rgbd"
+    ):
         resolve({**BOP, "kind": kind}, None)
 
 
 FAULTS = {
     "no family": ({"kind": "procedural", "title": "Toy"}, "'Toy': names no family"),
-    "no url": ({"kind": "bop", "title": "Toy", "location": "bop/toy"}, "'Toy': bop/toy is not there; .*data_dir"),
-    "no place": ({"kind": "bop", "title": "Toy"}, "location is not there"),
+    "no url": ({"kind": "bop", "title": "Toy", "location": "bop/toy"}, "'Toy': bop/toy does not exist; .*data_dir"),
+    "no place": ({"kind": "bop", "title": "Toy"}, "location does not exist"),
     "checksums": ({**BOP, "sha256": ["a", "b"]}, r"has 1 url\(s\) but 2 sha256"),
 }
 

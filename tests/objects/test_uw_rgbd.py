@@ -54,7 +54,7 @@ def test_faults_name_the_tar_and_its_member(tmp_path):
     wrong = write_tar(tmp_path / "wrong.tar", {"a/mug_1_1_1.pcd": view(1).replace(b"FIELDS", b"FEILDS")})
     with pytest.raises(InputError, match=r"wrong\.tar, member a/mug_1_1_1\.pcd: .*FIELDS"):
         list(surfaces([wrong]))
-    with pytest.raises(InputError, match=r"empty\.tar: the archive holds no \.pcd"):
+    with pytest.raises(InputError, match=r"empty\.tar: the archive has no \.pcd"):
         list(surfaces([write_tar(tmp_path / "empty.tar", {"readme.txt": b""})]))
 
 
@@ -69,5 +69,5 @@ def test_truncated_tar(mug_tar, kept):
 def test_missing_and_empty_folder(tmp_path):
     with pytest.raises(InputError, match="no such folder"):
         list(from_entry({}, tmp_path / "nowhere"))
-    with pytest.raises(InputError, match="holds none of"):
+    with pytest.raises(InputError, match="has none of"):
         list(from_entry({}, tmp_path))

@@ -29,10 +29,10 @@ def changed(array, index, value):
     ("name", "damage", "expected"),
     [
         ("concept", lambda a: a.astype(object), "pickled"),
-        ("concept", lambda a: changed(a, 3, "dust"), "unknown concept 'dust'; known are noise, pose, overlap"),
+        ("concept", lambda a: changed(a, 3, "dust"), "unknown concept 'dust'; expected one of noise, pose, overlap"),
         ("split", lambda a: changed(a.astype("U9"), 0, "validate"), "unknown split"),
         ("points", lambda a: a[:, :2], r"'points' is \d+×2, not \d+×3"),
-        ("points", lambda a: changed(a, 5, np.nan), "'points' holds NaN"),
+        ("points", lambda a: changed(a, 5, np.nan), "'points' contains NaN"),
         ("points", lambda a: a[:-1], "'offsets' do not match"),
         ("offsets", lambda a: a[:-1], "'offsets' do not match"),
         ("target_points", lambda a: a[:-1], "'target_offsets' do not match"),

@@ -60,7 +60,7 @@ def test_the_pose_that_explains_the_shots_is_started_from(start):
 
 @pytest.mark.parametrize(
     ("name", "given", "fault"),
-    [("pray", {}, "unknown; known are reinitialise"), ("denoise", {"framse": 3}, "unexpected keyword argument")],
+    [("pray", {}, "unknown; choose one of reinitialise"), ("denoise", {"framse": 3}, "unexpected keyword argument")],
 )
 def test_unknown_actions_and_settings_are_refused(name, given, fault):
     with pytest.raises(InputError, match=fault):

@@ -86,5 +86,5 @@ def test_fixed_actions_and_the_oracle():
 
 @pytest.mark.parametrize("name", ["gpac", "always_pray", "always_", "denoise"])
 def test_an_unknown_policy_is_refused_and_the_known_are_named(name):
-    with pytest.raises(InputError, match=rf"recovery policy '{name}': unknown; known are gpca, .*always_denoise"):
+    with pytest.raises(InputError, match=rf"recovery policy '{name}': unknown; choose one of gpca, .*always_denoise"):
         policy_entry(name, ACTIONS)

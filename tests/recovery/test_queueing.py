@@ -54,5 +54,5 @@ def test_faulty_files_are_refused(changed, rows, tmp_path):
     with pytest.raises(InputError, match="unknown order, or more errors"):
         read_queues([tmp_path / "queue_seed0.csv"])
     write_csv(tmp_path / "queue_seed1.csv", pd.DataFrame(columns=rows.columns))
-    with pytest.raises(InputError, match="holds no rows"):
+    with pytest.raises(InputError, match="has no rows"):
         read_queues([tmp_path / "queue_seed1.csv"])

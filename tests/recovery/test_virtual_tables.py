@@ -25,5 +25,5 @@ def test_a_scan_is_simplified_and_keeps_its_size():
 
 
 def test_a_cloud_of_points_stands_on_no_table():
-    with pytest.raises(InputError, match=r"recovery\.objects: its object 'cup' is a cloud of points"):
+    with pytest.raises(InputError, match=r"recovery\.objects: object 'cup' is a point cloud"):
         simplified(Surface("cup", np.zeros((70, 3)), None))

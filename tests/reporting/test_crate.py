@@ -16,7 +16,7 @@ def faults(crate, folder):
     entities = {entity["@id"]: entity for entity in crate["@graph"]}
     about, root = entities[NAME], entities["./"]
     data = [part["@id"] for part in root["hasPart"]]
-    found = ["an identifier stands twice"] if len(entities) < len(crate["@graph"]) else []
+    found = ["an identifier appears twice"] if len(entities) < len(crate["@graph"]) else []
     found += [f"{entity} has no type" for entity in entities.values() if not entity.get("@type")]
     if about["@type"] != "CreativeWork" or about["about"] != {"@id": "./"}:
         found.append("the descriptor is not about the root")
@@ -106,5 +106,5 @@ def test_a_damaged_record_is_named_and_nothing_is_written(folder, text):
 
 
 def test_a_folder_without_records_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"holds no \*\.provenance\.json"):
+    with pytest.raises(InputError, match=r"has no \*\.provenance\.json"):
         write_crate(tmp_path, "tiny", [], [])

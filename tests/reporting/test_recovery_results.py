@@ -69,7 +69,7 @@ def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
     text = table.markdown()
     assert "24 failures over 2 seeds: 8 by noise among 80 registrations" in text
     assert TITLE in text
-    with pytest.raises(InputError, match="hold no recovery"):
+    with pytest.raises(InputError, match="have no recovery"):
         table8_recovery(metrics, {}, TITLE, {"absent": "Absent"}, 3)
 
 
@@ -84,7 +84,7 @@ def drawn_twice(draw, tmp_path):
 def test_rates_are_drawn(metrics, tmp_path):
     image = drawn_twice(lambda *out: draw_recovery_rates(metrics, TITLE, POLICIES, 3, *out), tmp_path)
     assert np.ptp(image) > 100
-    with pytest.raises(InputError, match="hold no recovery rates"):
+    with pytest.raises(InputError, match="have no recovery rates"):
         draw_recovery_rates(metrics, TITLE, {"absent": "Absent"}, 3, tmp_path / "c.pdf", tmp_path / "c.png")
 
 
@@ -113,7 +113,7 @@ def test_what_queued_cases_teach_is_drawn(tmp_path):
 @pytest.mark.parametrize("text", ["{", "[]", '{"thresholds": {}}'])
 def test_a_faulty_policy_file_is_refused(text, tmp_path):
     (tmp_path / "policy.json").write_text(text)
-    with pytest.raises(InputError, match="no policy with its thresholds"):
+    with pytest.raises(InputError, match="not a policy with its thresholds"):
         read_policy(tmp_path / "policy.json")
     with pytest.raises(InputError, match="no such file"):
         read_policy(tmp_path / "none.json")

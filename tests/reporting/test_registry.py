@@ -149,7 +149,7 @@ def test_short_names_are_those_of_the_paper_and_the_first_of_a_number():
 
 def test_a_misspelt_target_is_answered_by_the_nearest_or_by_all():
     assert unknown_target("tabel2", ["table2", "page"]).endswith("did you mean table2?")
-    assert unknown_target("xyz", ["table2", "page"]).endswith("known are page, table2")
+    assert unknown_target("xyz", ["table2", "page"]).endswith("choose one of page, table2")
 
 
 def test_results_stand_by_section_in_order():

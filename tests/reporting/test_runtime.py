@@ -64,7 +64,7 @@ def test_the_bars_add_up_to_one_explanation(tmp_path):
 
 
 def test_what_was_not_measured_is_named():
-    with pytest.raises(InputError, match="holds no row of 'scores'"):
+    with pytest.raises(InputError, match="has no row of 'scores'"):
         _bars(RUNTIME[RUNTIME["component"] != "scores"], NUMBERS)
-    with pytest.raises(InputError, match="holds no rows"):
+    with pytest.raises(InputError, match="has no rows"):
         table7_runtime(RUNTIME[:0], "Tiny", NUMBERS)

@@ -26,9 +26,9 @@ def snakemake(tmp_path):
 
 def test_a_users_mistake_is_one_line_in_the_log_and_status_2(snakemake, capsys):
     with pytest.raises(SystemExit) as caught, job(snakemake):
-        raise InputError("metrics.csv", "is empty", "make it anew")
+        raise InputError("metrics.csv", "is empty", "regenerate it")
     assert caught.value.code == 2
-    assert (snakemake.folder / "logs" / "table.log").read_text() == "metrics.csv: is empty; make it anew\n"
+    assert (snakemake.folder / "logs" / "table.log").read_text() == "metrics.csv: is empty; regenerate it\n"
     assert capsys.readouterr().err == ""
     assert not list(snakemake.folder.glob("*.provenance.json"))
 

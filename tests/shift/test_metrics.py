@@ -109,10 +109,10 @@ def test_one_sample_of_a_set_is_finite(files):
     ("change", "message"),
     [
         (lambda rows: rows.__setitem__("score_pose", 2 * rows["score_pose"] + 0.1), "do not sum to one"),
-        (lambda rows: rows.__setitem__("score_pose", np.nan), "'score_pose' holds something that is not a finite"),
+        (lambda rows: rows.__setitem__("score_pose", np.nan), "'score_pose' contains values that are not finite"),
         (lambda rows: rows.__setitem__("set", rows["set"].replace("severity", "space")), "unknown set 'space'"),
         (lambda rows: rows.__setitem__("sample", rows["sample"] + 1), "lacks samples of"),
-        (lambda rows: rows.__setitem__("sample", 0), "holds a sample twice"),
+        (lambda rows: rows.__setitem__("sample", 0), "contains a sample twice"),
     ],
 )
 def test_bad_predictions_are_one_line(files, change, message):

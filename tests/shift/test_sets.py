@@ -28,10 +28,10 @@ def test_a_file_gives_back_what_was_saved(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"set": "space"}, "unknown set 'space'; known are in_distribution"),
+        ({"set": "space"}, "unknown set 'space'; expected one of in_distribution"),
         ({"split": "valid"}, "unknown split 'valid'"),
         ({"concept": "blur"}, "unknown concept 'blur'"),
-        ({"h": np.nan}, "array 'h' holds NaN"),
+        ({"h": np.nan}, "array 'h' contains NaN"),
         ({"split": "test"}, "set 'in_distribution' has no training samples"),
     ],
 )

@@ -6,13 +6,17 @@ from .command_lines import arrays_changed, refused, removed, settings, untouched
 
 FAULTS = [
     (removed("without.npz"), {}, r"without.npz: no such file; make it with 'python -m gpca without'"),
-    (arrays_changed("without.npz", sample=lambda s: s + 1), {}, r"without.npz: holds other samples than the reg"),
-    (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"embeddings.npz: holds other samples than"),
+    (
+        arrays_changed("without.npz", sample=lambda s: s + 1),
+        {},
+        r"without.npz: its samples differ from those of the reg",
+    ),
+    (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"embeddings.npz: its samples differ from"),
     (untouched, settings("active_learning", held_out=["noise", "pose"]), r"array 'h_pose' is missing"),
-    (untouched, settings("active_learning", initial=18), r"leaves no pool of 18 training samples; lower active_l"),
+    (untouched, settings("active_learning", initial=18), r"leaves none of 18 training samples; lower active_l"),
     (untouched, settings("active_learning", label=4), r"setting label: unknown; did you mean labels\?"),
     (untouched, settings("active_learning", stream={"arrivals": 60, "quiet": 2}), r"stream of 60 arrivals: needs"),
-    (untouched, {"--strategies": ["random", "bald", "oracle"]}, r"strategy 'oracle': unknown; known are random"),
+    (untouched, {"--strategies": ["random", "bald", "oracle"]}, r"strategy 'oracle': unknown; choose one of random"),
     (untouched, {"--strategies": ["random"]}, r"--out: 3 file\(s\) for 1 strategies"),
 ]
 

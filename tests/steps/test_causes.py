@@ -26,14 +26,14 @@ TIGHT = {"nominal": 1e-6, "failed": 0.06}
 FAULTS = [
     (untouched, {"--objects": "nowhere.npz"}, "nowhere.npz: no such file; make it with"),
     (truncated("objects.npz"), {}, "objects.npz: is not a readable npz archive"),
-    (arrays_changed("objects.npz", points_m=lambda points: points * np.nan), {}, "array 'points_m' holds NaN"),
+    (arrays_changed("objects.npz", points_m=lambda points: points * np.nan), {}, "array 'points_m' contains NaN"),
     (one_object, {}, "causes of tiny: 1 object(s) cannot be split"),
     (untouched, settings("causes", trian=9), "setting trian: unknown; did you mean train?"),
     (untouched, settings("causes", icp_points=64), "setting icp_points: unknown"),
     (untouched, settings("causes", icp={"max_iterations": 0}), "setting max_iterations: 0 is less"),
     (untouched, settings("causes", icp={"method": "generalized"}), "the target has no normals; use point_to_point"),
-    (untouched, settings("causes", points=[128, 64]), "causes points: [128, 64] runs downwards"),
-    (untouched, settings("causes", shares={"nominal": 1.0}), "causes shares: they add up to 1.7"),
+    (untouched, settings("causes", points=[128, 64]), "causes points: [128, 64] is in descending order"),
+    (untouched, settings("causes", shares={"nominal": 1.0}), "causes shares: add up to 1.7"),
     (untouched, settings("causes", starts=12), "setting starts: 12 is less than the minimum of 13"),
     (untouched, {"--candidates": "causes.npz", "--out": "causes.npz"}, "causes.npz"),
 ]
@@ -51,8 +51,8 @@ def test_states_that_cannot_be_filled_end_with_what_to_widen(folder):
     line = refusal(
         arguments("causes", changes),
         folder,
-        "12 candidates gave 0 of 5",
-        "failed by pose alone; raise causes.severities",
+        "12 candidates yielded 0 of 5",
+        "samples that failed from pose alone; raise causes.severities",
     )
     assert "raise causes.severities.rotation_deg or causes.severities.translation" in line
 
@@ -65,7 +65,7 @@ def test_objects_that_fail_when_clean_are_named_and_the_last_is_a_refusal(folder
     assert done.returncode == 2
     said = [line for line in done.stderr.splitlines() if "%|" not in line]
     assert [line.split("'")[1] for line in said[:-1]] == ["brick", "cone"]
-    assert "of every object nearly all clean pairs are off by 0.0001 % of the diameter" in said[-1]
+    assert "nearly all clean pairs of every object have an error of at least 0.0001 % of the diameter" in said[-1]
 
 
 def test_one_thread_or_two_give_the_same_bytes(folder, made):

@@ -10,19 +10,23 @@ from .command_lines import CONTROLS, ENCODER, STEP_OPTIONS, arguments, arrays_ch
 
 FAULTS = {
     "train_control": [
-        (untouched, settings("train_control", control={}), "setting control: unknown; known are controls, encoder"),
+        (untouched, settings("train_control", control={}), "setting control: unknown; choose one of controls, encoder"),
         (untouched, settings("train_control", controls={"folds": 1}), "setting folds: 1 is less than the minimum of 2"),
-        (untouched, settings("train_control", controls={"draw_points": [64, 32]}), r"\[64, 32\] runs downwards"),
-        (untouched, settings("train_control", encoder=ENCODER | {"fewest_points": 65}), "65 is above draw_points, 64"),
+        (
+            untouched,
+            settings("train_control", controls={"draw_points": [64, 32]}),
+            r"\[64, 32\] is in descending order",
+        ),
+        (untouched, settings("train_control", encoder=ENCODER | {"fewest_points": 65}), "65 exceeds draw_points, 64"),
     ],
     "controls": [
-        (untouched, settings("controls", explainers={}), "setting explainers: names none"),
-        (untouched, settings("controls", explainers={"gpc": {}}), "explainer 'gpc': unknown; known are"),
+        (untouched, settings("controls", explainers={}), "setting explainers: is empty"),
+        (untouched, settings("controls", explainers={"gpc": {}}), "explainer 'gpc': unknown; choose one of"),
         (untouched, settings("controls", explainers={"gpca": {"draw": 3}}), "draw"),
         (untouched, {"--retrained": [], "--retrained-embeddings": []}, "--retrained: lacks control 'density'"),
         (untouched, {"--other-registrations": []}, r"--other-registrations: 0 file\(s\) for 1 name\(s\)"),
-        (arrays_changed("control.npz", sample=lambda s: s + 1), {}, "control.npz: holds other samples"),
-        (arrays_changed("registrations.npz", fitness=lambda f: f - 2), {}, "'fitness' holds what cannot be"),
+        (arrays_changed("control.npz", sample=lambda s: s + 1), {}, "control.npz: its samples differ"),
+        (arrays_changed("registrations.npz", fitness=lambda f: f - 2), {}, "'fitness' contains impossible values"),
     ],
 }
 
@@ -35,12 +39,12 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, step, fault):
 def test_a_control_that_the_source_does_not_admit_is_named_and_its_file_holds_no_samples(folder, capsys):
     assert main(arguments("train_control", {"--control": "unseen_objects"})) == 0
     [line] = [line for line in capsys.readouterr().err.splitlines() if "left out" in line]
-    assert line == "control 'unseen_objects' of tiny is left out: it needs 5 objects or more, there are 2"
+    assert line == "control 'unseen_objects' of tiny is skipped: it needs at least 5 objects, but there are 2"
     with np.load(folder / "control.npz") as arrays:
         assert len(arrays["sample"]) == 0
     chosen = {"controls": CONTROLS | {"controls": ["unseen_objects", "shuffled"]}}
     changes = settings("controls", **chosen) | {"--retrained": "unseen_objects"}
     assert main(arguments("controls", changes)) == 0
-    assert "controls of tiny: 'unseen_objects' is left out" in capsys.readouterr().err
+    assert "controls of tiny: 'unseen_objects' is skipped" in capsys.readouterr().err
     rows = pd.read_csv(folder / STEP_OPTIONS["controls"]["--out"])
     assert set(rows["control"]) == {"paper", "shuffled"}

@@ -108,7 +108,7 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
     [
         ("objects", {"--data-dir": "nowhere"}, "gpca objects: nowhere: no such folder; correct data_dir in the config"),
         ("registrations", {"--objects": "lost.npz"}, "gpca registrations: lost.npz: no such file; make it with"),
-        ("attribute", {"--explainer": "shapley"}, "gpca attribute: explainer 'shapley': unknown; known are"),
+        ("attribute", {"--explainer": "shapley"}, "gpca attribute: explainer 'shapley': unknown; choose one of"),
     ],
 )
 def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, changes, message):

@@ -13,20 +13,20 @@ def exchange(**changed):
 
 
 FAULTS = [
-    (removed("weights.pt"), {}, r"weights.pt: no such weights; make them anew with 'python -m gpca train'"),
+    (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with 'python -m gpca train'"),
     (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
     (arrays_changed("objects.npz", names=lambda names: names[::-1]), {}, r"objects of tiny: object \d is not '\w+'"),
-    (untouched, exchange(methods=["icp"]), r"registration method 'icp': unknown; known are"),
+    (untouched, exchange(methods=["icp"]), r"registration method 'icp': unknown; choose one of"),
     (untouched, exchange(methods=[]), r"setting methods: \[\] should be non-empty"),
-    (untouched, exchange(estimators=["gauss"]), r"estimator 'gauss': unknown; known are"),
+    (untouched, exchange(estimators=["gauss"]), r"estimator 'gauss': unknown; choose one of"),
     (untouched, exchange(train=10), r"setting train: 10 is not a multiple of 3"),
     (untouched, exchange(tests=3), r"setting tests: unknown; did you mean test\?"),
     (untouched, settings("exchange", estimators={"cello": {"sigma": 1}}), r"unexpected keyword argument 'sigma'"),
     (untouched, settings("exchange", methods={"point_to_point": {"k": 1}}), r"unexpected keyword argument 'k'"),
-    (untouched, settings("exchange", explainers={}), r"setting explainers: names none; give at least one"),
+    (untouched, settings("exchange", explainers={}), r"setting explainers: is empty; name at least one"),
     (untouched, settings("exchange", explainers={"gpc": {}}), r"explainer 'gpc': unknown"),
     (untouched, settings("exchange", explainers={"shap_removal": {}}), r"'shap_removal': reads design 'removal', of"),
-    (untouched, settings("exchange", control={}), r"setting control: unknown; known are exchange, uncertainty,"),
+    (untouched, settings("exchange", control={}), r"setting control: unknown; choose one of exchange, uncertainty,"),
     (untouched, {"--out": ["a.csv", "b.csv"]}, r"--out: 2 file\(s\) for 1 seed\(s\)"),
 ]
 
@@ -38,7 +38,7 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
 
 def test_a_method_whose_package_is_missing_is_refused_by_name(folder, capsys, monkeypatch):
     monkeypatch.setattr("gpca.alignment.methods.registry.find_spec", lambda package: None)
-    message = r"registration method 'gicp_small': needs the package small_gicp; install it, or leave the method out"
+    message = r"registration method 'gicp_small': needs the package small_gicp; install it or leave the method out"
     refused(folder, capsys, "exchange", untouched, exchange(methods=["point_to_point", "gicp_small"]), message)
 
 

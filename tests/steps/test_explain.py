@@ -11,18 +11,18 @@ from .command_lines import arguments, refused, removed, truncated, untouched, wr
 
 FAULTS = [
     (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),
-    (truncated("model.pt"), {}, r"model.pt: is damaged or no model"),
+    (truncated("model.pt"), {}, r"model.pt: is damaged or not a model"),
     (truncated("meshes/cone.ply"), {}, r"cone.ply: is truncated or not a readable .ply file"),
     (removed("meshes/brick.stl"), {}, r"brick.stl: no such file; give one of .ply"),
     (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit"),
-    (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: holds 3 numbers; give 4×4"),
+    (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: contains 3 numbers; give 4×4"),
     (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
-    (untouched, {"--method": "icp"}, r"registration method 'icp': unknown; known are fgr, "),
-    (untouched, {"--uncertainty": "gauss"}, r"estimator 'gauss': unknown; known are .*brossard"),
+    (untouched, {"--method": "icp"}, r"registration method 'icp': unknown; choose one of fgr, "),
+    (untouched, {"--uncertainty": "gauss"}, r"estimator 'gauss': unknown; choose one of .*brossard"),
     (untouched, {"--uncertainty": "cello"}, r"'cello': learns from registrations of training objects, and there are"),
     (untouched, {"--uncertainty": ""}, r"estimator '': unknown"),
-    (untouched, {"meshes/cone.ply": ["meshes/cone.ply"]}, r"explain: 2 sources; print them with --json-lines"),
-    (untouched, {"--settings": {"draws": 3}}, r"--settings: explain has none"),
+    (untouched, {"meshes/cone.ply": ["meshes/cone.ply"]}, r"explain: 2 sources need one line each; add --json-lines"),
+    (untouched, {"--settings": {"draws": 3}}, r"--settings: is not used by explain"),
 ]
 
 

@@ -74,7 +74,7 @@ def test_the_table_says_how_few_there_are(asked):
 def test_files_of_other_samples_are_refused(asked, tmp_path):
     fewer = tmp_path / "seed100.csv"
     fewer.write_text("".join(asked[1][0].open().readlines()[:-1]))
-    with pytest.raises(InputError, match="holds other samples than the causes"):
+    with pytest.raises(InputError, match="its samples differ from those of the causes"):
         collect(asked[0], [fewer], asked[2])
     with pytest.raises(InputError, match="files of every seed are needed"):
         collect([], [], [])
@@ -83,7 +83,7 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
 @pytest.mark.parametrize(
     ("option", "value", "words"),
     [
-        ("--descriptors", ["descriptors.npz", "descriptors.npz"], "--descriptors: 2 file(s) for 1 of causes"),
+        ("--descriptors", ["descriptors.npz", "descriptors.npz"], "--descriptors: 2 file(s) for 1 file(s) of --causes"),
         ("--instances", ["objects.npz"], "objects.npz: array"),
         (
             "--settings",
@@ -91,7 +91,7 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
             "/not/there is not",
         ),
         ("--settings", [json.dumps({"frames": {"points": 3}})], "setting points: 3 is less than the minimum of 64"),
-        ("--settings", [json.dumps({"explainers": {"oracle": {}}})], "explainer 'oracle': unknown; known are"),
+        ("--settings", [json.dumps({"explainers": {"oracle": {}}})], "explainer 'oracle': unknown; choose one of"),
         ("--out", ["objects.npz"], "objects.npz"),
     ],
 )

@@ -8,16 +8,20 @@ FAULTS = [
     (
         arrays_changed("embeddings.npz", sample=lambda s: s + 1),
         {},
-        r"embeddings.npz: holds other samples than the regi",
+        r"embeddings.npz: its samples differ from those of the regi",
     ),
-    (untouched, settings("frame_labels", frame_labels={"initial": 18}), r"leaves no pool of 18 training samples"),
+    (untouched, settings("frame_labels", frame_labels={"initial": 18}), r"leaves none of 18 training samples"),
     (
         untouched,
         settings("frame_labels", frame_labels={"targets": [2]}),
         r"setting targets.0: 2 is greater than the ma",
     ),
     (untouched, {"--backbones": ["dgcnn", "pointnet"]}, r"--embeddings: 1 file\(s\) for 2 of --backbones; give one"),
-    (untouched, {"--strategies": ["random"]}, r"--out: 2 file\(s\) for 1 of --strategies; give one each"),
+    (
+        untouched,
+        {"--strategies": ["random"]},
+        r"--out: 2 file\(s\) for 1 value\(s\) of --strategies; give one for each",
+    ),
 ]
 
 

@@ -38,10 +38,10 @@ def label(registrations, tmp_path, monkeypatch, capsys):
 def test_quit_keeps_the_answers_before_and_the_next_session_counts_them(label):
     status, concepts, said = label("overlap", "/quit", "noise")
     assert (status, concepts) == (0, ["overlap"])
-    assert "6 labelled at the start, 0 answered before" in said.out
+    assert "6 labeled at the start, 0 answered before" in said.out
     status, concepts, said = label("pose")
     assert (status, concepts) == (0, ["overlap", "pose"])
-    assert "6 labelled at the start, 1 answered before" in said.out
+    assert "6 labeled at the start, 1 answered before" in said.out
 
 
 def test_retrain_learns_at_once_and_asks_the_same_question_again(label):
@@ -60,21 +60,21 @@ def test_a_skipped_sample_is_noted_without_a_concept(label):
 def test_a_mistyped_name_is_asked_for_again_on_a_terminal_and_stops_a_file(label):
     status, concepts, said = label("Not a name", "overlap", terminal=True)
     assert (status, concepts) == (0, ["overlap"])
-    assert "'Not a name' is no name of a concept" in said.out
+    assert "'Not a name' is not a valid concept name" in said.out
     status, concepts, said = label("Not a name", "noise")
     assert (status, concepts) == (2, ["overlap"])
-    assert "'Not a name' is no name of a concept" in said.err
+    assert "'Not a name' is not a valid concept name" in said.err
 
 
 FAULTS = [
     (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
-    (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file with an answer on each line"),
-    (untouched, {"--known": ["noise"]}, r"starts with fewer than two labelled concepts; name two with --known"),
-    (untouched, {"--strategy": "best"}, r"strategy 'best': unknown; known are random"),
+    (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file with one answer per line"),
+    (untouched, {"--known": ["noise"]}, r"starts with fewer than two labeled concepts; name two with --known"),
+    (untouched, {"--strategy": "best"}, r"strategy 'best': unknown; choose one of random"),
     (written("labels.csv", "sample,split\n1,train\n"), {}, r"labels.csv: column 'concept' is missing"),
     (written("labels.csv", "sample,split,concept\n99,train,pose\n"), {}, r"labels.csv, line 2: no sample '99' of"),
     (written("labels.csv", "sample,split,concept\n9,train,\n9,train,pose\n"), {}, r"line 3: 'pose' contradicts ''"),
-    (written("labels.csv", "sample,split,concept\n9,train,Not pose\n"), {}, r"'Not pose' is no name of a concept"),
+    (written("labels.csv", "sample,split,concept\n9,train,Not pose\n"), {}, r"'Not pose' is not a valid concept name"),
 ]
 
 

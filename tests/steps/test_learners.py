@@ -7,7 +7,7 @@ from .command_lines import arrays_changed, refused, removed, settings, untouched
 
 FAULTS = [
     (removed("shifted.npz"), {}, r"shifted.npz: no such file; make it with 'python -m gpca shift'"),
-    (arrays_changed("shifted.npz", h=lambda h: h * np.nan), {}, r"shifted.npz: array 'h' holds NaN"),
+    (arrays_changed("shifted.npz", h=lambda h: h * np.nan), {}, r"shifted.npz: array 'h' contains NaN"),
     (
         arrays_changed("shifted.npz", concept=lambda c: np.full_like(c, "pose")),
         {"--learners": ["learner_nearest", "gpca"]},

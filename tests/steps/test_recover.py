@@ -75,7 +75,7 @@ def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "fault"),
     [
-        ({"policies": ["gpac"]}, "recovery policy 'gpac': unknown; known are gpca, "),
+        ({"policies": ["gpac"]}, "recovery policy 'gpac': unknown; choose one of gpca, "),
         ({"actions": {"pray": {}}}, "recovery action 'pray': unknown"),
         ({"trian": 9}, "setting trian: unknown; did you mean train?"),
     ],

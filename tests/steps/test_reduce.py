@@ -9,13 +9,21 @@ from .command_lines import arguments, arrays_changed, refused, removed, settings
 
 FAULTS = [
     (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
-    (arrays_changed("embeddings.npz", h=lambda h: h * np.nan), {}, r"array 'h' holds NaN"),
-    (arrays_changed("embeddings.npz", h=np.ones_like), {}, r"training embeddings: are all alike"),
-    (arrays_changed("embeddings.npz", split=lambda s: np.full_like(s, "test")), {}, r"holds no training samples"),
-    (untouched, settings("reduce", components=19), r"19 components of 18 training embeddings of 32 numbers; set"),
+    (arrays_changed("embeddings.npz", h=lambda h: h * np.nan), {}, r"array 'h' contains NaN"),
+    (arrays_changed("embeddings.npz", h=np.ones_like), {}, r"training embeddings: are all identical"),
+    (arrays_changed("embeddings.npz", split=lambda s: np.full_like(s, "test")), {}, r"has no training samples"),
+    (
+        untouched,
+        settings("reduce", components=19),
+        r"19 components are too many for 18 training embeddings of 32 numbers",
+    ),
     (untouched, settings("reduce", components=0), r"setting components: 0 is less than the minimum of 1"),
-    (untouched, settings("reduce", neighbours=3), r"'autoencoder': no setting 'neighbours'; known are components"),
-    (untouched, {"--reduction": "tsne"}, r"reduction 'tsne': unknown; known are none, pca"),
+    (
+        untouched,
+        settings("reduce", neighbours=3),
+        r"'autoencoder': has no setting 'neighbours'; its settings are components",
+    ),
+    (untouched, {"--reduction": "tsne"}, r"reduction 'tsne': unknown; choose one of none, pca"),
     (untouched, {"--seeds": [0, 1]}, r"--embeddings: 1 file\(s\) for 2 seed\(s\); give one for each"),
 ]
 

@@ -14,13 +14,13 @@ def pairs(**changed):
 FAULTS = [
     (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registrations'"),
     (truncated("objects.npz"), {}, r"objects.npz: is not a readable npz archive"),
-    (arrays_changed("registrations.npz", points=lambda p: p * float("nan")), {}, r"array 'points' holds NaN"),
+    (arrays_changed("registrations.npz", points=lambda p: p * float("nan")), {}, r"array 'points' contains NaN"),
     (
         arrays_changed("objects.npz", names=lambda names: names[::-1]),
         {},
         r"object 0 is not '\w+', as the registr",
     ),
-    (untouched, settings("register_methods", gicp={}), r"setting gicp: unknown; known are method_pairs, methods"),
+    (untouched, settings("register_methods", gicp={}), r"setting gicp: unknown; choose one of method_pairs, methods"),
     (
         untouched,
         settings("register_methods", methods={"gicpp": {}}),
@@ -31,7 +31,7 @@ FAULTS = [
     (untouched, pairs(samples=4), r"setting samples: 4 is not a multiple of 3"),
     (untouched, pairs(sucess=0.1), r"setting sucess: unknown; did you mean success\?"),
     (untouched, pairs(global_start="teaser"), r"global_start: 'teaser' is not among the methods"),
-    (untouched, pairs(global_start="point_to_point"), r"'point_to_point': needs an initial pose itself"),
+    (untouched, pairs(global_start="point_to_point"), r"'point_to_point': needs an initial pose"),
     (untouched, {"--methods": ["fgr", "icp"]}, r"registration method 'icp': unknown"),
     (untouched, {"--out": ["a.csv"]}, r"--out: 1 file\(s\) for 2 pair\(s\) of method and seed; give one for each"),
     (untouched, {"--seeds": [0, 1]}, r"--out: 2 file\(s\) for 4 pair"),

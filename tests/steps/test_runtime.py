@@ -7,7 +7,7 @@ from .command_lines import refused, removed, untouched
 FAULTS = [
     (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),
     (untouched, {"--settings": {"runtime": {"repeats": 1}}}, r"setting repeats: 1 is less than the minimum"),
-    (untouched, {"--settings": {}}, r"leaves no pool of 18 training samples"),
+    (untouched, {"--settings": {}}, r"leaves none of 18 training samples"),
 ]
 
 

@@ -105,10 +105,10 @@ def provenance(name, inputs=(MESH,), **settings):
             ["model.pt.provenance.json: no such file"],
         ),
         (written("real/model.pt.provenance.json", "{}"), ["model.pt.provenance.json: lacks 'inputs_sha256'"]),
-        (provenance("real/model.pt"), ["names nothing that a model learns from"]),
+        (provenance("real/model.pt"), ["lists nothing that a model learns from"]),
         (
             provenance("real/model.pt", ["real/model_causes/tiny/seed0.npz"]),
-            ["provenance of the model: is incomplete ('causes'); make the model anew"],
+            ["provenance of the model: is incomplete ('causes'); regenerate the model"],
         ),
         (
             provenance("real/objects/tiny.npz", [], entry={"title": "Tiny"}),
@@ -116,20 +116,20 @@ def provenance(name, inputs=(MESH,), **settings):
         ),
         (
             provenance("real/objects/tiny.npz", entry={"title": "Tiny", "stand_in": True}),
-            ["tiny.npz: holds objects that the package drew; ship a model of real objects"],
+            ["tiny.npz: contains objects that the package drew; ship a model of real objects"],
         ),
         (
             provenance("real/objects/tiny.npz", ["/mine/secret.ply"], entry={"title": "Tiny"}),
-            ["tiny.npz: was made from 'secret.ply', of a dataset without a known licence; add the dataset to "],
+            ["tiny.npz: was made from 'secret.ply', which is from a dataset without a known license; add the dataset"],
         ),
         (
             provenance("real/objects/tiny.npz", [], entry={"title": "Tiny", "url": "https://x/mine.zip"}),
-            ["'mine.zip', of a dataset without a known licence"],
+            ["'mine.zip', which is from a dataset without a known license"],
         ),
-        (written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\n"), ["cause_intervals.csv: holds no rows"]),
+        (written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\n"), ["cause_intervals.csv: has no rows"]),
         (
             written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\ntiny,gpca,auroc_failed,9,1,0.5,,,,,,\n"),
-            ["cause_intervals.csv: holds no scores of gpca_multilabel"],
+            ["cause_intervals.csv: has no scores of gpca_multilabel"],
         ),
     ],
 )
@@ -147,10 +147,10 @@ def test_a_model_that_the_package_should_not_carry_is_refused(folder, model, mon
     before = content(folder)
     monkeypatch.setattr(ship, "LARGEST_BYTES", 1000)
     assert main(SHIP) == 2
-    assert "MB in the package, where 0.001 are allowed" in capsys.readouterr().err
+    assert "MB, more than the 0.001 MB allowed in the package" in capsys.readouterr().err
     assert content(folder) == before
     for changes, words in (
-        ({"stand_in": True}, "learnt objects that the package drew"),
+        ({"stand_in": True}, "was trained on objects that the package drew"),
         ({"diagnoser": None}, "cannot say what is wrong"),
     ):
         replace(model, **({"stand_in": False} | changes)).save("real/model.pt")

@@ -119,9 +119,9 @@ def test_a_covariance_survives_the_file(file):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"failed": "perhaps"}, "a row neither failed nor not"),
-        ({"mahalanobis": "many"}, "column 'mahalanobis' holds something that is not a finite number"),
-        ({"spread": -1.0}, "column 'spread' holds numbers below 0"),
+        ({"failed": "perhaps"}, "'failed' contains values other"),
+        ({"mahalanobis": "many"}, "column 'mahalanobis' contains values that are not finite numbers"),
+        ({"spread": -1.0}, "column 'spread' contains numbers below 0"),
         ({"add_relative": ""}, "column 'add_relative'"),
     ],
 )

@@ -103,7 +103,9 @@ def test_the_same_seed_gives_the_same_numbers_and_other_estimators_change_none(t
 
 
 def test_objects_that_are_not_the_registrations_are_refused(causes, objects):
-    with pytest.raises(InputError, match=r"objects of tiny: object .* give those that the registrations were made of"):
+    with pytest.raises(
+        InputError, match=r"objects of tiny: object .* give the objects that the registrations were made from"
+    ):
         try_estimators(causes, Judges(objects, "objects of tiny"), "four", 100, {"censi": {}}, SETTINGS)
 
 

@@ -110,10 +110,10 @@ def test_the_file_is_read_as_it_was_written(written):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"concept": "rain"}, "holds an unknown cause, or a row neither a success nor none"),
-        ({"success": "maybe"}, "holds an unknown cause, or a row neither a success nor none"),
-        ({"add_relative": np.nan}, "column 'add_relative' holds something that is not a finite number"),
-        ({"translation_error": -1.0}, "column 'translation_error' holds numbers below 0"),
+        ({"concept": "rain"}, "contains an unknown cause, or a success other than True and False"),
+        ({"success": "maybe"}, "contains an unknown cause, or a success other than True and False"),
+        ({"add_relative": np.nan}, "column 'add_relative' contains values that are not finite numbers"),
+        ({"translation_error": -1.0}, "column 'translation_error' contains numbers below 0"),
     ],
 )
 def test_what_cannot_be_is_named(written, changes, message):

@@ -61,9 +61,9 @@ def changed(array, index, value):
     ("name", "damage", "expected"),
     [
         *((name, lambda a: None, f"'{name}' is missing") for name in COLUMNS),
-        ("uncertainty", lambda a: changed(a, (2, 1), np.nan), "'uncertainty' holds NaN"),
-        ("covariance", lambda a: changed(a, (0, 0, 0, 0), np.inf), "'covariance' holds NaN or infinity"),
-        ("residual", lambda a: changed(a, 0, -np.inf), "'residual' holds NaN or infinity"),
+        ("uncertainty", lambda a: changed(a, (2, 1), np.nan), "'uncertainty' contains NaN"),
+        ("covariance", lambda a: changed(a, (0, 0, 0, 0), np.inf), "'covariance' contains NaN or infinity"),
+        ("residual", lambda a: changed(a, 0, -np.inf), "'residual' contains NaN or infinity"),
         ("covariance", lambda a: a[..., :5], "'covariance' is 6×4×6×5, not 6×4×6×6"),
         ("covariance", lambda a: a[:, 0], "'covariance' is 6×6×6, not 6×K×6×6"),
         ("uncertainty", lambda a: a[:, :-1], "'uncertainty' is 6×3, not 6×4"),
@@ -101,7 +101,7 @@ def test_a_truncated_file_is_refused(tmp_path, share):
 
 def test_a_file_of_no_samples_is_refused(tmp_path):
     made([], np.array([], "U5")).save(tmp_path / "seed0.npz")
-    with pytest.raises(InputError, match="holds no samples"):
+    with pytest.raises(InputError, match="has no samples"):
         Outcomes.load(tmp_path / "seed0.npz")
 
 
@@ -172,7 +172,7 @@ def test_outcomes_survive_file_and_attaching_together(tmp_path, registrations, o
 def test_samples_that_the_registrations_lack_are_refused(registrations, sample, split):
     """Sample 20 is one of the training split only."""
     outcomes = made([0, sample], ("test", split))
-    with pytest.raises(InputError, match="samples that the registrations lack; make both anew"):
+    with pytest.raises(InputError, match="samples that the registrations lack; regenerate both"):
         outcomes.attach_to(registrations, *seconds_of(outcomes))
 
 
@@ -197,16 +197,16 @@ def test_seconds_survive_the_file(tmp_path):
     [
         (lambda rows: rows.drop(columns="icp_seconds"), "column 'icp_seconds' is missing"),
         (lambda rows: rows.drop(columns="condition"), "column 'condition' is missing"),
-        (lambda rows: rows[:-1], "holds 23 rows, not 6 samples × 4 conditions"),
-        (lambda rows: rows[:0], "holds no rows"),
-        (lambda rows: rows.assign(seconds="soon"), "'seconds' holds something that is not a finite number"),
-        (lambda rows: rows.assign(icp_seconds=np.inf), "'icp_seconds' holds something that is not a finite number"),
-        (lambda rows: rows.assign(sample="three"), "'sample' holds something that is not a finite number"),
-        (lambda rows: rows.assign(sample=rows["sample"] + 1), "other samples or conditions"),
-        (lambda rows: rows.assign(split="test"), "other samples or conditions"),
-        (lambda rows: rows[::-1], "other samples or conditions"),
-        (lambda rows: rows.assign(condition=rows["condition"].to_numpy()[::-1]), "other samples or conditions"),
-        (lambda rows: rows.sort_values(["condition", "sample"]), "other samples or conditions"),
+        (lambda rows: rows[:-1], "has 23 rows, not 6 samples × 4 conditions"),
+        (lambda rows: rows[:0], "has no rows"),
+        (lambda rows: rows.assign(seconds="soon"), "'seconds' contains values that are not finite numbers"),
+        (lambda rows: rows.assign(icp_seconds=np.inf), "'icp_seconds' contains values that are not finite numbers"),
+        (lambda rows: rows.assign(sample="three"), "'sample' contains values that are not finite numbers"),
+        (lambda rows: rows.assign(sample=rows["sample"] + 1), "samples or conditions differ"),
+        (lambda rows: rows.assign(split="test"), "samples or conditions differ"),
+        (lambda rows: rows[::-1], "samples or conditions differ"),
+        (lambda rows: rows.assign(condition=rows["condition"].to_numpy()[::-1]), "samples or conditions differ"),
+        (lambda rows: rows.sort_values(["condition", "sample"]), "samples or conditions differ"),
     ],
 )
 def test_faulty_seconds_are_refused_in_one_line_with_their_name(tmp_path, damage, expected):

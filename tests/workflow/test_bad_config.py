@@ -17,15 +17,15 @@ BOMB = "a0: &a0 [x]\n" + "\n".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10
 BAD = {
     "range downwards": (
         lambda project: own_file(project, registrations={"severities": {"noise": [0.3, 0.2]}}),
-        "registrations.severities: severity noise: [0.3, 0.2] runs downwards",
+        "registrations.severities: severity noise: [0.3, 0.2] is in descending order",
     ),
     "key twice": (
         lambda project: own_text(project, "seeds: [0]\nseeds: [1]\n"),
-        "mine.yaml: line 2: key 'seeds' stands twice; keep one of them",
+        "mine.yaml: line 2: key 'seeds' appears twice; keep one of them",
     ),
     "bomb": (
         lambda project: own_text(project, BOMB),
-        "mine.yaml: its aliases unfold to more than",
+        "mine.yaml: its aliases expand to more than",
     ),
     "template": (
         lambda project: own_text(project, "__use_yte__: true\nseeds: [0]\n"),
@@ -33,7 +33,7 @@ BAD = {
     ),
     "folder of the references": (
         lambda project: ("--config", "run=reference"),
-        "config key run: results/reference is no run's folder; take another name",
+        "config key run: results/reference is reserved; choose another name",
     ),
     "size that cannot be": (
         lambda project: ("--config", "registrations={train: 1000000000000}"),

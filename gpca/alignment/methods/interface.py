@@ -53,11 +53,11 @@ class Pair:
         for name in ("source", "target"):
             points, normals = getattr(self, name), getattr(self, f"{name}_normals")
             if points.ndim != 2 or points.shape[1] != 3:
-                raise InputError(f"{name} cloud", f"is of shape {points.shape}", "give points (N, 3)")
+                raise InputError(f"{name} cloud", f"has shape {points.shape}", "give an (N, 3) array")
             require_cloud(f"{name} cloud", points)
             if normals is not None and (normals.shape != points.shape or not np.isfinite(normals).all()):
-                fault = f"{normals.shape} for points {points.shape}, or NaN among them"
-                raise InputError(f"{name} normals", fault, "give one finite vector for each point")
+                fault = f"have shape {normals.shape} for points of shape {points.shape}, or contain NaN"
+                raise InputError(f"{name} normals", fault, "give one finite vector per point")
         require_rigid(self.T_target_source_init, "initial pose")
 
     def started_at(self, T_target_source: np.ndarray) -> Pair:

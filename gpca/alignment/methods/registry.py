@@ -33,23 +33,25 @@ def require_settings(name: str, settings: Mapping[str, object]) -> None:
     for key, value in settings.items():
         choices = get_args(hints[key])
         if get_origin(hints[key]) is Literal and value not in choices:
-            raise InputError(f"{subject}: setting {key}", f"{value!r} is none of {', '.join(choices)}")
+            raise InputError(f"{subject}: setting {key}", f"must be one of {', '.join(choices)}, not {value!r}")
 
 
 def require_global(name: str) -> None:
     """Raise an InputError unless the method is known and needs no initial pose."""
     if not method_entry(name).is_global:
         known = ", ".join(other for other, entry in methods().items() if entry.is_global)
-        raise InputError(f"registration method '{name}'", "needs an initial pose itself", f"global ones are {known}")
+        raise InputError(f"registration method '{name}'", "needs an initial pose", f"choose one of {known}")
 
 
 def require_local(name: str) -> None:
     """Raise an InputError unless the method is known, installed, and starts at an initial pose."""
     if method_entry(name).is_global:
-        remedy = "name one that starts at an initial pose"
-        raise InputError(f"registration method '{name}'", "is global, so that its results do not spread", remedy)
+        remedy = "choose one that starts at an initial pose"
+        raise InputError(f"registration method '{name}'", "is global, so its results have no spread", remedy)
     if package := left_out([name]).get(name):
-        raise InputError(f"registration method '{name}'", f"needs the package {package}", "install it, or name another")
+        raise InputError(
+            f"registration method '{name}'", f"needs the package {package}", "install it or choose another"
+        )
 
 
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
@@ -68,7 +70,7 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Call
     entry = method_entry(name)
     if name in left_out([name]):
         raise InputError(
-            f"registration method '{name}'", f"needs the package {entry.package}", "install it, or leave the method out"
+            f"registration method '{name}'", f"needs the package {entry.package}", "install it or leave the method out"
         )
     utility = require_open3d().utility  # loaded here, and with it the threads that are held to one below
     threads = ThreadpoolController()

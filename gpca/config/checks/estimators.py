@@ -14,6 +14,6 @@ def check_estimators(config: dict) -> None:
         with_key(f"estimators.{name}", require_estimator_settings, name, settings or {})
     methods = config["estimator_pairs"]["methods"]
     if not methods:
-        raise InputError("config key estimator_pairs.methods", "names none", "name point_to_point, for one")
+        raise InputError("config key estimator_pairs.methods", "is empty", "name a method, such as point_to_point")
     for name in methods:
         with_key(f"estimator_pairs.methods.{name}", require_local, name)

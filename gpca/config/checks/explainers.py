@@ -36,8 +36,8 @@ def check_registrations(config: dict) -> None:
         samples = config[section]["train"] + config[section]["test"]
         size = samples * points * BYTES_PER_POINT
         if size > LARGEST_BYTES:
-            fault = f"{samples} samples have {size / 2**30:.0f} GiB of points, which one job has to hold"
-            raise InputError(f"config key {section}.train", fault, f"take fewer, or lower {key}")
+            fault = f"{samples} samples take {size / 2**30:.0f} GiB of points, all held by one job"
+            raise InputError(f"config key {section}.train", fault, f"use fewer or lower {key}")
 
 
 def check_diagnosis(config: dict) -> None:
@@ -76,7 +76,7 @@ def check_controls(config: dict) -> None:
         with_key(key, check_settings, own, "explainers", name)
         entry = explainer_entry(name)
         if entry.design and not entry.observed_only:
-            fault = "reads more of Monte-Carlo ICP than the observed pair, which is all that runs under a control"
+            fault = "needs more Monte-Carlo ICP than that of the observed pair, which is all that a control runs"
             raise InputError(f"config key {key}", fault, "leave it out")
 
 
@@ -87,7 +87,7 @@ def check_gradients(config: dict) -> None:
         return
     share, neighbours = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
     if round((1 - share) * encoder.draw_points) < neighbours:
-        fault = f"{share:g} of {encoder.draw_points} points leave fewer than the {neighbours} that the encoder needs"
+        fault = f"deleting {share:g} of {encoder.draw_points} points leaves fewer than the encoder's {neighbours}"
         raise InputError("config key gradients.deleted", fault, "delete fewer")
 
 

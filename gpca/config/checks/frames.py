@@ -20,15 +20,17 @@ def check_real_world(config: dict, encoders_left_out: Set[str]) -> None:
     section = config["real_world"]
     require_names("real_world.backbones", section["backbones"], config["encoders"], "encoder", encoders_left_out)
     if REAL_WORLD in config["sources"]:
-        raise InputError(f"config key sources.{REAL_WORLD}", "is the name of real_world's frames", "take another")
+        raise InputError(
+            f"config key sources.{REAL_WORLD}", "is reserved for the frames of real_world", "choose another name"
+        )
     with_key("real_world.scenes", SceneSettings.from_dict, section["scenes"])
     for family in section["scenes"].get("families", ()):
         with_key("real_world.scenes.families", procedural.require_family, family)
     with_key("real_world.datasets", resolve_datasets, section["datasets"], config["data_dir"])
     datasets = resolve_datasets(section["datasets"], config["data_dir"])
     if section["initial_pose"].get("form") == "results" and not has_estimates(datasets):
-        fault = "form results needs a dataset with results or errors"
-        raise InputError("config key real_world.initial_pose", fault, "name the files, or take another form")
+        fault = "form 'results' needs a dataset with results or errors"
+        raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
     _check_training(config)
     _check_labels(config)
     names = ("condition_backbones", section["condition_backbones"])
@@ -54,8 +56,8 @@ def _check_labels(config: dict) -> None:
     """
     targets = config["frame_labels"]["targets"]
     if len(set(map(in_percent, targets))) < len(targets):
-        raise InputError("config key frame_labels.targets", "two are alike in whole percent", "leave one out")
+        raise InputError("config key frame_labels.targets", "two are equal in whole percent", "remove one")
     initial, train = config["frame_labels"]["initial"], config["real_world"]["train"]
     if initial // 2 >= train // len(CONCEPTS):
-        fault = f"{initial} labelled samples of two concepts leave no pool of {train} training samples"
+        fault = f"{initial} labeled samples of two concepts leave none of {train} training samples for the pool"
         raise InputError("config key frame_labels.initial", fault, "lower it or raise real_world.train")

@@ -18,4 +18,4 @@ def check_methods(config: dict, methods_left_out: Set[str]) -> None:
     with_key(key, require_global, start)
     if package := left_out([start]).get(start):
         fault = f"'{start}' needs the package {package}, which is not installed"
-        raise InputError(f"config key {key}", fault, "install it, or name another global method")
+        raise InputError(f"config key {key}", fault, "install it or choose another global method")

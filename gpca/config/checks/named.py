@@ -23,4 +23,4 @@ def require_names(
     for name in names:
         if name not in known:
             fault = f"{noun} '{name}' is left out" if name in left_out else f"no {noun} '{name}'"
-            raise InputError(f"config key {key}", fault, f"known are {', '.join(known)}")
+            raise InputError(f"config key {key}", fault, f"choose one of {', '.join(known)}")

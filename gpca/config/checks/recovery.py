@@ -27,12 +27,14 @@ def check_recovery(
     require_names("recovery.costs", list(section["costs"]), ACTIONS, "action")
     for action in section["actions"]:
         if action not in section["costs"]:
-            raise InputError("config key recovery.costs", f"has none of the action '{action}'", "give each its cost")
+            raise InputError("config key recovery.costs", f"lacks the action '{action}'", "give every action a cost")
     for concept, action in section["treatments"].items():
         key = f"recovery.treatments.{concept}"
         require_names(key, [action], section["actions"], "action", actions_left_out)
     if len(set(section["treatments"].values())) < len(section["treatments"]):
-        raise InputError("config key recovery.treatments", "one action treats two concepts", "give each its own")
+        raise InputError(
+            "config key recovery.treatments", "one action treats two concepts", "give each concept its own"
+        )
     for name in section["policies"]:
         _check_policy(name, config, designs_left_out)
     declared = {name: section["thresholds"][name] for name in DECLARED}

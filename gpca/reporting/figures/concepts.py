@@ -45,7 +45,9 @@ def draw_concepts_figure(
     samples = choose_samples(registrations, registrations_npz, object_name)
     name = str(registrations.object_name[samples["noise"]])
     if name not in objects.names:
-        raise InputError(objects_npz, f"has no object '{name}'", f"make it and {registrations_npz} from one config")
+        raise InputError(
+            objects_npz, f"has no object '{name}'", f"regenerate it and {registrations_npz} from the same config"
+        )
     sources = {concept: source_before_icp(registrations, sample) for concept, sample in samples.items()}
     row = objects.names.index(name)
     points_shown = max(len(source) for source in sources.values())  # This makes both clouds equally dense.
@@ -96,7 +98,7 @@ def choose_samples(registrations: Registrations, path: str | Path, object_name: 
             choices.append({concept: int(rows[np.argmin(distance_S[rows])]) for concept, rows in rows_of.items()})
     if not choices:
         subject = f"object '{object_name}'" if object_name else "any object"
-        raise InputError(path, f"has no test sample of each concept for {subject}", "name another or make more")
+        raise InputError(path, f"has no test sample of each concept for {subject}", "name another or generate more")
     return min(choices, key=lambda samples: max(distance_S[sample] for sample in samples.values()))
 
 

@@ -128,7 +128,9 @@ def ellipse(covariance_2_2: np.ndarray) -> np.ndarray:
 
 def _of_method(rows: Mapping, key: tuple, method: str, samples_npz: str | Path) -> pd.DataFrame:
     if key not in rows:
-        raise InputError(samples_npz, f"there are no estimates of {key[0]}, seed {key[2]}", "make them from one config")
+        raise InputError(
+            samples_npz, f"has no estimates of {key[0]}, seed {key[2]}", "regenerate it from the same config"
+        )
     return rows[key][rows[key]["method"] == method]
 
 

@@ -44,7 +44,7 @@ def draw_frame_reliability(
         parts.setdefault(source_method_seed(path)[1], []).append((scores_N_C.max(axis=1), hit_N))
     shown = [method for method in methods if method in parts]
     if not shown:
-        raise InputError("predictions on depth frames", "are of none of these methods", "run them first")
+        raise InputError("predictions on depth frames", "cover none of these methods", "run them first")
     figure, panels = small_panels(len(shown), panel_height_in=1.55)
     for panel, method in zip(panels, shown, strict=True):
         confidence_N, hit_N = (np.concatenate(columns) for columns in zip(*parts[method], strict=True))

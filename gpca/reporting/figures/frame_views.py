@@ -30,7 +30,9 @@ def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataF
     poses = read_csv(poses_csv, POSE_COLUMNS)
     predictions = read_predictions(predictions_csv)
     if not (poses[["split", "sample"]].to_numpy() == predictions[["split", "sample"]].to_numpy()).all():
-        raise InputError(poses_csv, f"its samples differ from those of {predictions_csv}", "regenerate both from the same config")
+        raise InputError(
+            poses_csv, f"its samples differ from those of {predictions_csv}", "regenerate both from the same config"
+        )
     for name in ("instance", "init_error", "icp_error"):
         poses[name] = numbers(poses_csv, poses, name)
     added = [name for name in predictions.columns if name not in poses.columns]

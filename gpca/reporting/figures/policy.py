@@ -34,7 +34,9 @@ def read_policy(path: str | Path) -> dict:
     except FileNotFoundError as fault:
         raise InputError(path, "no such file", "make it with 'python -m gpca recover'") from fault
     except (ValueError, KeyError, TypeError) as fault:
-        raise InputError(path, "is no policy with its thresholds", "make it with 'python -m gpca recover'") from fault
+        raise InputError(
+            path, "is not a policy with its thresholds", "make it with 'python -m gpca recover'"
+        ) from fault
     return content
 
 

@@ -83,6 +83,6 @@ def _mistakes(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | P
         scores = samples[[name for name in samples.columns if name.startswith("score_")]].max(axis=1)
         parts.append(samples.assign(file=file, score=scores, seed=source_method_seed(predictions)[2])[wrong])
     if not parts:
-        raise InputError("real_world_failures", "got no files", "name at least one seed")
+        raise InputError("real_world_failures", "has no files", "name at least one seed")
     mistakes = pd.concat(parts).sort_values(["score", "seed", "row"], ascending=[False, True, True])
     return mistakes.drop_duplicates(["instance", "concept_true"]).reset_index(drop=True)

@@ -66,7 +66,9 @@ class Stages:
         predictions = read_predictions(predictions_csv)
         named = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
         if named != list(zip(predictions["split"], predictions["sample"], strict=True)):
-            raise InputError(predictions_csv, f"its samples differ from those of {registrations_npz}", "regenerate both")
+            raise InputError(
+                predictions_csv, f"its samples differ from those of {registrations_npz}", "regenerate both"
+            )
         if set(concepts_of(predictions)) != set(CONCEPTS):
             raise InputError(predictions_csv, f"does not score the concepts {', '.join(CONCEPTS)}", "regenerate it")
         for column in ("bald", *(f"variance_{concept}" for concept in CONCEPTS)):

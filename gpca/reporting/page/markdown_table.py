@@ -58,7 +58,7 @@ def read_markdown_table(path: str | Path) -> ShownTable:
         raise InputError(path, "is not a caption with a table below it", remedy)
     heads, rule, *body = (_cells(line) for line in lines)
     if any(len(row) != len(heads) for row in (rule, *body)):
-        raise InputError(path, "holds rows of different lengths", remedy)
+        raise InputError(path, "contains rows of different lengths", remedy)
     return ShownTable(
         caption=caption[2:-2],
         heads=tuple(cell.text for cell in heads),

@@ -199,7 +199,7 @@ def rendered_caption(name: str, caption: str):
     try:
         return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
     except SystemMessage as fault:
-        raise InputError(f"caption of {name}", f"is no reStructuredText ({fault})", "correct it") from fault
+        raise InputError(f"caption of {name}", f"is not valid reStructuredText ({fault})", "correct it") from fault
 
 
 def _size(path: Path) -> tuple[int, int]:
@@ -209,4 +209,4 @@ def _size(path: Path) -> tuple[int, int]:
         with Image.open(path) as image:
             return image.size
     except OSError as fault:
-        raise InputError(path, "is no readable image", "regenerate it with snakemake") from fault
+        raise InputError(path, "is not a readable image", "regenerate it with snakemake") from fault

@@ -33,7 +33,7 @@ SETTINGS = {
 }
 COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
 _SHARES = ("reached", "area_under_curve", "area_gain")  # These and every accuracy lie in [0, 1] and are printed in %.
-_NOTHING = ("metrics", "have nothing", "run its strategies first")  # The error of a table without rows says this.
+_NOTHING = ("metrics", "have no results", "run its strategies first")  # The error of a table without rows says this.
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 SHIFTED = {"severity": "severities beyond", "source": "unseen source", "objects": "unseen objects"}
 RHO = f"rho_max_score_{DISTANCES[0]}"
-NOTHING = ("diagnostics", "have nothing", "run its learners first")  # The error of a table without rows says this.
+NOTHING = ("diagnostics", "have no results", "run its learners first")  # The error of a table without rows says this.
 OF_DISTANCE = (
     "ρ: Spearman's correlation of 1 - largest score with the distance to the training samples, the mean over the "
     "nearest ones in the space of the analytical features; diagnostics.csv has the other scores and distances."

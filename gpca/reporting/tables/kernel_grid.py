@@ -30,7 +30,7 @@ PRINTED = (  # The paper's table has these rows.
     ("polynomial", 0.001, 200),
 )
 _HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
-_NOTHING = ("kernels", "have nothing", "run its sources and iterations first")  # An empty table says this.
+_NOTHING = ("kernels", "have no results", "run its sources and iterations first")  # An empty table says this.
 _MEASURES = {  # Each measure of the grid has a column, and a factor to the column's unit.
     "accuracy": (Column("Accuracy (%)"), 100),
     "confidence": (Column("Confidence (%)"), 100),

@@ -35,7 +35,7 @@ SEEN = {
 }
 NEW_CAUSES = ("nominal", "geometry")
 PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
-_NOTHING = ("metrics", "have nothing", "run new_concepts first")
+_NOTHING = ("metrics", "have no results", "run new_concepts first")
 
 
 def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:

@@ -16,11 +16,11 @@ CLOUD = np.random.default_rng(0).uniform(size=(20, 3))
     [
         ({"source": CLOUD[:2]}, "source cloud.*at least 3 finite points"),
         ({"target": np.where(CLOUD > 0.9, np.nan, CLOUD)}, "target cloud.*at least 3 finite points"),
-        ({"target": CLOUD[:, :2]}, r"target cloud: is of shape \(20, 2\)"),
-        ({"source_normals": CLOUD[:5]}, "source normals.*one finite vector for each point"),
-        ({"target_normals": np.full((20, 3), np.inf)}, "target normals.*one finite vector for each point"),
+        ({"target": CLOUD[:, :2]}, r"target cloud: has shape \(20, 2\)"),
+        ({"source_normals": CLOUD[:5]}, "source normals.*one finite vector per point"),
+        ({"target_normals": np.full((20, 3), np.inf)}, "target normals.*one finite vector per point"),
         ({"T_target_source_init": np.diag([1.0, 1.0, -1.0, 1.0])}, "initial pose.*mirrored"),
-        ({"T_target_source_init": np.eye(3)}, "initial pose.*of shape"),
+        ({"T_target_source_init": np.eye(3)}, "initial pose.*has shape"),
     ],
 )
 def test_a_faulty_pair_is_named(faulty, words):

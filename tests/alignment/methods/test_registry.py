@@ -157,12 +157,12 @@ def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setattr(registry, "find_spec", lambda name: None)
     assert left_out(["point_to_point", *OPTIONAL]) == OPTIONAL
     for name, package in OPTIONAL.items():
-        with pytest.raises(InputError, match=f"'{name}': needs the package {package}; install it, or leave"):
+        with pytest.raises(InputError, match=f"'{name}': needs the package {package}; install it or leave"):
             make_method(name)
 
 
 def test_an_unknown_name_lists_the_known():
-    with pytest.raises(InputError, match=r"'icp2': unknown; known are fgr, .*trimmed"):
+    with pytest.raises(InputError, match=r"'icp2': unknown; choose one of fgr, .*trimmed"):
         make_method("icp2")
 
 
@@ -177,9 +177,9 @@ def test_an_unknown_name_lists_the_known():
         (
             "random_sampling",
             {"metric": "point_to_line"},
-            "metric: 'point_to_line' is none of point_to_point, point_to_",
+            "metric: must be one of point_to_point, point_to_",
         ),
-        ("tukey", {"kernel": "Tukey"}, "kernel: 'Tukey' is none of HuberLoss, CauchyLoss, GMLoss, TukeyLoss"),
+        ("tukey", {"kernel": "Tukey"}, "kernel: must be one of HuberLoss, CauchyLoss, GMLoss, TukeyLoss, not 'Tukey'"),
     ],
 )
 def test_settings_that_a_method_does_not_take_are_refused(name, settings, words):

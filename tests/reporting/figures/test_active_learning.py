@@ -55,7 +55,7 @@ def test_the_figure_is_the_same_bytes_each_time(files, tmp_path):
 
 
 def test_without_a_curve_of_these_sources_nothing_is_drawn(files, tmp_path):
-    with pytest.raises(InputError, match="holds no curve of these sources and strategies"):
+    with pytest.raises(InputError, match="has no curve of these sources and strategies"):
         draw_learning_curves(files, {"cups": "Cups"}, TITLES, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
     assert not list(tmp_path.glob("a.*"))
 

@@ -21,7 +21,7 @@ def test_a_sample_is_drawn_again_where_it_lay(four, causes):
     again = replay(four, causes, row, "four", 100, CauseSettings(**FEW_CAUSES))
     assert again.observed[ALL] == pytest.approx(causes.registrations.cloud(row), abs=1e-5)
     assert np.array_equal(again.model.astype(np.float32), causes.registrations.target(row))
-    with pytest.raises(InputError, match="is not drawn again by these settings"):
+    with pytest.raises(InputError, match="is not reproduced by these settings"):
         replay(four, causes, row, "four", 101, CauseSettings(**FEW_CAUSES))
 
 
@@ -30,7 +30,7 @@ def test_the_sample_shown_failed_by_as_many_causes_as_any(causes):
     failed = causes.rows("test")[causes.truth.state[causes.rows("test")] == FAILED]
     assert row in failed
     assert causes.truth.causes[row].sum() == causes.truth.causes[failed].sum(axis=1).max()
-    with pytest.raises(InputError, match="holds no failed test sample"):
+    with pytest.raises(InputError, match="has no failed test sample"):
         choose_sample(causes.subset(causes.rows("train")), "causes.npz")
 
 

@@ -111,7 +111,7 @@ def test_nothing_overlaps_and_all_stays_on_the_page(metrics_csv, monkeypatch):
 
 
 def test_metrics_without_these_confusions_are_refused(metrics_csv, tmp_path):
-    with pytest.raises(InputError, match="holds no confusion") as caught:
+    with pytest.raises(InputError, match="has no confusion") as caught:
         draw_confusions_figure(metrics_csv, SOURCES, {"other": "Other"}, tmp_path / "a.pdf", tmp_path / "a.png")
     assert str(metrics_csv) in str(caught.value)
     with pytest.raises(InputError, match="no such file"):

@@ -54,5 +54,5 @@ def test_a_figure_is_the_same_bytes_each_time(draw, numbers, tmp_path):
 @pytest.mark.parametrize(("draw", "numbers"), DRAWN)
 def test_numbers_of_others_make_no_figure(draw, numbers, tmp_path):
     frame = numbers()
-    with pytest.raises(InputError, match="hold no"):
+    with pytest.raises(InputError, match="have no"):
         draw(frame[frame["method"] == REGISTRATION], tmp_path / "a.pdf", tmp_path / "a.png")

@@ -55,7 +55,7 @@ def test_both_files_are_written_and_the_same_again(files, tmp_path):
 
 def test_samples_without_their_estimates_are_refused(files, tmp_path):
     paths, samples = files
-    with pytest.raises(InputError, match="there are no estimates of cups, seed 0"):
+    with pytest.raises(InputError, match="has no estimates of cups, seed 0"):
         drawn((paths[1:], samples), tmp_path)
 
 

@@ -33,5 +33,5 @@ def test_a_panel_is_a_method_with_all_seeds_and_its_calibration_error(tmp_path, 
     frame_reliability.draw_frame_reliability(files, methods, "Frames", *out)
     assert [title for title in titles if title] == ["DGCNN\nECE 0.000", "Pair\nECE 0.100"]
     assert all(path.stat().st_size > 0 for path in out)
-    with pytest.raises(InputError, match="are of none of these methods"):
+    with pytest.raises(InputError, match="cover none of these methods"):
         frame_reliability.draw_frame_reliability(files, {"lost-none": "Lost"}, "Frames", *out)

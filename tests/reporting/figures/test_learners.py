@@ -55,7 +55,7 @@ def test_a_figure_is_the_same_bytes_each_time(learned, draw, tmp_path):
 @pytest.mark.parametrize("draw", [draw_coverage_risk, draw_reliability, draw_uncertainty_vs_distance])
 def test_without_predictions_nothing_is_drawn(learned, draw, tmp_path):
     for sources, learners in (({"mugs": "Mugs"}, LEARNERS), (SOURCES, {"absent": "Absent"})):
-        with pytest.raises(InputError, match="hold no predictions of these sources and learners"):
+        with pytest.raises(InputError, match="have no predictions of these sources and learners"):
             draw(learned, sources, learners, tmp_path / "a.pdf", tmp_path / "a.png")
     assert not list(tmp_path.iterdir())
 

@@ -54,6 +54,6 @@ def test_a_line_is_drawn_for_each_embedding_and_a_row_for_each_kind_of_concept(f
 
 
 def test_without_a_curve_nothing_is_drawn(files, tmp_path):
-    with pytest.raises(InputError, match="holds no curve of these sources"):
+    with pytest.raises(InputError, match="has no curve of these sources"):
         draw_new_concepts(files, {"cups": "Cups"}, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
     assert not list(tmp_path.glob("a.*"))

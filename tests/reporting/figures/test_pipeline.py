@@ -109,6 +109,6 @@ def test_letters_are_large_enough_inside_and_apart(stage_files, curve_files, tmp
 
 def test_curves_of_other_strategies_alone_are_refused(stage_files, curve_files, tmp_path):
     others = [path for path in curve_files if "entropy" in str(path)]
-    with pytest.raises(InputError, match=r"active learning: holds no curve of bald_kmeans or random; run"):
+    with pytest.raises(InputError, match=r"active learning: has no curve of bald_kmeans or random; run"):
         draw_pipeline(*stage_files, others, "Solids", "DGCNN", LEARNING, tmp_path / "a.pdf", tmp_path / "a.png")
     assert not (tmp_path / "a.pdf").exists()

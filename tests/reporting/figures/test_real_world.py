@@ -69,7 +69,7 @@ def test_fig5_shows_a_test_sample_that_an_occluder_covers_and_that_is_named_righ
     assert (shown["split"], shown["concept_true"], shown["lost_to"]) == ("test", "overlap", OCCLUDER)
     wrong = samples.assign(concept_predicted="noise")
     assert wrong.iloc[choose_sample(wrong, "predictions", pixels_I)]["concept_true"] == "overlap"
-    with pytest.raises(InputError, match="holds no test sample of overlap"):
+    with pytest.raises(InputError, match="has no test sample of overlap"):
         choose_sample(samples[samples["concept_true"] != "overlap"], "predictions", pixels_I)
 
 
@@ -109,12 +109,12 @@ def test_all_three_are_drawn_and_drawing_again_changes_no_byte(results, tmp_path
 def test_files_of_other_samples_are_refused(results, tmp_path):
     poses = pd.read_csv(results / "poses.csv", dtype=str, keep_default_na=False)
     write_csv(tmp_path / "poses.csv", poses[::-1])
-    with pytest.raises(InputError, match="holds other samples than"):
+    with pytest.raises(InputError, match="its samples differ from"):
         read_samples(tmp_path / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
 
 
 def test_metrics_of_other_methods_are_refused(results, tmp_path):
-    with pytest.raises(InputError, match="holds no confusion of these backbones"):
+    with pytest.raises(InputError, match="has no confusion of these backbones"):
         draw_real_world_confusions(results / "metrics.csv", "Frames", ["pointnet-none"], tmp_path / "a", tmp_path / "b")
 
 

@@ -54,5 +54,5 @@ def test_the_figure_is_the_same_bytes_each_time(tmp_path):
         draw_nominal_reliability(judged, SOURCES, EXPLAINERS, *files)
         drawn.append([file.read_bytes() for file in files])
     assert drawn[0] == drawn[1]
-    with pytest.raises(InputError, match="hold no predictions of these sources and explainers"):
+    with pytest.raises(InputError, match="have no predictions of these sources and explainers"):
         draw_nominal_reliability(judged, {"mugs": "Mugs"}, EXPLAINERS, tmp_path / "a.pdf", tmp_path / "a.png")

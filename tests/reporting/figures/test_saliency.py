@@ -40,6 +40,6 @@ def test_one_sample_of_each_concept_is_drawn_named_right_where_there_is_one(file
 def test_maps_of_other_samples_are_refused(files, tmp_path):
     rows = pd.read_csv(files[2])
     rows.assign(sample=rows["sample"] + 1000).to_csv(files[2], index=False)
-    with pytest.raises(InputError, match="holds other samples than"):
+    with pytest.raises(InputError, match="its samples differ from"):
         draw_saliency(*files, "Tiny", tmp_path / "a.pdf", tmp_path / "a.png")
     assert not (tmp_path / "a.pdf").exists()

@@ -65,14 +65,16 @@ def test_states_follow_the_limits_of_the_config(stage_files, monkeypatch):
 def test_uncertainties_of_other_samples_are_refused(stage_files, tmp_path):
     *files, uncertainties, limits = stage_files
     (tmp_path / "seed0.csv").write_text(uncertainties.read_text().replace("\n", "\n99").removesuffix("99"))
-    with pytest.raises(InputError, match=r"seed0\.csv: holds other samples than the registrations; make both anew"):
+    with pytest.raises(
+        InputError, match=r"seed0\.csv: its samples differ from those of the registrations; regenerate both"
+    ):
         Stages.load(*files, tmp_path / "seed0.csv", limits)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("\n0,test,", "\n99,test,", "holds other samples than"),
+        ("\n0,test,", "\n99,test,", "its samples differ from"),
         ("bald", "doubt", "column 'bald' is missing"),
         ("0.0144", "", "not a finite number"),
         ("score_noise", "score_blur", "unknown concept|does not score"),

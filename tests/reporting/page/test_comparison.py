@@ -78,5 +78,5 @@ def test_a_file_of_another_form_is_refused(tmp_path):
         ("factor", LINES[0].replace(",close,", "many,close,")),
         ("decimals", LINES[0].replace(",,,1,", ",,,many,")),
     ):
-        with pytest.raises(InputError, match=f"'{name}' holds something that is not a number: 'many'"):
+        with pytest.raises(InputError, match=f"'{name}' contains a value that is not a number: 'many'"):
             page_comparison(written(tmp_path, HEAD + line))

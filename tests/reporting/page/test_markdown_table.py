@@ -39,13 +39,13 @@ def test_what_a_table_writes_is_read_again(table, tmp_path):
         ("", "is not a caption with a table below it"),
         ("**Caption**\n", "is not a caption with a table below it"),
         ("| A |\n| :-- |\n| 1 |\n", "is not a caption with a table below it"),
-        ("**Caption**\n\n| A | B |\n| :-- | --: |\n| 1 |\n", "holds rows of different lengths"),
+        ("**Caption**\n\n| A | B |\n| :-- | --: |\n| 1 |\n", "contains rows of different lengths"),
     ],
 )
 def test_another_text_is_refused(text, fault, tmp_path):
     path = tmp_path / "t.md"
     path.write_text(text)
-    with pytest.raises(InputError, match=f"t.md: {fault}; make it anew"):
+    with pytest.raises(InputError, match=f"t.md: {fault}; regenerate it"):
         read_markdown_table(path)
 
 

@@ -156,7 +156,7 @@ def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
     ("damaged", "text", "fault"),
     [
         ("tiny/tables/table4_mine.md", "no table", "is not a caption with a table below it"),
-        ("tiny/figures/reliability.png", "no image", "is no readable image"),
+        ("tiny/figures/reliability.png", "no image", "is not a readable image"),
         ("tiny/comparison.csv", "", "is empty"),
         ("tiny/registrations/bricks/seed0.npz", "", "is not a readable npz archive"),
     ],
@@ -172,6 +172,6 @@ def test_a_damaged_file_is_named(copied, damaged, text, fault):
 @pytest.mark.parametrize("caption", [".. nonsense::", ".. raw:: html\n\n   <b>"])
 def test_a_fault_in_a_caption_is_named(copied, caption):
     folder, _ = copied
-    with pytest.raises(InputError, match="caption of reliability: is no reStructuredText"):
+    with pytest.raises(InputError, match="caption of reliability: is not valid reStructuredText"):
         write_page(folder, run_of(folder, results=results({"reliability": caption})))
     assert not (folder / "index.html").exists()

@@ -100,7 +100,7 @@ def test_the_words_say_what_was_done(registrations):
 def test_predictions_of_other_samples_are_refused(files):
     rows = pd.read_csv(files["predictions"], dtype=str)
     rows[rows["split"] == "train"].to_csv(files["predictions"], index=False)
-    with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; make both anew"):
+    with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; regenerate both"):
         page_samples(files, SOURCE, LIMITS)
 
 

@@ -85,9 +85,9 @@ def test_comparisons_add_up_and_without_one_nothing_is_bold(builder):
 
 
 def test_a_table_without_rows_is_refused_by_its_name(builder):
-    builder.require_rows("metrics", "hold no accuracy", "run its explainers first")
-    with pytest.raises(InputError, match=r"^metrics: hold no accuracy for table0; run its explainers first$"):
-        TableBuilder("table0", HEADS).require_rows("metrics", "hold no accuracy", "run its explainers first")
+    builder.require_rows("metrics", "have no accuracy", "run its explainers first")
+    with pytest.raises(InputError, match=r"^metrics: have no accuracy for table0; run its explainers first$"):
+        TableBuilder("table0", HEADS).require_rows("metrics", "have no accuracy", "run its explainers first")
 
 
 def test_the_caption_speaks_of_the_stand_ins_among_the_rows(builder):

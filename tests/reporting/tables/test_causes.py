@@ -49,7 +49,7 @@ def test_the_bounds_in_the_csv_are_those_of_the_bootstrap(intervals):
 
 
 def test_intervals_of_other_explainers_make_no_table(intervals):
-    with pytest.raises(InputError, match="hold no diagnosis for table9_causes"):
+    with pytest.raises(InputError, match="have no diagnosis for table9_causes"):
         table9_causes(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS)
 
 
@@ -69,5 +69,5 @@ def test_frames_are_counted_below_the_table(intervals):
     assert "Of 300 registrations 120 are nominal, 130 borderline, and 50 failed: 6 mostly by noise, 30" in text
     assert "naming pose would be right for 60 % of the failed" in text
     assert "over 13 scenes, 32 objects and" in text
-    with pytest.raises(InputError, match="hold no diagnosis of frames"):
+    with pytest.raises(InputError, match="have no diagnosis of frames"):
         table9_frames(intervals, {"title": "Frames", "stand_in": False}, EXPLAINERS)

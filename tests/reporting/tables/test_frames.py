@@ -45,5 +45,5 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
 
 
 def test_nothing_to_show_is_refused():
-    with pytest.raises(InputError, match="hold no accuracy for table6_seen_unseen"):
+    with pytest.raises(InputError, match="have no accuracy for table6_seen_unseen"):
         make({("real_rgbd", "attribution", "other"): [(0.7, 100)]})

@@ -55,7 +55,7 @@ def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(make):
     table = make(grid(), STAND_INS, 200)
     assert "on procedural stand-ins" in table.caption
     assert table.latex().count("{") == table.latex().count("}")
-    with pytest.raises(InputError, match=f"hold nothing for {make.__name__}"):
+    with pytest.raises(InputError, match=f"have no results for {make.__name__}"):
         make(grid(("cups",)), REAL, 200)
 
 
@@ -89,6 +89,6 @@ def test_the_figure_has_the_accuracies_that_the_paper_prints(tmp_path, monkeypat
 
 
 def test_without_a_grid_of_these_sources_nothing_is_drawn(tmp_path):
-    with pytest.raises(InputError, match="hold nothing of these sources"):
+    with pytest.raises(InputError, match="have no results for these sources"):
         draw_kernel_curves(grid(), {"cups": "Cups"}, read_published(), tmp_path / "a.pdf", tmp_path / "a.png")
     assert not list(tmp_path.iterdir())

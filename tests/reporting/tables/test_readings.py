@@ -43,5 +43,5 @@ def test_the_figure_has_a_panel_for_each_group_with_readings(tmp_path):
     draw_readings(rows(), GROUPS, REAL, tmp_path / "a.pdf", tmp_path / "a.png")
     draw_readings(rows(), GROUPS, REAL, tmp_path / "b.pdf", tmp_path / "b.png")
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
-    with pytest.raises(InputError, match="holds no readings"):
+    with pytest.raises(InputError, match="has no readings"):
         draw_readings(rows("reproduced"), GROUPS, REAL, tmp_path / "c.pdf", tmp_path / "c.png")

@@ -42,14 +42,14 @@ VALUES = {
     ("objects.npz", "complex points", "complex"): {"points_m": lambda p: p + 1j},
     ("objects.npz", "points of text", "type <U"): {"points_m": lambda p: p.astype(str)},
     ("objects.npz", "points of dates", "type datetime"): {"points_m": lambda p: p.astype("datetime64[s]")},
-    ("objects.npz", "points far from the origin", "centred"): {"points_m": lambda p: p + 5},
+    ("objects.npz", "points far from the origin", "centered"): {"points_m": lambda p: p + 5},
     ("objects.npz", "normals of no length", "normal"): {"normals": lambda n: 0 * n},
     ("objects.npz", "long normals", "normal"): {"normals": lambda n: 2 * n},
-    ("objects.npz", "two of one name", "one name"): {"names": lambda n: n[[0, 0, 2]]},
+    ("objects.npz", "two of one name", "the same name"): {"names": lambda n: n[[0, 0, 2]]},
     ("objects.npz", "names of numbers", "names"): {"names": lambda n: np.arange(len(n))},
     ("objects.npz", "offsets of halves", "offsets"): {"offsets": lambda o: o + 0.0},
-    ("objects.npz", "offsets that fall", "fit together"): {"offsets": lambda o: o[[0, 2, 1, 3]]},
-    ("objects.npz", "no objects", "fit together"): {
+    ("objects.npz", "offsets that fall", "do not match"): {"offsets": lambda o: o[[0, 2, 1, 3]]},
+    ("objects.npz", "no objects", "do not match"): {
         "names": lambda n: n[:0], "diameters_m": lambda d: d[:0], "offsets": lambda o: o[:1],
         "points_m": lambda p: p[:0], "normals": lambda n: n[:0],
     },
@@ -82,7 +82,7 @@ VALUES = {
     ("uncertainty.npz", "complex uncertainty", "complex"): {"uncertainty": lambda u: u + 1j},
     ("uncertainty.npz", "negative calls", "icp_calls"): {"icp_calls": lambda c: c - 5},
     ("uncertainty.npz", "doubtful degeneracy", "degenerate"): {"degenerate": lambda d: d + 0.5},
-    ("uncertainty.npz", "other samples", "conditions.csv: holds other samples"): {"sample": lambda s: s + 1000},
+    ("uncertainty.npz", "other samples", "conditions.csv: its samples differ"): {"sample": lambda s: s + 1000},
     ("uncertainty.npz", "other conditions", "conditions"): {
         name: lambda a: a[:, :2] for name in ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
     },

@@ -99,7 +99,7 @@ def test_one_that_learns_needs_examples_and_fails_at_too_few():
 @pytest.mark.parametrize(
     ("name", "settings", "message"),
     [
-        ("icp", {}, r"estimator 'icp': unknown; known are .*brossard"),
+        ("icp", {}, r"estimator 'icp': unknown; choose one of .*brossard"),
         ("censi", {"sigma": 1}, r"estimator 'censi': got an unexpected keyword argument 'sigma'"),
         ("monte_carlo", {"starts": 2.5}, r"setting starts: 2.5 is not of type 'integer'"),
         ("censi", {"noise": -1}, r"setting noise: -1 is less than the minimum of 0"),
