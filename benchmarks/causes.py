@@ -33,8 +33,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--candidates", type=int, default=60)
     parser.add_argument("--starts", type=int, default=13)
-    parser.add_argument("--family", default="ycb", help="of procedural objects")
-    parser.add_argument("--objects", type=Path, help="file of a run, in the place of procedural objects")
+    parser.add_argument("--family", default="ycb", help="family of procedural objects")
+    parser.add_argument("--objects", type=Path, help="file of canonical clouds, in place of procedural objects")
     options = parser.parse_args(arguments)
     prepare()
     from gpca.causes.settings import CauseSettings

@@ -31,7 +31,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--model", type=Path, required=True)
     parser.add_argument("--frames", type=Path, help="folder of a run")
-    parser.add_argument("--name", default="real_rgbd", help="of the frames in that run")
+    parser.add_argument("--name", default="real_rgbd", help="name of the frames in that run")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--objects", type=Path, help="file of canonical clouds")
     parser.add_argument("--pairs", type=int, default=20)

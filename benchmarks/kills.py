@@ -33,10 +33,12 @@ DRAWN_FROM_IT = (  # and show seconds
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=20, help="default 20")
-    parser.add_argument("--longest", type=float, default=30.0, help="seconds before a kill, at most; default 30")
-    parser.add_argument("--seed", type=int, default=0, help="of the seconds, default 0")
+    parser.add_argument("--longest", type=float, default=30.0, help="most seconds before a kill, default 30")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the times of the kills, default 0")
     parser.add_argument("--cores", type=int, default=2, help="default 2")
-    parser.add_argument("--folder", type=Path, default=ROOT / "build/kills", help="default build/kills; made afresh")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "build/kills", help="default build/kills, which is recreated"
+    )
     options = parser.parse_args(arguments)
     shutil.rmtree(options.folder, ignore_errors=True)
     undisturbed, disturbed = (options.folder / name for name in ("undisturbed", "killed"))

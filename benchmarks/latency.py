@@ -110,7 +110,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in {"threads": 1, "points": 512, "pairs": 12, "repeats": 50, "draws": 1000}.items():
         parser.add_argument(f"--{name}", type=int, default=default, help=f"default {default}")
-    parser.add_argument("--model", type=Path, help="a model file, whose explanations are timed")
+    parser.add_argument("--model", type=Path, help="model file whose explanations are timed")
     options = parser.parse_args(arguments)
     if options.points < 64 or options.draws < 2 or min(options.threads, options.pairs, options.repeats) < 1:
         parser.error("points must be at least 64, draws 2 and the others 1")

@@ -84,8 +84,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--configfile", type=Path, help="as for snakemake")
     parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
     parser.add_argument("--cores", type=int, default=2, help="default 2")
-    parser.add_argument("--existing", metavar="RUN", help="only read results/RUN")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the stages")
+    parser.add_argument("--existing", metavar="RUN", help="run nothing, only read results/RUN")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the stages")
     options = parser.parse_args(arguments)
     folder = ROOT / "results" / (options.existing or RUN)
     try:

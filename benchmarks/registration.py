@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> None:
         result[f"ratio_{name}"] = median(own / open3d for open3d, own in turns)
         print(f"{name:24}{result[f'ms_{name}']:9.2f}{result[f'ratio_{name}']:9.2f}{failed:8d}", flush=True)
     for name, package in missing.items():
-        print(f"{name:24}left out: the package {package} is not installed")
+        print(f"{name:24}skipped: the package {package} is not installed")
     print(json.dumps({key: float(f"{value:.4g}") for key, value in result.items()}))
 
 
@@ -63,7 +63,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in {"samples": 12, "points": 512, "repeats": 3}.items():
         parser.add_argument(f"--{name}", type=int, default=default, help=f"default {default}")
-    parser.add_argument("--methods", nargs="+", help="names of the registry; default: all")
+    parser.add_argument("--methods", nargs="+", help="names of registration methods; default: all")
     options = parser.parse_args(arguments)
     if options.samples < 6 or options.samples % 3 or options.points < 64 or options.repeats < 1:
         parser.error("samples must be a multiple of 3 and at least 6, points at least 64, repeats 1")

@@ -45,10 +45,12 @@ WAIT_S = 10.0  # that a submitted job takes besides its work: the queue's turn, 
 def main(arguments: list[str] | None = None) -> int:
     parser = parser_of_run(__doc__)
     parser.add_argument("--cores", type=int, nargs="+", default=[1, 2, 4, 8, 16], help="default 1 2 4 8 16")
-    parser.add_argument("--sources", type=int, default=0, help="datasets of the larger run; by default none is planned")
-    parser.add_argument("--seeds", type=int, default=10, help="of the larger run, default 10")
-    parser.add_argument("--explainers", type=int, default=20, help="of the larger run, default 20")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the tables")
+    parser.add_argument(
+        "--sources", type=int, default=0, help="number of datasets of the larger run; by default none is planned"
+    )
+    parser.add_argument("--seeds", type=int, default=10, help="number of seeds of the larger run, default 10")
+    parser.add_argument("--explainers", type=int, default=20, help="number of explainers of the larger run, default 20")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the tables")
     options = parser.parse_args(arguments)
     try:
         run = name_of_run(options.folder)

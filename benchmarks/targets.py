@@ -47,8 +47,8 @@ class Cost:
 
 def main(arguments: list[str] | None = None) -> int:
     parser = parser_of_run(__doc__)
-    parser.add_argument("--cores", type=int, default=2, help="of the wall time, default 2")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page that has a place for the rows")
+    parser.add_argument("--cores", type=int, default=2, help="cores for the wall time, default 2")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the rows")
     options = parser.parse_args(arguments)
     try:
         run = name_of_run(options.folder)
@@ -68,8 +68,8 @@ def main(arguments: list[str] | None = None) -> int:
 def parser_of_run(description: str | None) -> argparse.ArgumentParser:
     """Return a parser of the folder of a finished run and of what that was configured by."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="of a finished run, such as results/real")
-    parser.add_argument("--configfile", type=Path, help="of that run; by default config/{run}.yaml where it is")
+    parser.add_argument("folder", type=Path, help="folder of a finished run, such as results/real")
+    parser.add_argument("--configfile", type=Path, help="config of that run; default config/{run}.yaml, if it exists")
     parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
     return parser
 

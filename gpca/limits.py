@@ -31,7 +31,7 @@ def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: int =
     if not Path(path).is_file():
         raise InputError(path, fault, remedy)
     if (size := Path(path).stat().st_size) > largest_bytes:
-        raise InputError(path, f"has {size / 1e9:.3g} GB, more than the limit of {largest_bytes / 1e9:.3g} GB", remedy)
+        raise InputError(path, f"is {size / 1e9:.3g} GB, more than the limit of {largest_bytes / 1e9:.3g} GB", remedy)
 
 
 def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: str) -> None:

@@ -36,9 +36,7 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
             path, "is not a file" if path.exists() else "no such file", "name a config, a YAML or JSON file"
         )
     if (size := path.stat().st_size) > LARGEST_BYTES:
-        raise InputError(
-            path, f"is too large for a config: it has {size} bytes", f"a config has at most {LARGEST_BYTES}"
-        )
+        raise InputError(path, f"is too large for a config: it has {size} bytes", f"the limit is {LARGEST_BYTES}")
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as fault:

@@ -268,7 +268,7 @@ def test_registration_ends_with_the_numbers_of_each_method(capsys):
     out = capsys.readouterr().out
     result = last_line(out)
     measured = ["point_to_point", "huber", "teaser"]
-    if "kiss_matcher            left out: the package kiss_matcher is not installed" not in out:
+    if "kiss_matcher            skipped: the package kiss_matcher is not installed" not in out:
         measured.append("kiss_matcher")
     names = [f"{number}_{name}" for name in measured for number in ("ms", "ratio")]
     assert list(result) == ["reference_ms", "normals_ms", *names]

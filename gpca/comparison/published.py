@@ -177,7 +177,7 @@ def read_published(path: str | Path = PUBLISHED) -> list[Number]:
             raise InputError(where, f"repeats {_named(number.key)}", f"it is on line {first[number.key]}")
         if number.same_as and number.same_as not in first:
             raise InputError(
-                where, f"'same_as' {_named(number.same_as)} is not a number above", "use a name from this file"
+                where, f"'same_as' {_named(number.same_as)} is not a number above", "name one of this file"
             )
         first[number.key] = line
         numbers.append(number)
@@ -212,9 +212,7 @@ def read_lines(path: str | Path, columns: Sequence[str]) -> Iterator[tuple[int, 
             for fields in reader:
                 if len(fields) != len(columns):
                     fault = f"has {len(fields)} fields for {len(columns)} columns"
-                    raise InputError(
-                        f"{path}, line {reader.line_num}", fault, "put text that contains a comma in quotes"
-                    )
+                    raise InputError(f"{path}, line {reader.line_num}", fault, "quote text that contains a comma")
                 yield reader.line_num, {name: field.strip() for name, field in zip(columns, fields, strict=True)}
     except FileNotFoundError:
         raise InputError(path, "no such file", "restore it") from None

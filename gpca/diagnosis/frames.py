@@ -74,7 +74,7 @@ def collect(
 def _seeds(*given: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataFrame, pd.DataFrame]]:
     files = [list(paths) for paths in given]
     if not files[0] or len({len(paths) for paths in files}) > 1:
-        raise InputError("causes of frames", "files of every seed are needed", "give as many of each kind")
+        raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
     for causes_file, sample_file, prediction_file in zip(*files, strict=True):
         causes = Causes.load(causes_file)
         numbers = [str(number) for number in causes.registrations.sample]

@@ -79,7 +79,7 @@ def read_judged(
     for path in prediction_files:
         source, explainer, seed = source_method_seed(path)
         if (source, seed) not in truths:
-            raise InputError(path, "its truth was not given", f"give causes/{source}/seed{seed}.npz")
+            raise InputError(path, "its ground truth was not given", f"give causes/{source}/seed{seed}.npz")
         rows = read_predictions(path)
         rows = rows[rows["split"] == "test"]
         truth = truths[source, seed]

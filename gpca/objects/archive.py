@@ -50,7 +50,7 @@ class Member:
         """Return the content; InputError when it is damaged, or too large to be parsed."""
         if self.size > LARGEST_FILE_BYTES:
             most = f"more than the limit of {LARGEST_FILE_BYTES / 1e9:.3g} GB"
-            raise InputError(self.archive, f"member '{self.name}' has {self.size / 1e9:.3g} GB, {most}", REMEDY)
+            raise InputError(self.archive, f"member '{self.name}' is {self.size / 1e9:.3g} GB, {most}", REMEDY)
         with _damage_named(self.archive), self.open() as stream:
             return stream.read()
 

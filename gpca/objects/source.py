@@ -59,7 +59,9 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         wanted = entry.get("location") or ", ".join(entry.get("files") or ["location"])
         raise InputError(subject, f"{wanted} does not exist", "correct location, or set data_dir to its parent folder")
     if checksums and len(checksums) != len(urls):
-        raise InputError(subject, f"has {len(urls)} url(s) but {len(checksums)} sha256", "give one for each, or null")
+        raise InputError(
+            subject, f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)", "give one for each, or null"
+        )
     return {**entry, "origin": "download"}
 
 

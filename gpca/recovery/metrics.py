@@ -90,7 +90,7 @@ def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
         rows["seconds"] = sum(numbers(path, rows, name) for name in SECONDS)
         parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
     if not parts:
-        raise InputError("recovery", "no files of seconds were given", "run the step recover")
+        raise InputError("recovery", "no timing files were given", "run the step recover")
     return pd.concat(parts).groupby(level="policy").mean().to_dict()
 
 

@@ -31,7 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--other-registrations",
         type=Path,
         nargs="*",
-        help="registrations of another source; without them, that set is left out",
+        help="registrations of another source; without them, this set is skipped",
     )
     parser.add_argument("--embeddings", required=True, type=Path, nargs="+")
     parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="encoder weights")

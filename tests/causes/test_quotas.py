@@ -87,15 +87,21 @@ def test_what_is_off_when_clean_is_wanted_only_where_it_has_a_share():
             ["overlap", True],
             "failed from overlap among several causes; raise causes.severities.crop, widen causes.sev",
         ),
-        (["nominal"], "nominal; lower causes.severities, raise causes.limits.nominal, or move part of causes.shares"),
-        (["borderline"], "borderline; raise causes.limits.failed, or move part of causes.shares.borderline to anoth"),
+        (
+            ["nominal"],
+            "nominal samples; lower causes.severities, raise causes.limits.nominal, or move part of causes.shares",
+        ),
+        (
+            ["borderline"],
+            "borderline samples; raise causes.limits.failed, or move part of causes.shares.borderline to anoth",
+        ),
     ],
 )
 def test_who_gives_up_says_which_group_is_rare_and_what_to_widen(rare, said):
     wanted = quotas()
     fill(wanted, *(group for group in wanted._most if list(group)[: len(rare)] != rare))
     line = str(wanted.refuse_to_go_on("ycb", 3, "train", 2000))
-    assert line.startswith("causes of ycb, seed 3, train: 2000 candidates gave ")
+    assert line.startswith("causes of ycb, seed 3, train: 2000 candidates yielded ")
     assert said in line
 
 

@@ -123,7 +123,7 @@ def test_times_come_in_seconds():
         ({"paper_n": "few"}, "line 2: 'paper_n' is 'few'; give a whole number"),
         ({"paper_n": "-5"}, "line 2: 'paper_n' is '-5'; give a whole number"),
         ({"paper_n": "20"}, "line 2: no share of 20 samples rounds to 31.4 %; correct 'paper_n'"),
-        ({"same_as": "I / YCB / SHAP"}, "line 2: 'same_as' I / YCB / SHAP is not a number above; use a name from this"),
+        ({"same_as": "I / YCB / SHAP"}, "line 2: 'same_as' I / YCB / SHAP is not a number above; name one of this"),
         ({"place": " "}, "line 2: 'place' is empty; fill it in"),
         ({"table": TEXT, "row": ""}, "line 2: 'row' is empty; fill it in"),
         ({"in_file": "metric.csv"}, "line 2: unknown in_file 'metric.csv'; expected one of metrics.csv, "),
@@ -209,9 +209,7 @@ def test_a_reason_of_nothing_is_refused(tmp_path, changes, message):
 def test_a_reason_with_a_comma_out_of_quotes_is_refused(tmp_path):
     path = tmp_path / "reasons.csv"
     path.write_text("table,row,column,reason\nI,*,SHAP,first, second\n")
-    with pytest.raises(
-        InputError, match="line 2: has 5 fields for 4 columns; put text that contains a comma in quotes"
-    ):
+    with pytest.raises(InputError, match="line 2: has 5 fields for 4 columns; quote text that contains a comma"):
         read_reasons(NUMBERS, path)
 
 

@@ -45,7 +45,7 @@ def test_all_sources_together_are_one_more_where_there_are_several(causes, tmp_p
 
 def test_predictions_without_their_truth_or_of_other_samples_are_refused(causes, tmp_path):
     files, truth = write_run(tmp_path, causes)
-    with pytest.raises(InputError, match=r"its truth was not given; give causes/four/seed100\.npz"):
+    with pytest.raises(InputError, match=r"its ground truth was not given; give causes/four/seed100\.npz"):
         read_judged(files, [])
     lines = files[0].read_text().splitlines()
     files[0].write_text("\n".join(lines[:-1]) + "\n")

@@ -160,7 +160,13 @@ def spoiled(h, value):
             {"components": 10},
             "10 components are too many for 9 .*; set components to at most 9",
         ),
-        ("umap", TRAIN[:12], TEST, {"components": 4}, "reduction 'umap': 15 neighbours of 12 training .*; lower n"),
+        (
+            "umap",
+            TRAIN[:12],
+            TEST,
+            {"components": 4},
+            "reduction 'umap': 15 neighbours are too many for 12 .*; lower n",
+        ),
         (
             "umap",
             TRAIN[:9],

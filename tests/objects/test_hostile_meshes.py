@@ -169,7 +169,7 @@ def test_a_file_too_large_to_be_parsed_is_not_opened(tmp_path):
     for name, kind in (("sparse.ply", "mesh_folder"), ("sparse.pcd", "uw_rgbd")):
         with (tmp_path / name).open("wb") as file:
             file.truncate(5 * 10**9)
-        refusal(arguments(kind, unit="m"), tmp_path, name, "has 5 GB, more than the 1 GB read")
+        refusal(arguments(kind, unit="m"), tmp_path, name, "is 5 GB, more than the limit of 1 GB")
 
 
 @pytest.mark.parametrize("points", [0, 63, -5])

@@ -5,7 +5,7 @@ METHODS = NAMES["method"]
 for name, package in left_out(config["methods"]).items():
     if workflow.is_main_process:
         print(
-            f"gpca: registration method '{name}' is left out: the package {package} is not installed",
+            f"gpca: registration method '{name}' is skipped: the package {package} is not installed",
             file=sys.stderr,
         )
 

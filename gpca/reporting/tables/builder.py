@@ -68,7 +68,7 @@ class TableBuilder:
         self._compared += groups.values()
 
     def require_rows(self, subject: str, verb: str, remedy: str) -> None:
-        """Raise an InputError, such as "metrics: hold no accuracy for table1_extended", if no row was added."""
+        """Raise an InputError, such as "metrics: have no accuracy for table1_extended", if no row was added."""
         if not self.rows:
             raise InputError(subject, f"{verb} for {self.name}", remedy)
 
