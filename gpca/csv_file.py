@@ -74,7 +74,7 @@ def finite_number(subject: object, name: str, text: str, remedy: str = "regenera
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(subject, f"'{name}' is '{text}' and not a finite number", remedy)
+        raise InputError(subject, f"'{name}' is '{text}', not a finite number", remedy)
     return value
 
 

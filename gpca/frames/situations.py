@@ -189,7 +189,7 @@ class Situations:
             clean = self._clean(random, axes_now)
             if clean is not None and (disturbed := self._disturbed(clean, cause, random)) is not None:
                 return disturbed, clean
-        raise InputError(f"recovery: situation {axes}", f"no room for cause '{cause}'", "widen recovery.hidden")
+        raise InputError(f"recovery: situation {axes}", f"has no room for cause '{cause}'", "widen recovery.hidden")
 
     def misplaced(self, clean: Situation, number: int) -> Situation:
         """Return one of many like a situation without a cause, each with a pose error of its own."""

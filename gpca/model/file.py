@@ -28,7 +28,7 @@ VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to ta
 RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
 SHIPPED = Path(__file__).with_name("shipped.pt")  # comes with the package where `python -m gpca ship` has put it
 BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
-REMEDY = "make one with 'make results', or alone with 'snakemake -j2 results/embedded/model.pt'"
+REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results/embedded/model.pt'"
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ def _download(url: str, path: Path, remedy: str) -> None:
     except (requests.exceptions.ConnectionError, requests.exceptions.Timeout) as fault:
         raise InputError(url, "cannot be reached", remedy) from fault
     except requests.exceptions.RequestException as fault:
-        raise InputError(url, f"the transfer broke off ({type(fault).__name__})", remedy) from fault
+        raise InputError(url, f"the transfer was interrupted ({type(fault).__name__})", remedy) from fault
 
 
 def _within_limits(download: Callable[[], object], url: str, path: Path, remedy: str) -> None:

@@ -207,18 +207,18 @@ def test_a_section_that_is_newer_than_the_reference_is_no_other_config(folders):
         (
             "metrics.csv",
             ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n",
-            "'value' is 'nan' and not a finite number; regenerate it",
+            "'value' is 'nan', not a finite number; regenerate it",
         ),
         (
             "metrics.csv",
             ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,0.9,0.8\n",
             "has rows with more entries than columns",
         ),
-        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "'value' is '' and not a finite number"),
+        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "'value' is '', not a finite number"),
         (
             "tables/table1.csv",
             ",".join(HEADS) + "\nycb,gpca,many,1,2,5,100,False\n",
-            "'mean' is 'many' and not a finite number",
+            "'mean' is 'many', not a finite number",
         ),
         ("metrics.csv.provenance.json", "{", "is not a provenance record; regenerate its result"),
         ("metrics.csv.provenance.json", "[]", "is not a provenance record; regenerate its result"),
