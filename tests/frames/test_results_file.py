@@ -41,7 +41,7 @@ FAULTS = {
         HEAD,
         "line 2: the pose is not a rigid transform: it is mirrored",
     ),
-    "NaN": ((f"1,0,3,0.2,{ONE},1 2 nan,-1",), HEAD, "t contains values other than finite"),
+    "NaN": ((f"1,0,3,0.2,{ONE},1 2 nan,-1",), HEAD, "t contains values that are not finite"),
     "an image that is not there": (
         (f"1,0,3,1,{ONE},1 2 800,1", f"1,8,3,1,{ONE},1 2 800,1"),
         HEAD,

@@ -54,7 +54,7 @@ def test_a_pair_far_from_all_that_the_diagnosis_learnt_is_said_to_be(explainer, 
     for unlike, words in ((1.7, ["1.7"]), (0.9, [])):
         monkeypatch.setattr(PairClassifier, "unlikeness", lambda self, inputs, unlike=unlike: np.array([unlike]))
         said = explainer.explain(*pair)
-        assert [line.split()[3] for line in said.warnings if "that the diagnosis was learnt from" in line] == words
+        assert [line.split()[3] for line in said.warnings if "that the diagnosis was trained on" in line] == words
         assert said.diagnosis.unlikeness == unlike
 
 
