@@ -34,8 +34,8 @@ pathvars:
 
 
 TOPICS = (
-    "common functions objects registrations methods causes estimators frames frame_causes encoders uncertainty explainers "
-    "active_learning diagnostics controls exchange gradients model recovery results readings comparison targets"
+    "common functions objects registrations methods causes estimators frames virtual_frames frame_causes encoders "
+    "uncertainty explainers active_learning diagnostics controls exchange gradients model recovery results readings comparison targets"
 )
 for topic in TOPICS.split():
 

@@ -39,6 +39,15 @@ class FrameDataset:
 
 
 @dataclass(frozen=True)
+class VirtualFrames:
+    """Frames rendered of the datasets' own models: so many scenes, views of each, and training samples in all."""
+
+    count: Annotated[int, Bounds(minimum=2)]
+    views: Count
+    train: TrainSamples
+
+
+@dataclass(frozen=True)
 class RealWorld:
     """Registrations of depth frames, every backbone with every reduction."""
 
@@ -55,6 +64,7 @@ class RealWorld:
     backbones: tuple[str, ...]
     reductions: tuple[Literal["none", "pca", "umap", "autoencoder"], ...]
     pretraining: Training | None
+    virtual: VirtualFrames | None
     training: dict[str, Training] | None
     explainers: Annotated[dict[str, dict | None], Named(EXPLAINERS)]
     one_encoder: bool

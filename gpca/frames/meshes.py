@@ -5,12 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import numpy as np
+
+from gpca.environment import require_open3d
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.reading import CentredModel, Dataset, distinct_surfaces
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.source import folders
+from gpca.objects.surface import Surface
+
+MOST_FACES = 2000  # of a mesh; what decimation moves is far below the noise of depth
 
 
 def datasets_of(
@@ -58,6 +64,24 @@ def meshes_of(
             raise InputError(f"object '{name}'", fault, remedy)
         meshes[index] = MeshScene([(surfaces[name].vertices_m, surfaces[name].triangles)])
     return meshes
+
+
+def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
+    """Return a mesh of at most so many faces, by quadric decimation (Garland and Heckbert 1997): scans have more.
+
+    Raises:
+        InputError: a cloud of points.
+    """
+    if surface.faces is None:
+        fault = "is a point cloud, but the virtual camera needs a mesh"
+        raise InputError(f"object '{surface.name}'", fault, "name a source of meshes")
+    if len(surface.faces) <= most_faces:
+        return surface
+    o3d = require_open3d()
+    vertices, triangles = o3d.utility.Vector3dVector, o3d.utility.Vector3iVector
+    mesh = o3d.geometry.TriangleMesh(vertices(surface.vertices_m), triangles(surface.faces.astype(np.int32)))
+    mesh = mesh.simplify_quadric_decimation(most_faces)
+    return Surface(surface.name, np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64))
 
 
 def _given(entry: dict) -> dict:

@@ -1,4 +1,4 @@
-"""Table-top scenes of procedural objects, seen by the virtual camera and written as a BOP dataset."""
+"""Table-top scenes, seen by the virtual camera and written as a BOP dataset."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class SceneSettings:
     """What is on the table and from where it is seen.
 
     Attributes:
-        families: of procedural objects.
+        families: of procedural objects; none where the objects are others.
         count, views: scenes, and frames of each.
         objects: range of their number in a scene.
         distance_m: range from the camera to the middle of the objects.
@@ -91,7 +91,8 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
         drawn = {"scenes" if name == "count" else name: value for name, value in asdict(settings).items()}
-        _write_json(partial / DESCRIPTION, {"title": f"{source}, procedural stand-in", **drawn})
+        title = f"{source}, procedural stand-in" if settings.families else source
+        _write_json(partial / DESCRIPTION, {"title": title, **drawn})
         for scene in progress(range(settings.count), f"scenes of {source}"):
             standing = lay_table(surfaces, settings, source, scene)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)

@@ -9,6 +9,7 @@ from gpca.errors import InputError
 from gpca.objects.source import data_files, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
+VIRTUAL = "virtual_rgbd"  # frames rendered of the models of a run's datasets
 ONE_ENCODER = f"{REAL_WORLD}_one_encoder"  # the same, where seeds are those of the classifier alone
 
 

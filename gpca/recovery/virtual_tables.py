@@ -7,11 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import numpy as np
-
-from gpca.environment import require_open3d
-from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.meshes import simplified
 from gpca.frames.situations import Shelf, Situations
 from gpca.objects.surface import Surface
 from gpca.pairs.dataset import Registrations
@@ -21,7 +18,6 @@ from gpca.progress import progress
 from gpca.recovery.cases import register_first
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 
-MOST_FACES = 2000  # of a mesh; what decimation moves is far below the noise of depth
 PARTS = ("train", "test", "rehearsals", "failures")
 
 
@@ -37,24 +33,6 @@ def lay_tables(
     recovery = settings.section
     shelf = Shelf(surfaces, source, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
     return {part: Situations(shelf, settings.situation, (source, seed, part)) for part in PARTS}
-
-
-def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
-    """Return a mesh of at most so many faces, by quadric decimation (Garland and Heckbert 1997): scans have more.
-
-    Raises:
-        InputError: a cloud of points.
-    """
-    if surface.faces is None:
-        fault = f"object '{surface.name}' is a point cloud, but the camera needs a mesh"
-        raise InputError("recovery.objects", fault, "name a source of meshes")
-    if len(surface.faces) <= most_faces:
-        return surface
-    o3d = require_open3d()
-    vertices, triangles = o3d.utility.Vector3dVector, o3d.utility.Vector3iVector
-    mesh = o3d.geometry.TriangleMesh(vertices(surface.vertices_m), triangles(surface.faces.astype(np.int32)))
-    mesh = mesh.simplify_quadric_decimation(most_faces)
-    return Surface(surface.name, np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64))
 
 
 def register_situations(

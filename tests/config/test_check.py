@@ -87,6 +87,12 @@ FAULTS = [
         ["dgcnn", "pointnet3"],
         "real_world.backbones: no encoder 'pointnet3'; choose one of dgcnn",
     ),
+    (
+        "real_world.virtual",
+        {"count": 4, "views": 1, "train": 30},
+        "real_world.virtual: needs real_world.datasets: it renders their models; set datasets, or virtual to null",
+    ),
+    ("real_world.virtual", {"count": 4, "views": 1}, "real_world.virtual: 'train' is a required property"),
     ("real_world.scenes.views", 0, "real_world.scenes.views: 0 is less than the minimum of 1"),
     (
         "real_world.scenes.distance_m",

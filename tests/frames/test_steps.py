@@ -75,6 +75,23 @@ def test_scenes_are_drawn_by_a_command(tmp_path, monkeypatch):
     assert len(list((tmp_path / "drawn/test/000000/mask_visib").iterdir())) == 2
 
 
+def test_scenes_are_drawn_of_the_models_of_datasets(scenes, tmp_path):
+    """Encoders can be pretrained on them: every object that a frame shows, in the frame and the size that it has."""
+    camera = {"width": 64, "height": 48, "focal_px": 60}
+    datasets = {name: {"location": str(scenes)} for name in ("tiny", "twin")}
+    given = settings(count=2, views=1, objects=[2, 2], camera=camera, datasets=datasets)
+    assert main(["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]) == 0
+    drawn, shown = (
+        json.loads((folder / "models/models_info.json").read_text()) for folder in (tmp_path / "drawn", scenes)
+    )
+    assert len(drawn) == len(shown)  # those of the twin are the same
+    assert [model["diameter"] for model in drawn.values()] == pytest.approx(
+        [model["diameter"] for model in shown.values()], rel=0.01
+    )
+    told = json.loads((tmp_path / "drawn/dataset_info.json").read_text())
+    assert (told["title"], told["families"]) == ("virtual", [])
+
+
 @pytest.mark.parametrize(
     ("given", "expected"),
     [

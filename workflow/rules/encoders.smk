@@ -60,9 +60,7 @@ rule train_encoder:
 
 rule pretrain_encoder:
     input:
-        registrations=collect(
-            f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SOURCES
-        ),
+        registrations=PRETRAINED_ON,
         code=encoder_code("train"),
     output:
         weights="<results>/encoders/pretrained/{backbone}.pt",

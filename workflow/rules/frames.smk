@@ -52,9 +52,10 @@ rule render_scenes:
     params:
         settings=settings("real_world", "scenes"),
         source=FRAMES,
+        data=[],
     shell:
         "python -m gpca scenes --threads {threads} --source {params.source} "
-        "--settings {params.settings:q} --out {output} 2> {log}"
+        "--settings {params.settings:q} {params.data:q} --out {output} 2> {log}"
 
 
 rule instances:

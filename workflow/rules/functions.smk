@@ -70,13 +70,10 @@ def read_by_readings(wildcards):
 def read_by_frame_input():
     """Return the frames of its seeds with what the protocol's encoder makes of them, and what others start from."""
     of = {"source": FRAMES, "seed": SEEDS[: READINGS["frame_seeds"]]}
-    first = collect(
-        f"<results>/registrations/{{source}}/seed{SEEDS[0]}.npz", source=SOURCES
-    )
     return {
         "registrations": [
             *collect("<results>/registrations/{source}/seed{seed}.npz", **of),
-            *(first if REAL_WORLD["pretraining"] else []),
+            *(PRETRAINED_ON if REAL_WORLD["pretraining"] else []),
         ],
         "poses": collect("<results>/poses/{source}/seed{seed}.csv", **of),
         "predictions": collect(

@@ -42,6 +42,11 @@ def check_real_world(config: dict, encoders_left_out: Set[str]) -> None:
 def _check_training(config: dict) -> None:
     """Check that the encoders take what they are trained with on frames."""
     section, encoders = config["real_world"], config["encoders"]
+    if section["virtual"]:
+        for needed, why in (("datasets", "it renders their models"), ("pretraining", "only this uses it")):
+            if not section[needed]:
+                fault = f"needs real_world.{needed}: {why}"
+                raise InputError("config key real_world.virtual", fault, f"set {needed}, or virtual to null")
     require_names("real_world.training", list(section["training"] or {}), encoders, "encoder", set())
     for name in section["backbones"]:
         for part in ("pretraining", "training"):

@@ -1,0 +1,69 @@
+# Frames rendered of the datasets' own models -> registrations that encoders are pretrained on.
+from gpca.frames.source import VIRTUAL
+
+SCENES = REAL_WORLD["scenes"]
+TABLES = {name: (REAL_WORLD["virtual"] or SCENES)[name] for name in ("count", "views")}
+PRETRAINED_ON = [
+    f"<results>/registrations/{source}/seed{SEEDS[0]}.npz"
+    for source in (*SOURCES, *([VIRTUAL] if REAL_WORLD["virtual"] else []))
+]
+
+
+use rule render_scenes as render_models with:
+    input:
+        **FRAMES_FROM,
+        code=code_files("gpca.steps.scenes"),
+    output:
+        directory(f"<results>/scenes/{VIRTUAL}"),
+    log:
+        f"<logs>/scenes/{VIRTUAL}.log",
+    benchmark:
+        f"<benchmarks>/scenes/{VIRTUAL}.tsv"
+    params:
+        settings=as_json({**SCENES, **TABLES, "datasets": REAL_WORLD["datasets"]}),
+        source=VIRTUAL,
+        data=folder_options(config["data_dir"], config["downloads"]),
+
+
+use rule instances as virtual_instances with:
+    input:
+        scenes=f"<results>/scenes/{VIRTUAL}",
+        code=code_files("gpca.steps.instances"),
+    output:
+        instances=f"<results>/instances/{VIRTUAL}.npz",
+        objects=f"<results>/objects/{VIRTUAL}.npz",
+    log:
+        f"<logs>/instances/{VIRTUAL}.log",
+    benchmark:
+        f"<benchmarks>/instances/{VIRTUAL}.tsv"
+    params:
+        settings=as_json({"initial_pose": {"form": "true_pose"}}),
+        source=VIRTUAL,
+        frames=lambda wildcards, input: ["--scenes", input.scenes],
+        surface_points=config["objects"]["surface_points"],
+
+
+use rule register_frames as register_virtual_frames with:
+    input:
+        instances=f"<results>/instances/{VIRTUAL}.npz",
+        objects=f"<results>/objects/{VIRTUAL}.npz",
+        code=code_files("gpca.steps.frame_registrations"),
+    output:
+        registrations=f"<results>/registrations/{VIRTUAL}/seed{{seed}}.npz",
+        poses=f"<results>/poses/{VIRTUAL}/seed{{seed}}.csv",
+        timings=f"<results>/timings/{VIRTUAL}/icp/seed{{seed}}.csv",
+    log:
+        f"<logs>/registrations/{VIRTUAL}/seed{{seed}}.log",
+    benchmark:
+        f"<benchmarks>/registrations/{VIRTUAL}/seed{{seed}}.tsv"
+    params:
+        settings=as_json(
+            config["registrations"]
+            | {
+                "train": (REAL_WORLD["virtual"] or REAL_WORLD)["train"],
+                "test": 3,  # of no use: only training samples are pretrained on
+                "test_share": 0.05,
+                "occluders": REAL_WORLD["occluders"],
+            }
+        ),
+        source=VIRTUAL,
