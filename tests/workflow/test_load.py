@@ -26,8 +26,6 @@ def test_every_config_loads_offline_and_asks_for_all_results(
     assert planned.jobs["train_on_frames"] == backbones * seeds
     assert planned.jobs["attribute"] == sources * explainers + (2 if config == "smoke" else 3) + backbones * reductions
     assert planned.jobs["render_scenes"] == (config != "real")
-    for rule in ("render_models", "virtual_instances", "register_virtual_frames"):
-        assert planned.jobs.get(rule, 0) == (config == "real")
     assert planned.jobs["run_icp"] == sources * (5 if config == "smoke" else 6)
     assert planned.jobs["shift"] == planned.jobs["fit_learners"] == sources
     assert planned.jobs["register_methods"] == planned.jobs["estimate"] == sources

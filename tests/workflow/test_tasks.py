@@ -88,7 +88,8 @@ def test_a_severity_is_changed_an_explainer_dropped_and_a_bop_dataset_named(proj
     assert not re.search("/(shap_oracle|sa_sobol_additive|badge)/", planned)
     assert "/shap_additive/" in planned
     assert "results/my_lab/instances/real_rgbd.npz" in planned
-    assert "results/my_lab/scenes" not in planned
+    assert "results/my_lab/scenes/real_rgbd" not in planned
+    assert "results/my_lab/registrations/virtual_rgbd/seed0.npz" in planned
 
 
 def test_a_registration_is_explained(model, registrations, tmp_path, monkeypatch, capsys):
