@@ -160,4 +160,4 @@ def test_good_results_are_read(call, damaged, lines, capsys):
     assert main([outputs.get(argument, argument) for argument in call(add)]) == 0
     read = Instances.load(outputs["instances.npz"])
     assert np.allclose(read.T_camera_object_init, read.T_camera_object_true, atol=1e-9)
-    assert len(read) + capsys.readouterr().err.count("left out") == len(lines)
+    assert len(read) + capsys.readouterr().err.count("skipped") == len(lines)
