@@ -38,7 +38,7 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, step, fault):
 
 def test_a_control_that_the_source_does_not_admit_is_named_and_its_file_holds_no_samples(folder, capsys):
     assert main(arguments("train_control", {"--control": "unseen_objects"})) == 0
-    [line] = [line for line in capsys.readouterr().err.splitlines() if "left out" in line]
+    [line] = [line for line in capsys.readouterr().err.splitlines() if "is skipped" in line]
     assert line == "control 'unseen_objects' of tiny is skipped: it needs at least 5 objects, but there are 2"
     with np.load(folder / "control.npz") as arrays:
         assert len(arrays["sample"]) == 0

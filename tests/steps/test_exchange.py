@@ -25,7 +25,11 @@ FAULTS = [
     (untouched, settings("exchange", methods={"point_to_point": {"k": 1}}), r"unexpected keyword argument 'k'"),
     (untouched, settings("exchange", explainers={}), r"setting explainers: is empty; name at least one"),
     (untouched, settings("exchange", explainers={"gpc": {}}), r"explainer 'gpc': unknown"),
-    (untouched, settings("exchange", explainers={"shap_removal": {}}), r"'shap_removal': reads design 'removal', of"),
+    (
+        untouched,
+        settings("exchange", explainers={"shap_removal": {}}),
+        r"'shap_removal': reads design 'removal'",
+    ),
     (untouched, settings("exchange", control={}), r"setting control: unknown; choose one of exchange, uncertainty,"),
     (untouched, {"--out": ["a.csv", "b.csv"]}, r"--out: 2 file\(s\) for 1 seed\(s\)"),
 ]

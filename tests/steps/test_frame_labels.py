@@ -16,7 +16,11 @@ FAULTS = [
         settings("frame_labels", frame_labels={"targets": [2]}),
         r"setting targets.0: 2 is greater than the ma",
     ),
-    (untouched, {"--backbones": ["dgcnn", "pointnet"]}, r"--embeddings: 1 file\(s\) for 2 of --backbones; give one"),
+    (
+        untouched,
+        {"--backbones": ["dgcnn", "pointnet"]},
+        r"--embeddings: 1 file\(s\) for 2 value\(s\) of --backbones",
+    ),
     (
         untouched,
         {"--strategies": ["random"]},

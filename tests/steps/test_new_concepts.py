@@ -13,16 +13,20 @@ def changed(section, **keys):
 
 FAULTS = [
     (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with 'python -m gpca train'"),
-    (truncated("cause_weights.pt"), {}, r"cause_weights.pt: not the weights of backbone 'dgcnn'; make"),
+    (truncated("cause_weights.pt"), {}, r"cause_weights.pt: not the weights of backbone 'dgcnn'; regenerate"),
     (removed("causes.npz"), {}, r"causes.npz: no such file; make it with 'python -m gpca causes'"),
     (arrays_changed("cause_embeddings.npz", sample=lambda s: s + 1), {}, r"cause_embeddings.npz: its samples differ"),
-    (arrays_changed("descriptors.npz", sample=lambda s: s + 1), {}, r"descriptors.npz: its samples differ from the"),
+    (arrays_changed("descriptors.npz", sample=lambda s: s + 1), {}, r"descriptors.npz: its samples differ from those"),
     (untouched, changed("new_concepts", cause=["nominal"]), r"setting cause: unknown; did you mean causes\?"),
     (untouched, changed("new_concepts", causes=["noise"]), r"setting causes.0: 'noise' is not one of"),
     (untouched, changed("new_concepts", errors=[1]), r"setting errors.0: 1 is greater than or equal to the maximum"),
     (untouched, changed("new_concepts", erring=["other_samples"]), r"'other_samples' is not among the embeddings; cho"),
-    (untouched, changed("active_learning", initial=18), r"leaves none of 18 training samples; lower active_lear"),
-    (untouched, {"--encoders": None}, r"--encoders: 0 file\(s\) for 1 of --encoders-of; give one for each"),
+    (
+        untouched,
+        changed("active_learning", initial=18),
+        r"leaves none of 18 training samples for the pool",
+    ),
+    (untouched, {"--encoders": None}, r"--encoders: 0 file\(s\) for 1 value\(s\) of --encoders-of; give one for each"),
     (
         untouched,
         {"--strategies": ["random"]},
@@ -43,7 +47,7 @@ def test_what_cannot_be_tried_is_left_out_and_named(folder, capsys):
 
     assert main(arguments("new_concepts", {"--encoders": None, "--encoders-of": None})) == 0
     err = capsys.readouterr().err
-    assert "new concepts of tiny: 'other_source' is skipped: it needs at least two sources" in err
+    assert "new concepts of tiny: 'other_source' is skipped: it needs two sources or more" in err
     assert "'geometry' is skipped: none of 2 candidates of a split fails without a cause" in err
     settings_found = {line.split(",")[0] for line in (folder / "new_bald_kmeans.csv").read_text().splitlines()[1:]}
     assert settings_found == {"self_supervised", "pair", "pair_errors_50", "pretrained"}

@@ -18,13 +18,13 @@ FAULTS = [
     (
         arrays_changed("objects.npz", names=lambda names: names[::-1]),
         {},
-        r"object 0 is not '\w+', as the registr",
+        r"object 0 is not '\w+', as in the registr",
     ),
     (untouched, settings("register_methods", gicp={}), r"setting gicp: unknown; choose one of method_pairs, methods"),
     (
         untouched,
         settings("register_methods", methods={"gicpp": {}}),
-        r"registration method 'gicpp': unknown; known",
+        r"registration method 'gicpp': unknown; choose",
     ),
     (untouched, settings("register_methods", methods={"fgr": {"radius": 1}}), r"unexpected keyword argument 'radius'"),
     (untouched, settings("register_methods", methods={"fgr": 3}), r"setting fgr: 3 is not of type 'object', 'null'"),

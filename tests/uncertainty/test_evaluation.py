@@ -72,7 +72,7 @@ def test_numbers_that_do_not_balance_the_concepts_are_refused(registrations, sam
 def test_nothing_to_evaluate_is_refused(registrations):
     with pytest.raises(InputError, match="'causal': has no registrations"):
         design_rows(registrations, "causal", 0)
-    with pytest.raises(InputError, match="'additive': no registrations"):
+    with pytest.raises(InputError, match="'additive': has no registrations"):
         design_rows(registrations.subset(registrations.rows("train")), "additive", None)
 
 

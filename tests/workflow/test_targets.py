@@ -168,7 +168,7 @@ EDITS = {
     + BACKBONES + MODEL,
     "gpca/frames/bop.py":
         jobs("reduce_embeddings", "instances", register_frames=2, train_on_frames=2, embed=2, attribute=2)
-        + BACKBONES + MODEL + RECOVERY + ON_FRAMES,
+        + jobs("render_scenes") + BACKBONES + MODEL + RECOVERY + ON_FRAMES,
     "gpca/recovery/policy.py": MODEL + RECOVERY,
     "gpca/reporting/tables/explainers.py": TABLES1,
     "gpca/reporting/figures/confusions.py":

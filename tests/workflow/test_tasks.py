@@ -89,7 +89,7 @@ def test_a_severity_is_changed_an_explainer_dropped_and_a_bop_dataset_named(proj
     assert "/shap_additive/" in planned
     assert "results/my_lab/instances/real_rgbd.npz" in planned
     assert "results/my_lab/scenes/real_rgbd" not in planned
-    assert "results/my_lab/registrations/virtual_rgbd/seed0.npz" in planned
+    assert "results/my_lab/registrations/virtual_rgbd/seed10.npz" in planned
 
 
 def test_a_registration_is_explained(model, registrations, tmp_path, monkeypatch, capsys):

@@ -82,7 +82,7 @@ VALUES = {
     ("uncertainty.npz", "complex uncertainty", "complex"): {"uncertainty": lambda u: u + 1j},
     ("uncertainty.npz", "negative calls", "icp_calls"): {"icp_calls": lambda c: c - 5},
     ("uncertainty.npz", "doubtful degeneracy", "degenerate"): {"degenerate": lambda d: d + 0.5},
-    ("uncertainty.npz", "other samples", "conditions.csv: its samples differ"): {"sample": lambda s: s + 1000},
+    ("uncertainty.npz", "other samples", "conditions.csv: its samples or"): {"sample": lambda s: s + 1000},
     ("uncertainty.npz", "other conditions", "conditions"): {
         name: lambda a: a[:, :2] for name in ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
     },
