@@ -15,12 +15,14 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from functools import cache
-from multiprocessing.connection import Connection, Listener
+from multiprocessing.connection import Connection, Listener, wait
 from pathlib import Path
-from threading import Thread
+from threading import Lock, Thread
 
 WALL_SECONDS = 1200  # a hang, on the busiest machine
 _SERVER = multiprocessing.get_context("forkserver")
+# A start asks after all processes that run; of an exit code that two threads read at once, one reads that it is lost.
+_ONE_READS = Lock()
 _SERVER.set_forkserver_preload(["tests.workflow.loaded"])
 
 # Says to the test what it was called with and ends as the fork ends, which writes where this process would.
@@ -70,11 +72,14 @@ def _answer(asked: Connection) -> None:
 
 def _fork(arguments, folder, environment, streams) -> int:
     process = _SERVER.Process(target=_child, args=(arguments, folder, environment, streams, _python()))
-    process.start()
-    process.join(WALL_SECONDS)
-    process.kill()
-    process.join()
-    return process.exitcode
+    with _ONE_READS:
+        process.start()
+    wait([process.sentinel], WALL_SECONDS)
+    with _ONE_READS:
+        process.join(0)
+        process.kill()
+        process.join()
+        return process.exitcode
 
 
 def _child(arguments, folder, environment, streams, python) -> None:
