@@ -10,7 +10,7 @@ import numpy as np
 from gpca.environment import require_open3d
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
-from gpca.frames.reading import CentredModel, Dataset, distinct_surfaces
+from gpca.frames.reading import CentredModel, Dataset, distinct_surfaces, read_models, with_shared_models
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.source import folders
@@ -33,6 +33,11 @@ def datasets_of(
     if not entries:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
     return {name: Dataset(name, tuple(folders(entry, downloads)), **_given(entry)) for name, entry in entries.items()}
+
+
+def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CentredModel]]:
+    """Return the models of the objects that each dataset's frames show; those that datasets share bear one name."""
+    return with_shared_models({name: read_models(dataset, dataset.frames()) for name, dataset in datasets.items()})
 
 
 def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scenes: Path | None) -> list[Path]:

@@ -29,9 +29,8 @@ from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.frames.instances import Instances
-from gpca.frames.meshes import datasets_of, files_behind, meshes_of
+from gpca.frames.meshes import datasets_of, files_behind, meshes_of, models_of
 from gpca.frames.plausibility import require_of_objects
-from gpca.frames.reading import read_models, with_shared_models
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, joined
 from gpca.provenance import record_provenance
@@ -121,8 +120,7 @@ def _measure(options: Namespace, given: dict) -> tuple[Causes, pd.DataFrame]:
     chosen = FrameCauseSettings(**given["frames"])
     rows = chosen_instances(instances, options.source, chosen)
     datasets = datasets_of(given["datasets"], options.data_dir, options.downloads, options.scenes)
-    models = with_shared_models({name: read_models(of, of.frames()) for name, of in datasets.items()})
-    meshes = meshes_of(models, objects, instances.object_index[rows].tolist())
+    meshes = meshes_of(models_of(datasets), objects, instances.object_index[rows].tolist())
     settings = CauseSettings.from_dict(given["causes"], given["icp"])
     return measure_frames(instances, rows, objects, meshes, options.source, options.seed, settings, chosen.points)
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.frames.meshes import datasets_of, files_behind, simplified
-from gpca.frames.reading import distinct_surfaces, read_models, with_shared_models
+from gpca.frames.meshes import datasets_of, files_behind, models_of, simplified
+from gpca.frames.reading import distinct_surfaces
 from gpca.frames.rgbd_scene import SceneSettings, write_scenes
 from gpca.objects import procedural
 from gpca.objects.surface import Surface
@@ -48,5 +48,4 @@ def run(options: Namespace) -> None:
 def _models(options: Namespace, datasets: dict[str, dict]) -> Iterable[Surface]:
     """Return the models of all objects that the datasets' frames show, those that datasets share once."""
     found = datasets_of(datasets, options.data_dir, options.downloads, None)
-    models = with_shared_models({name: read_models(of, of.frames()) for name, of in found.items()})
-    return map(simplified, distinct_surfaces(models))
+    return map(simplified, distinct_surfaces(models_of(found)))
