@@ -22,13 +22,13 @@ MOST_FACES = 2000  # of a mesh; what decimation moves is far below the noise of 
 def datasets_of(
     datasets: Mapping[str, dict] | None, data_dir: str | None, downloads: Path, scenes: Path | None
 ) -> dict[str, Dataset]:
-    """Return the datasets of the config, by name, or the rendered scenes in their place.
+    """Return the datasets of the config, by name, or the rendered scenes in their place, of which all frames are read.
 
     Raises:
         InputError: neither is given, or what :func:`gpca.frames.source.resolve_datasets` refuses.
     """
     if scenes:
-        return {"scenes": Dataset("scenes", (scenes,))}
+        return {"scenes": Dataset("scenes", (scenes,), most_frames=None)}
     entries = resolve_datasets(datasets, data_dir)
     if not entries:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")

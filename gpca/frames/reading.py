@@ -38,7 +38,7 @@ class Dataset:
         split: the split whose frames are read.
         results: BOP results files with initial poses, one of each estimator.
         errors: CSV of errors that estimators made elsewhere on its objects, or None.
-        most_frames: where there are more frames, so many are drawn.
+        most_frames: where there are more frames, so many are drawn; None reads all.
     """
 
     name: str
@@ -47,12 +47,12 @@ class Dataset:
     split: str = "test"
     results: tuple[Path, ...] = ()
     errors: Path | None = None
-    most_frames: int = 200
+    most_frames: int | None = 200
 
     def frames(self) -> list[Frame]:
         """Return its frames, or a draw of them."""
         found = read_frames(self.folders, self.split)
-        if len(found) <= self.most_frames:
+        if self.most_frames is None or len(found) <= self.most_frames:
             return found
         rows = generator(self.name, "frames").choice(len(found), self.most_frames, replace=False)
         return [found[row] for row in np.sort(rows)]
