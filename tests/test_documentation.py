@@ -138,8 +138,7 @@ def test_every_setting_on_a_page_has_the_value_of_the_config():
     text = "\n".join(path.read_text() for path in sorted((ROOT / "docs").glob("*.md")))
     rows = re.findall(r"^\| `([a-z0-9_]+\.[a-z0-9_.]+)` \| `([^`]+)` \|", text, re.MULTILINE)
     named = re.findall(r"[(,] ?`(\w+\.[\w.]+)`: (\[[^\]]+\]|[\w.+-]+)", " ".join(text.split()))
-    assert len(rows) >= 23
-    assert len(named) >= 29
+    assert len(named) >= 12
     for key, documented in (*rows, *named):
         value = config
         for part in key.split("."):
@@ -197,9 +196,10 @@ def test_every_configured_learner_is_described():
 def test_every_key_of_a_source_is_described():
     schema = yaml.safe_load((ROOT / "gpca/config/config.schema.yaml").read_text())
     keys = schema["$defs"]["source"]["properties"]
-    described = {name for row in re.findall(r"^\| (`.+?) \|", (ROOT / "docs/adding.md").read_text(), re.MULTILINE)
-                 for name in re.findall(r"`(\w+)`", row)}  # fmt: skip
-    assert described == set(keys)
+    text = (ROOT / "config/sources.yaml").read_text()
+    [described] = re.findall(r"^# Keys: (.+?\))\.$", text, re.MULTILINE | re.DOTALL)
+    names = re.findall(r"(?:^|; |or )(\w+)", re.sub(r"\(.*?\)", "", described.replace("\n# ", " "), flags=re.DOTALL))
+    assert sorted(names) == sorted(keys)
 
 
 def test_the_resources_of_the_cluster_page_are_those_of_the_rules():

@@ -26,7 +26,7 @@ def test_what_was_found_of_estimators_stands_in_the_reference():
     assert f"SHAP stays at {span(shap['all'])}" in found
     others = shap.drop("monte_carlo")["agreement"]
     alike = others[["brossard", "stein_icp"]]
-    assert f"in {span(alike, 'and')} of the cases, the four others in {span(others.drop(alike.index))}" in found
+    assert f"in {span(alike, 'and')} of the cases, with the four others in {span(others.drop(alike.index))}" in found
 
 
 def test_what_was_found_of_methods_stands_in_the_reference():

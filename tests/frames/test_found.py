@@ -47,10 +47,10 @@ def test_what_was_found_of_causes_stands_in_the_reference():
         r"Of (\d+) registrations .* (\d+) failed: (\d+) mostly by noise, (\d+) mostly by pose, (\d+) mostly by overlap"
     )
     samples, failed, noise, pose, overlap = map(int, re.search(told, note).groups())
-    assert f"Of {samples} registrations {failed} failed" in found
+    assert f"Of {samples} registrations, {failed} failed" in found
     assert f"{pose} mostly by the estimator's pose, {noise} by noise, {overlap} by missing surface" in found
     always = 100 * pose / failed
-    assert f"naming pose always would** ({always:.0f} %)" in found
+    assert f'as the constant answer "pose" would** ({always:.0f} %)' in found
     rows = cells("table9_frames", "explainer", "metric").unstack()
     area, dominant = rows["auroc_failed"], rows["dominant_accuracy"]
     assert f"AUROC {area['residuals']:.3f} and {area['gpca_pair']:.3f}" in found

@@ -21,7 +21,6 @@ def test_what_was_found_stands_in_the_reference():
     ):
         assert words.format(one[policy], two[policy]) in found
     assert f"on** ({two['gpca_acting']:.1f} %), and so is the softmax head ({two['softmax_head']:.1f} %)" in found
-    assert f"one action GP-CA recovers {one['gpca_acting']:.1f} %" in found
     learnt = rows.loc["utility"]
     assert f"act on {learnt['acted_nominal']:.0f} % of the registrations that are right" in found
     assert f"leaves {learnt['left_alone']:.0f} % of the failures" in found
