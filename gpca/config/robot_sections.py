@@ -19,6 +19,8 @@ from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.settings import LoopSettings
 from gpca.settings import Bounds, Count, NotNegative, OpenShare, Share
 
+Pretraining = Annotated[EncoderSettings, Keys(without=("backbone", "options", "reading", "draws"))]
+# The encoder then embeds draws of the size that it was last trained on.
 Training = Annotated[EncoderSettings, Keys(without=("backbone", "options", "reading", "draw_points", "draws"))]
 Conditions = Annotated[dict[str, InitialPoseSettings], Bounds(propertyNames=NAME)]
 
@@ -63,7 +65,7 @@ class RealWorld:
     occluders: Share
     backbones: tuple[str, ...]
     reductions: tuple[Literal["none", "pca", "umap", "autoencoder"], ...]
-    pretraining: Training | None
+    pretraining: Pretraining | None
     virtual: VirtualFrames | None
     training: dict[str, Training] | None
     explainers: Annotated[dict[str, dict | None], Named(EXPLAINERS)]
