@@ -116,6 +116,8 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "frame_methods": names_of_backbones(frames),
         "frame_explainers": {name: explainer_entry(name).title for name in frames["explainers"]},
         "frames_title": title_of(of_frames),
+        "frames_pretrained_on": _pretrained_on(frames),
+        "frames_rendered": bool(frames["virtual"]),
         "model": of_model,
         "model_title": title_of(of_model),
         "methods": {
@@ -195,6 +197,13 @@ def unreduced_methods(frames: Mapping) -> dict[str, str]:
     backbones = [name for name in names_of_backbones(frames) if name.endswith("-none")]
     titles = {name: encoder_title(*name.split("-")) for name in backbones}
     return titles | {name: explainer_entry(name).title for name in frames["explainers"]}
+
+
+def _pretrained_on(frames: Mapping) -> str:
+    """Return what the encoders of frames are trained on before the frames; empty where they are not."""
+    if not frames["pretraining"]:
+        return ""
+    return "whole objects" + (" and on frames rendered of the models of all objects" if frames["virtual"] else "")
 
 
 def _title_of_pose(settings: Mapping) -> str:

@@ -101,3 +101,20 @@ def test_a_stand_in_says_so_wherever_its_title_stands(config, sources):
     settings = settings_of(config, sources)
     for title in (*settings["source_titles"].values(), settings["frames_title"], settings["model_title"]):
         assert "procedural stand-in" in title
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"pretraining": None}, ""),
+        ({}, "whole objects"),
+        (
+            {"virtual": {"count": 2, "views": 1, "train": 9}},
+            "whole objects and on frames rendered of the models of all objects",
+        ),
+    ],
+)
+def test_tables_tell_what_encoders_of_frames_were_pretrained_on(config, sources, changes, told):
+    settings = settings_of(config | {"real_world": config["real_world"] | changes}, sources)
+    assert settings["frames_pretrained_on"] == told
+    assert settings["frames_rendered"] == ("virtual" in changes)

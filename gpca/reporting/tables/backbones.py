@@ -35,14 +35,18 @@ def encoder_title(encoder: str, reduction: str) -> str:
 
 
 def table6_of_encoders(
-    metrics: pd.DataFrame, title: str, encoders: Mapping[str, Mapping], reductions: Sequence[str]
+    metrics: pd.DataFrame,
+    title: str,
+    encoders: Mapping[str, Mapping],
+    reductions: Sequence[str],
+    pretrained_on: str = "",
 ) -> Table:
     """Return :func:`table6_backbones` with the parameters counted of encoders that are made from their settings."""
     backbones = {
         name: parameter_count(make_encoder(settings["backbone"], settings.get("options", {})))
         for name, settings in encoders.items()
     }
-    return table6_backbones(metrics, title, backbones, reductions)
+    return table6_backbones(metrics, title, backbones, reductions, pretrained_on)
 
 
 def table6_backbones(
@@ -50,6 +54,7 @@ def table6_backbones(
     title: str,
     backbones: Mapping[str, int],
     reductions: Sequence[str],
+    pretrained_on: str = "",
 ) -> Table:
     """Return the accuracy on depth frames by backbones × reductions, and of the classic features.
 
@@ -59,6 +64,7 @@ def table6_backbones(
         backbones: The number of parameters of each name, in order. The table shows differences to the first backbone
             with the first reduction.
         reductions: The names of the reductions, in order.
+        pretrained_on: What the encoders learned from before the frames, if anything.
 
     Raises:
         InputError: The metrics hold none of these.
@@ -81,6 +87,7 @@ def table6_backbones(
     table.compare_down(["accuracy"])
     shown = table.cells[0, "accuracy"]
     rival = f"To {BACKBONES.get(first, '')}"
+    encoder = f"encoder that goes on from one pretrained on {pretrained_on}" if pretrained_on else "encoder"
     other = " without reduction" if reductions[0] == "none" else f" with {REDUCTIONS[reductions[0]]}"
     return table.build(
         caption=f"GP-CA by backbone and dimensionality reduction, accuracy (%) on {title}",
@@ -96,7 +103,7 @@ def table6_backbones(
         footnotes=(
             f"Mean over {plural(shown.seeds, 'seed')}, {shown.test_samples // shown.seeds} test samples each, in "
             f"scenes that training does not see; {INTERVAL}. Each seed has its own split of the scenes, "
-            "perturbations, encoder that goes on from one pretrained on whole objects, and GPC.",
+            f"perturbations, {encoder}, and GPC.",
             "Std. dev.: as the paper says, of classifiers on one encoder's embeddings, the first seed's. Of all: of "
             "the seeds of the mean.",
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "

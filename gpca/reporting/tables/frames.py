@@ -27,6 +27,7 @@ def table6_seen_unseen(
     conditions: Mapping[str, str],
     backbones: Sequence[str],
     explainers: Mapping[str, str],
+    rendered: bool = False,
 ) -> Table:
     """Return the accuracy on depth frames by what was seen in training and by dataset, under every condition.
 
@@ -36,6 +37,7 @@ def table6_seen_unseen(
         conditions: Source of each condition -> its title, in order.
         backbones: The names of the methods ``{backbone}-{reduction}``, in order.
         explainers: The titles of the other methods, in order.
+        rendered: Whether the encoders learned from frames rendered of the models first.
 
     Raises:
         InputError: The metrics hold none of these.
@@ -53,6 +55,7 @@ def table6_seen_unseen(
     columns |= {name: Column(f"{name.removeprefix(DATASET)} (%)", interval=False) for name in datasets}
     columns |= {"ece": Column("ECE, all", decimals=2, interval=False, limits=(0.0, 1.0))}
     columns |= {"nll": Column("NLL, all", decimals=2, interval=False, limits=(0.0, inf))}
+    pretrained = "The pretraining renders the models of both. " if rendered else ""
     first = rows_where(metrics, source=next(iter(conditions)), metric="test_samples", concept=ALL)
     shares = [_share(first, name) for name in (SEEN, UNSEEN)]
     return table.build(
@@ -62,8 +65,8 @@ def table6_seen_unseen(
         footnotes=(
             f"Mean over {plural(table.most_seeds(), 'seed')}; {INTERVAL}. No scene is in both training and test. Seen "
             f"objects ({shares[0]} of the test samples) are shown in a scene of the training too, unseen ones "
-            f"({shares[1]}) are not. Instances take turns, so that objects and datasets are as unequally frequent as "
-            "in the frames.",
+            f"({shares[1]}) are not. {pretrained}Instances take turns, so that objects and datasets are as unequally "
+            "frequent as in the frames.",
             "A dataset has a value where at least one seed tests its frames. ECE: expected calibration error of all. "
             "NLL: their mean negative log likelihood, in nats.",
         ),

@@ -67,3 +67,9 @@ def test_what_was_not_run_has_no_row_and_nothing_at_all_is_refused():
     assert len(make({"dgcnn-none": (0.8, 0.8)}).rows) == 1
     with pytest.raises(InputError, match="have no accuracy for table6_backbones"):
         make({"softmax_head": (0.8, 0.8)})
+
+
+def test_the_note_says_what_encoders_were_pretrained_on():
+    of = metrics(VALUES), "frames", BACKBONES, ("none", "pca")
+    assert "pretrained on whole objects, and GPC" in " ".join(table6_backbones(*of, "whole objects").footnotes)
+    assert "perturbations, encoder, and GPC" in " ".join(table6_backbones(*of).footnotes)

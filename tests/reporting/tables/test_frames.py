@@ -18,8 +18,9 @@ def metrics(values):
     return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
 
 
-def make(values):
-    return table6_seen_unseen(metrics(values), "frames", CONDITIONS, ["dgcnn-none"], {"gpca_pair": "GP-CA on the pair"})
+def make(values, **options):
+    explainers = {"gpca_pair": "GP-CA on the pair"}
+    return table6_seen_unseen(metrics(values), "frames", CONDITIONS, ["dgcnn-none"], explainers, **options)
 
 
 def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
@@ -42,6 +43,12 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
     assert (1, "seen") not in table.cells
     assert table.cells[0, "nll"].mean == 1.5
     assert "40 % of the test samples" in " ".join(table.footnotes)
+
+
+def test_the_note_says_that_the_pretraining_knows_the_models():
+    values = {("real_rgbd", "attribution", "dgcnn-none"): [(0.7, 100)]}
+    assert "renders the models" not in " ".join(make(values).footnotes)
+    assert "The pretraining renders the models of both." in " ".join(make(values, rendered=True).footnotes)
 
 
 def test_nothing_to_show_is_refused():
