@@ -4,7 +4,9 @@ import pandas as pd
 
 from gpca.code_files import ROOT
 
-TABLES = ROOT / "results/reference/real/tables"
+REFERENCE = ROOT / "results/reference/real"
+TABLES = REFERENCE / "tables"
+MOST = 400  # labels of a run where the concept is rare
 PAGE = " ".join((ROOT / "docs/active_learning.md").read_text().split())
 CONCEPTS = ("noise", "pose", "overlap")
 
@@ -17,6 +19,20 @@ def test_what_was_found_of_new_concepts_stands_in_the_reference():
     unseen = rows.loc["unseen", [f"labels_{concept}" for concept in CONCEPTS]].stack()
     assert unseen[unseen < 60].index.tolist() == [("coffee_cup", "labels_overlap")]
     assert "60 labels do not reach 90 %, except for overlap on cups" in PAGE
+
+
+def test_what_was_found_of_a_rare_concept_stands_in_the_reference():
+    tidy = pd.read_csv(REFERENCE / "active_learning.csv")
+    rare = tidy[(tidy["table"] == "active_learning/rare") & (tidy["metric"] == "labels_to_target")]
+    labels = rare.groupby(["method", "source"])["value"].mean().round().astype(int)
+    assert (rare[rare["source"] == "ycb"]["value"] == MOST).any()  # so the mean is a lower bound
+    cups, linemod, ycb = labels["random"]
+    bald = labels["bald_kmeans"]
+    assert f"it takes {cups} on cups and more than {ycb} on YCB" in PAGE
+    assert f"BALD with k-means still {bald['coffee_cup']} and {bald['ycb']}" in PAGE
+    reasons = (ROOT / "gpca/comparison/reasons.csv").read_text()
+    assert f"random sampling takes {cups}, {linemod} and more than {ycb} labels" in reasons
+    assert f"BALD still {', '.join(map(str, bald[:-1]))} and {bald.iloc[-1]}" in reasons
 
 
 def test_what_was_found_of_oracles_that_err_stands_in_the_reference():
