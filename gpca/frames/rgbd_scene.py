@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
 from gpca.files import whole_folder
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at, shade
+from gpca.frames.resting import rest, stable_poses
 from gpca.objects.canonical import canonical_cloud, diameter
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
@@ -88,13 +88,14 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     """
     _require_replaceable(Path(folder))
     surfaces = [centre(surface) for surface in surfaces]
+    resting = [stable_poses(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
         drawn = {"scenes" if name == "count" else name: value for name, value in asdict(settings).items()}
         title = f"{source}, procedural stand-in" if settings.families else source
         _write_json(partial / DESCRIPTION, {"title": title, **drawn})
         for scene in progress(range(settings.count), f"scenes of {source}"):
-            standing = lay_table(surfaces, settings, source, scene)
+            standing = lay_table(surfaces, settings, source, scene, resting)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
             views = camera_poses(settings, middle_m, source, scene)
             _write_scene(partial / f"test/{scene:06d}", surfaces, standing, views, settings, (source, scene))
@@ -108,7 +109,11 @@ def _require_replaceable(folder: Path) -> None:
 
 
 def lay_table(
-    surfaces: list[Surface], settings: SceneSettings, source: str, scene: int, resting: Sequence[tuple] = ()
+    surfaces: list[Surface],
+    settings: SceneSettings,
+    source: str,
+    scene: int,
+    resting: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> list[Placed]:
     """Stand different objects on the table z = 0, each as it rests by itself, close together but not touching.
 
@@ -116,7 +121,7 @@ def lay_table(
     near to the middle as its convex outline on the table allows.
 
     Args:
-        resting: what :func:`stable_poses` returns for each surface, where many tables are laid.
+        resting: what :func:`gpca.frames.resting.stable_poses` returns for each surface.
     """
     from shapely import MultiPoint
     from shapely.affinity import translate
@@ -126,7 +131,7 @@ def lay_table(
     standing: list[Placed] = []
     outlines: list = []
     for model in random.permutation(len(surfaces))[:count]:
-        poses_n, probabilities_n = resting[model] if resting else stable_poses(surfaces[model])
+        poses_n, probabilities_n = resting[model]
         T_world_object = rest(poses_n, probabilities_n, random)
         flat_m = transform(T_world_object, surfaces[model].vertices_m)[:, :2]
         outline = MultiPoint(flat_m - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2).convex_hull
@@ -171,22 +176,6 @@ def centre(surface: Surface) -> Surface:
     """Return the surface with its bounding box's centre at the origin."""
     centre_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
     return Surface(surface.name, surface.vertices_m - centre_m, surface.faces)
-
-
-def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return the poses (n, 4, 4) in which an object rests on the plane z = 0, and their probabilities (n,)."""
-    import trimesh
-
-    mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
-    return trimesh.poses.compute_stable_poses(mesh, sigma=0.0, threshold=0.0)
-
-
-def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Draw one of the stable poses and turn it about the vertical."""
-    chosen = poses_n[random.choice(len(poses_n), p=probabilities_n / probabilities_n.sum())]
-    turn = np.eye(4)
-    turn[:3, :3] = Rotation.from_euler("z", random.uniform(0, 2 * np.pi)).as_matrix()
-    return turn @ chosen
 
 
 def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:

@@ -13,7 +13,8 @@ from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
-from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, centre, lay_table, rest, stable_poses, table
+from gpca.frames.resting import rest, stable_poses
+from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, centre, lay_table, table
 from gpca.frames.shots import Shot, median_depth
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface

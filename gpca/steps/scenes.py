@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable
 from dataclasses import replace
@@ -10,6 +11,7 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.frames.meshes import datasets_of, files_behind, models_of, simplified
 from gpca.frames.reading import distinct_surfaces
+from gpca.frames.resting import stable_poses
 from gpca.frames.rgbd_scene import SceneSettings, write_scenes
 from gpca.objects import procedural
 from gpca.objects.surface import Surface
@@ -46,6 +48,16 @@ def run(options: Namespace) -> None:
 
 
 def _models(options: Namespace, datasets: dict[str, dict]) -> Iterable[Surface]:
-    """Return the models of all objects that the datasets' frames show, those that datasets share once."""
+    """Return the models of all objects that the datasets' frames show, those that datasets share once.
+
+    Those that cannot be rendered or stood on a table are skipped, with a line on stderr.
+    """
     found = datasets_of(datasets, options.data_dir, options.downloads, None)
-    return map(simplified, distinct_surfaces(models_of(found)))
+    for surface in distinct_surfaces(models_of(found)):
+        try:
+            model = simplified(surface)
+            stable_poses(model)
+        except InputError as fault:
+            print(f"skipped: {fault}", file=sys.stderr)
+        else:
+            yield model

@@ -8,6 +8,7 @@ from gpca.errors import InputError
 from gpca.files import read_image
 from gpca.frames.camera import DepthNoise
 from gpca.frames.plausibility import points_on_model
+from gpca.frames.resting import stable_poses
 from gpca.frames.rgbd_scene import SceneSettings, lay_table, write_scenes
 
 from .tiny import PERFECT, scene_settings, surfaces
@@ -21,8 +22,9 @@ def test_objects_rest_on_the_table_and_do_not_touch():
     from shapely import MultiPoint
 
     objects = surfaces()
+    resting = [stable_poses(surface) for surface in objects]
     for scene in range(3):
-        standing = lay_table(objects, scene_settings(gap_m=0.01), "tiny", scene)
+        standing = lay_table(objects, scene_settings(gap_m=0.01), "tiny", scene, resting)
         placed = [transform(p.T_world_object, objects[p.model].vertices_m) for p in standing]
         assert 4 <= len(standing) <= 5
         assert len({p.model for p in standing}) == len(standing)

@@ -1,10 +1,12 @@
 """The steps from datasets to registrations as commands, and what they say of a faulty call."""
 
 import json
+import shutil
 
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
 
 from gpca.__main__ import main
 from gpca.frames.instances import Instances
@@ -90,6 +92,30 @@ def test_scenes_are_drawn_of_the_models_of_datasets(scenes, tmp_path):
     )
     told = json.loads((tmp_path / "drawn/dataset_info.json").read_text())
     assert (told["title"], told["families"]) == ("virtual", [])
+
+
+def test_models_that_cannot_stand_on_a_table_are_skipped(scenes, tmp_path, capsys):
+    shutil.copytree(scenes, tmp_path / "set")
+    cloud, sheet, *_ = sorted((tmp_path / "set/models").glob("*.ply"))
+    trimesh.PointCloud(trimesh.load(cloud).sample(2000)).export(cloud)
+    flat = trimesh.load(sheet)
+    flat.vertices[:, 2] = 0
+    flat.export(sheet)
+    described = tmp_path / "set/models/models_info.json"
+    told = json.loads(described.read_text())
+    told["2"]["diameter"] = 80.0  # of the cylinder's base
+    described.write_text(json.dumps(told))
+    datasets = {"tiny": {"location": str(tmp_path / "set")}}
+    camera = {"width": 64, "height": 48, "focal_px": 60}
+    given = settings(count=2, views=1, objects=[2, 2], camera=camera, datasets=datasets)
+    assert main(["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]) == 0
+    told = capsys.readouterr().err
+    assert "is a point cloud, but the virtual camera needs a mesh" in told
+    assert "is flat and cannot be stood on a table" in told
+    drawn, shown = (
+        json.loads((folder / "models/models_info.json").read_text()) for folder in (tmp_path / "drawn", scenes)
+    )
+    assert len(drawn) == len(shown) - 2
 
 
 @pytest.mark.parametrize(
