@@ -83,11 +83,12 @@ fi
 endef
 
 # The stamp is written last, so an install that was killed is made anew; pip's cache keeps what was already downloaded.
-.venv/complete: environment.lock
+.venv/complete: environment.lock environment.hashes
 	@$(choose_python)
 	echo "installing $$(grep -c '==' environment.lock) packages from environment.lock into .venv (about 2.2 GB, 2 to 5 minutes)"
 	$$python -m venv --clear .venv
-	if ! .venv/bin/python $(INSTALL) -r environment.lock; then
+	if ! { .venv/bin/python $(INSTALL) --no-deps --require-hashes -r environment.hashes &&
+	       .venv/bin/python $(INSTALL) -c environment.lock torch; }; then
 	    echo "the packages of environment.lock could not be installed: pip's message above says which and why;" \
 	         "wheels exist for Linux on x86-64 with Python 3.11 and 3.12 (here: $$(uname -sm), $$($$python -V))" >&2
 	    exit 2
@@ -95,7 +96,7 @@ endef
 	.venv/bin/python -m gpca.environment
 	touch $@
 
-lock: ## renew environment.lock from what pyproject.toml names, in a fresh environment
+lock: ## renew environment.lock and environment.hashes from what pyproject.toml names, in a fresh environment
 	@$(choose_python)
 	rm -rf build/lock
 	$$python -m venv build/lock
@@ -105,6 +106,11 @@ lock: ## renew environment.lock from what pyproject.toml names, in a fresh envir
 	    | sed -E -e '/^(nvidia|cuda|triton)/Id' -e 's/\+[A-Za-z0-9.]+$$//' > build/lock/packages
 	{ sed '/^[^#]/,$$d' environment.lock; cat build/lock/packages; } > build/lock/environment.lock
 	mv build/lock/environment.lock environment.lock
+	build/lock/bin/python $(INSTALL) uv
+	{ echo "# The files of the packages in environment.lock but torch, by their SHA-256. Made by 'make lock'."
+	  grep -v '^torch==' environment.lock | build/lock/bin/uv pip compile - --quiet --no-deps --no-annotate --no-header \
+	      --python-version 3.11 --generate-hashes; } > build/lock/environment.hashes
+	mv build/lock/environment.hashes environment.hashes
 	{ echo "# Made by 'make lock' from environment.lock, for those who run with 'snakemake --sdm conda'."
 	  printf '%s\n' 'channels: [conda-forge]' 'dependencies:' '  - python=3.11' '  - pip' '  - pip:'
 	  sed -nE 's/^([A-Za-z0-9].*)/      - \1/p' environment.lock; } > workflow/envs/gpca.yaml

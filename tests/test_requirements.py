@@ -2,6 +2,7 @@
 
 import ast
 import importlib.metadata
+import re
 import sys
 import tomllib
 
@@ -55,6 +56,16 @@ def test_the_lock_pins_every_package_and_no_build():
     assert not [line for line in lock() if line.lower().startswith(("nvidia", "cuda", "triton"))]
     for requirement in requirements(*EXTRAS):
         assert requirement.specifier.contains(pinned()[canonicalize_name(requirement.name)]), requirement
+
+
+def test_every_file_of_the_lock_but_torch_is_checked_by_its_hash():
+    text = (ROOT / "environment.hashes").read_text().replace(" \\\n", "")
+    entries = [line.split() for line in text.splitlines() if line[0] != "#"]
+    hashed = {canonicalize_name(name): version for name, version in (entry[0].split("==") for entry in entries)}
+    assert hashed == {name: version for name, version in pinned().items() if name != "torch"}
+    for _, *hashes in entries:
+        assert hashes
+        assert all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", of) for of in hashes)
 
 
 def required_by(package):
