@@ -1,6 +1,6 @@
 """Heads of a neural network on the embeddings, with what deep learning offers for uncertainty (paper, Table V).
 
-The encoder stays as it is; a head of one hidden layer is trained on it with the labelled embeddings. From each
+The encoder stays as it is; a head of one hidden layer is trained on it with the labeled embeddings. From each
 follow draws of the logits, and from those scores, variances and BALD as GP-CA's: the members of a deep ensemble
 (Lakshminarayanan et al. 2017), the passes of Monte-Carlo dropout (Gal & Ghahramani 2016).
 """

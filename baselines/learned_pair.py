@@ -1,4 +1,4 @@
-"""GP-CA on the pair with embeddings that are learnt: what a network gains over measured relations, at what cost."""
+"""GP-CA on the pair with embeddings that are learned: what a network gains over measured relations, at what cost."""
 
 from __future__ import annotations
 

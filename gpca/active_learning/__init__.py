@@ -1,1 +1,1 @@
-"""A new concept from few labels: acquisition, rounds of labelling, streams, learning curves."""
+"""A new concept from few labels: acquisition, rounds of labeling, streams, learning curves."""

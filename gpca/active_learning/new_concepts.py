@@ -1,4 +1,4 @@
-"""One new concept, learnt from one embedding: the rounds of the paper's strategy, random ones, and all labels."""
+"""One new concept, learned from one embedding: the rounds of the paper's strategy, random ones, and all labels."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Learning a concept that the classifier has never seen from few labels (paper Sec. III-C and IV-C).
 
 A GPC that knows two concepts meets a pool with all three. In rounds, a strategy picks B samples, their labels join the
-labelled ones and the GPC is retrained; its accuracy on the test samples over the labels spent is the learning curve.
+labeled ones and the GPC is retrained; its accuracy on the test samples over the labels spent is the learning curve.
 """
 
 from __future__ import annotations

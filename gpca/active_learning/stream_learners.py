@@ -1,6 +1,6 @@
 """Who learns from a stream besides GP-CA: the two stream learners that the paper names, on the same embeddings.
 
-Each has the part of a GPC's interface that a stream asks for. All start from the same labelled samples, ask by the same
+Each has the part of a GPC's interface that a stream asks for. All start from the same labeled samples, ask by the same
 budget manager and get the same labels, one at a time; they differ in what learns, and in what they call uncertain.
 """
 

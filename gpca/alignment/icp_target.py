@@ -1,9 +1,9 @@
 """The target of point-to-point ICP as its searches take it: points sorted into cells, and voxels with lists of points.
 
-Space is cut into voxels. The first point that falls into one has the target points nearest to the voxel's centre
-listed; every later point there, in whichever iteration and from whichever initial pose, finds its neighbour among
+Space is cut into voxels. The first point that falls into one has the target points nearest to the voxel's center
+listed; every later point there, in whichever iteration and from whichever initial pose, finds its neighbor among
 those. A list says how far it is complete; where that does not suffice, the point is searched by itself, so the
-neighbour is always the true one (:mod:`gpca.alignment.icp_neighbours`).
+neighbor is always the true one (:mod:`gpca.alignment.icp_neighbours`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Normals of a cloud that has none: the direction in which a point's neighbours spread least."""
+"""Normals of a cloud that has none: the direction in which a point's neighbors spread least."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Alignment quality by entropy: is the joint cloud as crisp as the two apart? (CorAl, Adolfsson et al. 2021.)
 
-The entropy of a point is that of a normal distribution with its neighbours' covariance, ½ ln |2πe Σ| at a given radius.
+The entropy of a point is that of a normal distribution with its neighbors' covariance, ½ ln |2πe Σ| at a given radius.
 Where two clouds lie on each other, points have about the same entropy in the joint cloud as in their own; where they
 do not, joining them blurs it.
 """

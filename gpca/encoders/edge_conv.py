@@ -9,7 +9,7 @@ so the matrix product runs over N points, not N·k edges. Batch normalisation is
     max_j act(γ (y_ij - μ)/σ + β) = act(γ (ext_j y_ij - μ)/σ + β),  ext = max where γ >= 0, min where γ < 0.
 
 In training μ and σ² are those of all B·N·k edges, exactly as a per-edge layer would compute them; one pass over the
-neighbours gathers maxima and sums together (:mod:`gpca.encoders.edge_kernels`). The plain per-edge form is kept in
+neighbors gathers maxima and sums together (:mod:`gpca.encoders.edge_kernels`). The plain per-edge form is kept in
 ``tests/encoders/per_edge.py``; outputs, running statistics and all gradients agree with it.
 """
 

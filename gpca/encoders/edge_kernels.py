@@ -1,4 +1,4 @@
-"""The passes over neighbours behind :mod:`gpca.encoders.edge_conv`, compiled by numba.
+"""The passes over neighbors behind :mod:`gpca.encoders.edge_conv`, compiled by numba.
 
 All arrays are C-contiguous float32 (float64 works too, for gradient checks). ``ac`` (B, N, 2F) holds A in its first F
 and C in its last F channels. The loops over clouds run in parallel on the threads that numba is given; every

@@ -1,4 +1,4 @@
-"""Centres of a cloud and the points around them (PointNet++, Qi et al. 2017b, Sec. 3.2), on the CPU and with CUDA."""
+"""Centers of a cloud and the points around them (PointNet++, Qi et al. 2017b, Sec. 3.2), on the CPU and with CUDA."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Dimensionality reductions of embeddings by name (paper, Table VI): none, PCA, UMAP, autoencoder.
 
-Each is fitted on the training embeddings, standardised on them, and is then one fixed function of an embedding: what it
+Each is fitted on the training embeddings, standardized on them, and is then one fixed function of an embedding: what it
 makes of a row depends on no other row that it is applied to. A new one is a class here and its line in `REDUCTIONS`.
 """
 

@@ -1,4 +1,4 @@
-"""Analytical features of a registration: how well source and target agree, without anything learnt.
+"""Analytical features of a registration: how well source and target agree, without anything learned.
 
 The paper names "RMSE, normal consistency, planarity, linearity, and point-count ratios" and no more; how each is
 computed is chosen here.

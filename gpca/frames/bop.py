@@ -1,7 +1,7 @@
-"""Frames of a dataset in the layout of the BOP benchmark: depth, colour, masks, true poses.
+"""Frames of a dataset in the layout of the BOP benchmark: depth, color, masks, true poses.
 
-Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Lengths are millimetres in the
-files and metres here; cameras look along +z with x to the right and y down.
+Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Lengths are millimeters in the
+files and meters here; cameras look along +z with x to the right and y down.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The pose that ICP starts from in a frame: an estimator's results, the truth with a declared error, or features.
 
-All return ``T_camera_object``, in metres, with the object's frame at the centre of its bounding box.
+All return ``T_camera_object``, in meters, with the object's frame at the center of its bounding box.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labelled."""
+"""Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labeled."""
 
 from __future__ import annotations
 

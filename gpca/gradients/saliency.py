@@ -1,8 +1,8 @@
 """Saliency maps of point clouds, and whether they show what matters: what deleting the most salient points does.
 
 A saliency map is the gradient of a score in the input (Simonyan et al. 2014), here of GP-CA's log odds of a concept in
-the points that the encoder sees. For clouds Zheng et al. (2019) take deleting a point for moving it to the centre:
-saliency is then r² ∂/∂r of the score, with r the distance from the centre.
+the points that the encoder sees. For clouds Zheng et al. (2019) take deleting a point for moving it to the center:
+saliency is then r² ∂/∂r of the score, with r the distance from the center.
 """
 
 from __future__ import annotations

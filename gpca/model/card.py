@@ -59,7 +59,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
         "`python -m gpca ship` wrote this page; docs/explain.md says how to use the model.",
         "## File",
         _file(name, content, origin),
-        *("## What it learnt", *_learnt(model, diagnoser, origin)),
+        *("## What it learned", *_learnt(model, diagnoser, origin)),
         *("## Data and licences", *_licences(origin)),
         *("## Scores", *_scores(origin, scores)),
         *("## Limits", "\n".join(_wrapped(f"- {line}", "  ") for line in limits)),
@@ -83,11 +83,11 @@ def _file(name: str, content: bytes, origin: Origin) -> str:
 def _learnt(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
     rows = [(source.title, source.objects, "diagnosis" if source.diagnosed else "GP-CA") for source in origin.sources]
     return [
-        f"The diagnosis learnt {diagnoser.classifier.samples} registrations whose causes were measured by "
+        f"The diagnosis learned {diagnoser.classifier.samples} registrations whose causes were measured by "
         "counterfactuals (docs/causes.md). What is observed in them was drawn from the objects' surfaces and "
-        f"perturbed. GP-CA as in the paper, which is printed beside it, learnt {len(model.gpc.learnt_N_d)} "
+        f"perturbed. GP-CA as in the paper, which is printed beside it, learned {len(model.gpc.learnt_N_d)} "
         "registrations, perturbed in one way each.",
-        _table(["objects", "number", "learnt by"], rows),
+        _table(["objects", "number", "learned by"], rows),
     ]
 
 
@@ -119,10 +119,10 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
         raise InputError("cause_intervals.csv", f"has no scores of {OWN}", "switch it on in diagnosis.explainers")
     changes = origin.record["settings"].get("model", {}).get("causes", {})
     return [
-        "Of classifiers of these kinds in the run that made this model, on objects that they had not learnt, with "
-        "95\u00a0% intervals over objects and seeds. The model itself then learnt all objects, so nothing is left to "
+        "Of classifiers of these kinds in the run that made this model, on objects that they had not learned, with "
+        "95\u00a0% intervals over objects and seeds. The model itself then learned all objects, so nothing is left to "
         "test it on. The registrations of these scores were drawn as the section `causes` of the config says; those "
-        "that the model learnt were drawn with these changes:",
+        "that the model learned were drawn with these changes:",
         "\n".join(f"- `{name}: {json.dumps(value, sort_keys=True)}`" for name, value in sorted(changes.items()))
         or "- none",
         _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows),
@@ -147,10 +147,10 @@ def _limits(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
     familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in ranges)
     return [
         f"Failed means an error above {causes['limits']['failed']:g} of the diameter. A task may need another limit.",
-        f"The diagnosis learnt {severities} (lengths in diameters; crop and outliers in shares of the points), clouds "
+        f"The diagnosis learned {severities} (lengths in diameters; crop and outliers in shares of the points), clouds "
         "of {} to {} points, and ICP `{}`. What lies outside is a guess.".format(*causes["points"], model.icp.method),
         f"The threshold of {diagnoser.threshold:.3f} was chosen so that at most {settings['model']['false_alarms']:g} "
-        "of the nominal registrations of objects that a first classifier had not learnt are called failed.",
+        "of the nominal registrations of objects that a first classifier had not learned are called failed.",
         f"It knows the causes {', '.join(CONCEPTS)}. Whatever else is wrong, such as the wrong object or a sensor's "
         "bias, it calls one of them.",
         f"It warns of clouds outside the geometry of GP-CA's training: {familiar} (docs/explain.md)."

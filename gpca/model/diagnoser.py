@@ -1,4 +1,4 @@
-"""What is wrong with one registration, if anything: the part of a model that learnt from measured causes."""
+"""What is wrong with one registration, if anything: the part of a model that learned from measured causes."""
 
 from __future__ import annotations
 

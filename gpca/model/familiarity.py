@@ -1,7 +1,7 @@
-"""Whether two clouds are like those that a model learnt: what is unlike them cannot be explained, only guessed at.
+"""Whether two clouds are like those that a model learned: what is unlike them cannot be explained, only guessed at.
 
 Three numbers of simple geometry, whose ranges over the training samples are kept with the model. None depends on the
-pose but that of size, which is measured about the clouds' own centres.
+pose but that of size, which is measured about the clouds' own centers.
 """
 
 from __future__ import annotations

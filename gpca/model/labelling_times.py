@@ -1,4 +1,4 @@
-"""The seconds of one round of active learning: the choice of what is labelled, and the retraining by it."""
+"""The seconds of one round of active learning: the choice of what is labeled, and the retraining by it."""
 
 from __future__ import annotations
 

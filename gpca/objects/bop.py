@@ -1,4 +1,4 @@
-"""Object models in the layout of the BOP benchmark: models/obj_000001.ply and models_info.json, in millimetres.
+"""Object models in the layout of the BOP benchmark: models/obj_000001.ply and models_info.json, in millimeters.
 
 Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md
 """

@@ -1,4 +1,4 @@
-"""A surface: what every kind of source yields, a mesh or a point cloud in metres."""
+"""A surface: what every kind of source yields, a mesh or a point cloud in meters."""
 
 from __future__ import annotations
 

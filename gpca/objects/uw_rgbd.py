@@ -1,7 +1,7 @@
 """UW RGB-D Object Dataset: single views of objects, already cut out, as PCD files or in the dataset's tars.
 
 Lai, Bo, Ren, Fox: A Large-Scale Hierarchical Multi-View RGB-D Object Dataset, ICRA 2011. A view is named
-<class>_<instance>_<sequence>_<frame>, e.g. coffee_mug_1_1_1; points are in metres in the camera's frame.
+<class>_<instance>_<sequence>_<frame>, e.g. coffee_mug_1_1_1; points are in meters in the camera's frame.
 """
 
 from __future__ import annotations

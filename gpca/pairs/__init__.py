@@ -1,1 +1,1 @@
-"""Perturbed pairs of clouds, aligned and labelled."""
+"""Perturbed pairs of clouds, aligned and labeled."""

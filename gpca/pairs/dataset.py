@@ -1,4 +1,4 @@
-"""Registrations: perturbed pairs, aligned by ICP, labelled with their concept, and the file that holds them."""
+"""Registrations: perturbed pairs, aligned by ICP, labeled with their concept, and the file that holds them."""
 
 from __future__ import annotations
 

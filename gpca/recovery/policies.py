@@ -153,7 +153,7 @@ ALWAYS = "always_"  # with an action's name behind it, the policy that always ta
 POLICIES = {
     "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
-    "utility": PolicyEntry("Expected utility, learnt", weigh_chances, explainer="gpca", learns=True),
+    "utility": PolicyEntry("Expected utility, learned", weigh_chances, explainer="gpca", learns=True),
     "utility_acting": PolicyEntry("Expected utility, alarmed", weigh_alarmed, explainer="gpca", learns=True),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),

@@ -1,6 +1,6 @@
 """What to do about an uncertain registration: from concept scores to one of four branches (paper Sec. V, Fig. 6).
 
-A case is queued for labelling where the classifier is uncertain about it or no concept dominates; else the dominant
+A case is queued for labeling where the classifier is uncertain about it or no concept dominates; else the dominant
 concept is treated: reinitialise ICP with a broader search (pose), change the viewpoint (overlap), filter and check the
 sensor (noise). After each action the scores are worked out anew, and after a few attempts that improved too little
 the case is queued as well.

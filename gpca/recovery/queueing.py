@@ -1,6 +1,6 @@
-"""What queued cases teach: the error on other failures, by how many cases a person has labelled.
+"""What queued cases teach: the error on other failures, by how many cases a person has labeled.
 
-A label is what solved the case: its cause for the classifier, the outcome of every action for the learnt chances.
+A label is what solved the case: its cause for the classifier, the outcome of every action for the learned chances.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is learnt before a policy decides: every action tried on failures of the training tables."""
+"""What is learned before a policy decides: every action tried on failures of the training tables."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Step ``frame_causes``: instances of depth frames -> their measured causes, and what explainers say of them.
 
-The explainers have learnt from registrations whose causes were drawn, those of all sources; no frame is among them.
+The explainers have learned from registrations whose causes were drawn, those of all sources; no frame is among them.
 """
 
 from __future__ import annotations

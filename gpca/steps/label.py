@@ -1,7 +1,7 @@
 """Step ``label``: a person names the cause of the registrations that the classifier is least sure of.
 
 Each question shows a picture and the scores; the answer is a concept, known or new, or one of the commands below. It is
-in the labels file before the next question comes; the same command continues where labelling was stopped. Answers can
+in the labels file before the next question comes; the same command continues where labeling was stopped. Answers can
 come from a file or a pipe.
 """
 

@@ -1,4 +1,4 @@
-"""How far an object's pose is off: ADD or ADD-S, the angle up to the symmetries, the shift of its centre."""
+"""How far an object's pose is off: ADD or ADD-S, the angle up to the symmetries, the shift of its center."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of what is learnt and compared: encoders, explainers, learners, strategies, tolerances."""
+"""Checks of what is learned and compared: encoders, explainers, learners, strategies, tolerances."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 These are not the scans. Diameters and extents (mm) are those of `models_info.json` of the BOP edition of LINEMOD
 (Hinterstoisser et al., ACCV 2012; Hodaň et al., ECCV 2018); axes as there, x to the front, z up. Each shape is drawn in
-millimetres with its foot near z = 0, stretched to the extents and then scaled evenly to the exact diameter, which
+millimeters with its foot near z = 0, stretched to the extents and then scaled evenly to the exact diameter, which
 leaves its extents within 11 % of the published ones.
 """
 

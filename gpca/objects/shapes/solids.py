@@ -1,7 +1,7 @@
 """A small vocabulary of solids: primitives, sweeps, booleans, all watertight, z up.
 
-Lengths are metres wherever a shape leaves this package. The functions themselves carry no unit, so a shape may be
-drawn in millimetres and brought to metres once, at its end (`moved(mesh, scale=0.001)` or `scaled_to`).
+Lengths are meters wherever a shape leaves this package. The functions themselves carry no unit, so a shape may be
+drawn in millimeters and brought to meters once, at its end (`moved(mesh, scale=0.001)` or `scaled_to`).
 Booleans go straight to manifold3d in float64; trimesh's own wrapper rounds every operand to float32.
 """
 

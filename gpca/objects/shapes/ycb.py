@@ -1,8 +1,8 @@
 """Stand-ins for the 21 objects of YCB-Video, built from solids with the size of the real ones.
 
-Shapes are drawn in millimetres, z up, each lying or standing as in the YCB scans, and then stretched to the sizes of
+Shapes are drawn in millimeters, z up, each lying or standing as in the YCB scans, and then stretched to the sizes of
 the published google_16k scans (tightest upright box; handles along x). The calliper table of Calli et al. (IEEE RAM,
-September 2015) is some millimetres smaller, since real cardboard bulges. No label, no fine relief; the
+September 2015) is some millimeters smaller, since real cardboard bulges. No label, no fine relief; the
 pitcher stands without the lid that its scan wears.
 """
 

@@ -7,7 +7,7 @@ All take the same arguments and raise the same error:
     pdf_path, png_path: The two files to write.
     InputError: There are no predictions of these sources and learners.
 
-The learners of the paper have a colour, as everywhere, and all others are grey: the tables tell them apart.
+The learners of the paper have a color, as everywhere, and all others are gray: the tables tell them apart.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def draw_uncertainty_vs_distance(
         panel.xaxis.set_minor_locator(NullLocator())
     axes[0, 0].set_ylim(bottom=0)
     _write_legend(figure, shown, learners)
-    write_title(figure, "ρ of the paper's learners above each panel, in their colours")
+    write_title(figure, "ρ of the paper's learners above each panel, in their colors")
     figure.tight_layout(rect=(0, 0.22 / height_in, 1, 1 - 0.3 / height_in), pad=0.4, h_pad=0.5)
     save_figure(figure, pdf_path, png_path)
 

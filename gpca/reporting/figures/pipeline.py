@@ -155,7 +155,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     middle_in = 0.86
     canvas.text(0.1, heads_in, "Active learning", ha="left", va="top", fontweight="bold")
 
-    canvas.text(6.4, heads_in, r"Unlabelled pool $\mathcal{D}_U$", va="top")
+    canvas.text(6.4, heads_in, r"Unlabeled pool $\mathcal{D}_U$", va="top")
     canvas.text(6.4, captions_in, f"{len(asked.rows_N)} training samples", va="bottom")
     for place, of_pool in enumerate(thinned(asked.rows_N, THUMBNAILS)):
         corner = (5.9 + 0.36 * (place % 3), 0.86 - 0.56 * (place // 3))
@@ -174,7 +174,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     canvas.text(
         5.04,
         captions_in,
-        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(asked.candidates)}\nringed; ×: labelled before",
+        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(asked.candidates)}\nringed; ×: labeled before",
         va="bottom",
     )
     canvas.arrow((4.46, middle_in), (4.24, middle_in))

@@ -67,7 +67,7 @@ def draw_mitigation(title: str, policy_json: str | Path, pdf_path: str | Path, p
     canvas.box(6.05, middles_in[0] - 0.2, 1.06, 0.4, "A person labels it\nthe GPC learns it")
     over_in = middles_in[0] + 0.32
     canvas.arrow((6.58, middles_in[0] + 0.2), (6.58, over_in), (0.69, over_in), (0.69, 1.52))
-    canvas.text(3.6, over_in + 0.03, "the classifier that has learnt the label decides all later cases", va="bottom")
+    canvas.text(3.6, over_in + 0.03, "the classifier that has learned the label decides all later cases", va="bottom")
     attempts = f"{limits['attempts']:.0f}"
     back = (
         "Register and\nscore anew\n\n"

@@ -40,7 +40,7 @@ def draw_queued_labels(
                 bounds = (100 * curve[name] for name in ("low", "high"))
                 panel.fill_between(curve["labels"], *bounds, color=colour, alpha=0.15, linewidth=0)
         panel.set_title(policies[policy])
-        panel.set_xlabel("queued cases labelled, per seed")
+        panel.set_xlabel("queued cases labeled, per seed")
         panel.set_ylim(0, 100)
         panel.margins(x=0.01)
         panel.xaxis.get_major_locator().set_params(integer=True)

@@ -65,7 +65,7 @@ def draw_transfer(
     for panel in axes.flat[len(shown) :]:
         panel.set_visible(False)
     for line in axes:
-        line[0].set_ylabel("learnt from")
+        line[0].set_ylabel("learned from")
     key = ", ".join(f"{letter} {title}" for letter, title in zip(letters, sources.values(), strict=True))
     write_title(figure, f"Accuracy (%) on the test samples of the column. {key}")
     figure.tight_layout(rect=(0, 0, 1, 1 - 0.22 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)

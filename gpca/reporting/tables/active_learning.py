@@ -153,7 +153,7 @@ def table3_stream(
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
-            f"concepts ({conditions['initial']} labelled samples at the start); a third of the others is new. A label "
+            f"concepts ({conditions['initial']} labeled samples at the start); a third of the others is new. A label "
             f"may be requested for {stream['budget']:.0%} of the arrivals; the GPC learns it at once, or the learner "
             "that the row names, simplified as docs/active_learning.md says.",
             "Delay: arrivals from the first sample of the new concept until half of its test samples are named right; "
@@ -191,7 +191,7 @@ def cell_of(metrics: pd.DataFrame, quantity: Quantity, test: int) -> Cell | None
 
 def _protocol(conditions: Mapping) -> str:
     return (
-        f"Start: {conditions['initial']} labelled samples of the two known concepts. Pool: the other "
+        f"Start: {conditions['initial']} labeled samples of the two known concepts. Pool: the other "
         f"{conditions['train'] - conditions['initial']} training samples, with all of the new concept, a third of "
         f"{conditions['train']}. "
         f"{conditions['batch']} labels a round, {conditions['labels']} in all; '>': some runs did not reach the target "

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TRAINED = {"random_draws": "draws of random size", "two_layer_head": "head of two layers"}
-KNOWN = {PAPER: TITLES[PAPER], SEEN: "Objects that it learnt from (%)", UNSEEN: "Unseen objects (%)"}
+KNOWN = {PAPER: TITLES[PAPER], SEEN: "Objects that it learned from (%)", UNSEEN: "Unseen objects (%)"}
 
 
 def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:

@@ -71,7 +71,7 @@ def table10_controls(
             f"In brackets: points gained or lost against the paper's protocol, over "
             f"{plural(table.most_seeds(), 'seed')}. {INTERVAL}",
             "Matched density: every cloud has a random number of points, in training and test. Unseen objects: encoder "
-            "and explainer learnt from other objects. Other sources: they learnt from one other source. Wrong labels: "
+            "and explainer learned from other objects. Other sources: they learned from one other source. Wrong labels: "
             "among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
             "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
             "AUROC: how well the entropy of the scores separates wrong from right answers. A dash marks a head that is "
@@ -106,7 +106,7 @@ def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
     Raises:
         InputError: The intervals hold none of these.
     """
-    table = TableBuilder("table10_transfer", {"explainer": "Explainer", "trained_on": "Learnt from"})
+    table = TableBuilder("table10_transfer", {"explainer": "Explainer", "trained_on": "Learned from"})
     titles = {name: title_of(entry) for name, entry in sources.items()}
     accuracy = rows_where(intervals, metric="accuracy")
     for explainer, words in explainers.items():
@@ -127,8 +127,8 @@ def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
         column_head="tested",
         columns={**{name: Column(f"on {title}") for name, title in titles.items()}, POOLED: Column("mean")},
         footnotes=(
-            "Encoder and explainer learnt from one source and are asked about the test samples of another; what they "
-            f"learnt from is the paper's protocol. Over {plural(table.most_seeds(), 'seed')}; " + INTERVAL,
+            "Encoder and explainer learned from one source and are asked about the test samples of another; what they "
+            f"learned from is the paper's protocol. Over {plural(table.most_seeds(), 'seed')}; " + INTERVAL,
         ),
     )
 

@@ -81,7 +81,7 @@ def table14_method_matrix(
         methods: The title of each name, in order.
         left_out: The package that is missing, by the title of the method that needs it.
     """
-    table = TableBuilder("table14_method_matrix", {"explainer": "Explainer", "learnt_from": "Learnt from"})
+    table = TableBuilder("table14_method_matrix", {"explainer": "Explainer", "learnt_from": "Learned from"})
     names = [*methods, ANOTHER]
     for explainer, words in explainers.items():
         rows = rows_where(metrics, table=explainer)

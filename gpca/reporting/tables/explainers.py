@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 TABLE1 = ("shap_additive", "sa_local_additive", *GPCA_FORMS)  # The paper has SHAP, SA and GP-CA; ours trains longer.
 EXTENDED = {  # Each of these metrics has a column in table1_extended.
     "accuracy": Column("Accuracy (%)"),
-    "permuted_accuracy": Column("Relabelled (%)"),
+    "permuted_accuracy": Column("Relabeled (%)"),
     "causal_accuracy": Column("Causal (%)"),
     "causal_samples": Column("n causal", decimals=0, interval=False, limits=(0, inf)),
     "abstention_rate": Column("Abstained (%)", interval=False),
@@ -79,7 +79,7 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
     notes = {
         "accuracy": f"Bold: best accuracy on the dataset{apart}. Abstained samples are wrong.",
         "permuted_accuracy": (
-            "Relabelled: accuracy under the best one-to-one renaming of the predicted concepts, which takes the truth "
+            "Relabeled: accuracy under the best one-to-one renaming of the predicted concepts, which takes the truth "
             "to find; where it is far above the accuracy, concepts are told apart but named wrongly."
         ),
         "causal_accuracy": (

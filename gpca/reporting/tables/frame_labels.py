@@ -75,7 +75,7 @@ def table6_labels(metrics: pd.DataFrame, title: str, encoders: Mapping[str, str]
         columns=columns,
         footnotes=(
             f"{mean_over(seeds, conditions['test'])}.",
-            f"Start: {conditions['initial']} labelled samples of the two known concepts; the pool is the rest of "
+            f"Start: {conditions['initial']} labeled samples of the two known concepts; the pool is the rest of "
             f"{conditions['train']} training samples. {conditions['batch']} labels a round, {conditions['labels']} in "
             "all; '>': some runs did not reach the target and count with all labels. Encoders saw every concept.",
             "Validation: of the encoder, on the training instances that it did not learn from, over all seeds; it "

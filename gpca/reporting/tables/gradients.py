@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ORDERS = {
     "gradient": "Most salient first",
-    "to_centre": "Most salient first (to the centre)",
+    "to_centre": "Most salient first (to the center)",
     "random": "At random",
     "least_gradient": "Least salient first",
 }
@@ -59,7 +59,7 @@ def saliency_deletion(metrics: pd.DataFrame, sources: Mapping[str, Mapping], con
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['samples'])}; one draw of points of each sample.",
             "Fall: of the score of the concept named on the whole draw, in hundredths; in brackets the excess over "
-            "random deletion. To the centre: in the order of how much moving a point to the centre changes the score "
+            "random deletion. To the center: in the order of how much moving a point to the center changes the score "
             "(Zheng et al. 2019). At random: mean of four orders.",
         ),
     )

@@ -51,7 +51,7 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
         of_causes[f"{cause}_all"] = Quantity(
             "final_accuracy", Column("all labels (%)", interval=False), ALL_LABELS, cause
         )
-    table = TableBuilder("table15_new_concepts", {"source": "Dataset", "seen": "Encoder learnt from"})
+    table = TableBuilder("table15_new_concepts", {"source": "Dataset", "seen": "Encoder learned from"})
     for source, entry in sources.items():
         for setting, title in SEEN.items():
             of_row = rows_where(metrics, source=source, table=TABLE + setting)
@@ -76,9 +76,9 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
             _protocol(conditions),
             f"Labels: by BALD with k-means, for each concept as the new one; random: mean over the three. Within "
             f"{WITHIN}: share of the runs that reached the target within {WITHIN} labels. All labels: accuracy when "
-            "the whole pool is labelled, mean over the three.",
+            "the whole pool is labeled, mean over the three.",
             "Nominal, Geometry: registrations with measured causes of objects that no method saw; accuracy over all "
-            "causes after all queries, and with the whole pool labelled. No encoder saw Geometry.",
+            "causes after all queries, and with the whole pool labeled. No encoder saw Geometry.",
         ),
     )
 
@@ -89,7 +89,9 @@ def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], condit
     shares = [0, *(round(100 * share) for share in conditions["errors"])]
     labels = {f"labels_{share}": Column(f"Labels, {share} % wrong", **COUNT) for share in shares}
     accuracies = {f"accuracy_{share}": Column(f"Acc., {share} % wrong (%)") for share in shares}
-    table = TableBuilder("table15_oracle", {"source": "Dataset", "seen": "Encoder learnt from", "strategy": "Strategy"})
+    table = TableBuilder(
+        "table15_oracle", {"source": "Dataset", "seen": "Encoder learned from", "strategy": "Strategy"}
+    )
     for source, entry in sources.items():
         for setting in (setting for setting in SEEN if setting in conditions["erring"]):
             for strategy, title in ((PAPERS, "BALD + k-means"), ("random", "Random")):
@@ -129,6 +131,6 @@ def _within(metrics: pd.DataFrame, test: int) -> Cell | None:
 
 def _protocol(conditions: Mapping) -> str:
     return (
-        f"Start: {conditions['initial']} labelled samples of the known concepts; {conditions['batch']} labels a round, "
+        f"Start: {conditions['initial']} labeled samples of the known concepts; {conditions['batch']} labels a round, "
         f"{conditions['labels']} in all; '>': some runs did not reach the target and count with all labels."
     )

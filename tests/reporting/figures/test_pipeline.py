@@ -81,7 +81,7 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(
     assert "initial pose $T_0$:\n" + severity_text(of, row, sample["concept_true"]) in written
     assert any(words.endswith(stages.words(row, "icp")) for words in written)
     low, high = asked.bald_N.min(), asked.bald_N.max()
-    assert f"{low:.2f} to {high:.2f} nats; $B K$ = 12\nringed; ×: labelled before" in written
+    assert f"{low:.2f} to {high:.2f} nats; $B K$ = 12\nringed; ×: labeled before" in written
     assert "28 training samples" in written
     assert "Retrain: overlap is new" in written
     assert "PointNet\n$f_\\theta$" in written

@@ -68,7 +68,7 @@ def test_table3_shows_the_papers_experiment_alone(metrics):
 
 def test_table3_states_its_conditions(metrics):
     markdown = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
-    for words in ("120 labelled samples", "680 training samples", "4 labels a round, 60 in all", "warm start", "5% of"):
+    for words in ("120 labeled samples", "680 training samples", "4 labels a round, 60 in all", "warm start", "5% of"):
         assert words in markdown
     assert "Mean over 3 seeds, 200 test samples each" in markdown
 

@@ -199,7 +199,7 @@ def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
     table = table1_extended(everything, REAL, EXPLAINERS)
     lines = table.markdown().splitlines()
     assert lines[2] == (
-        "| Dataset | Explainer | Accuracy (%) | Relabelled (%) | Causal (%) | n causal "
+        "| Dataset | Explainer | Accuracy (%) | Relabeled (%) | Causal (%) | n causal "
         "| Abstained (%) | ICP calls | Seconds | n |"
     )
     assert lines[4] == "| LINEMOD | GP-CA | 80.0 ± 0.0 | 90.0 ± 0.0 | 50.0 ± 0.0 | 80 | 12.5 | 400 | 0.250 | 200 |"
