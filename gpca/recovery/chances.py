@@ -1,4 +1,4 @@
-"""Chances, learned on the training tables: that a pose is right as it is, and that an action makes a wrong one right."""
+"""Chances, learned on the training tables: that a pose is right as it is, and that an action mends a wrong one."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
     total = sum(failed.values())
     most = max(failed, key=lambda concept: failed[concept])
     return table.build(
-        caption=f"What is wrong with a registration of a depth frame: {title_of(frames)}; learned from simulated causes",
+        caption=f"What is wrong with registrations of depth frames: {title_of(frames)}; learned from simulated causes",
         column_head="metric",
         columns=SHOWN_OF_FRAMES,
         footnotes=(

@@ -71,8 +71,8 @@ def table10_controls(
             f"In brackets: points gained or lost against the paper's protocol, over "
             f"{plural(table.most_seeds(), 'seed')}. {INTERVAL}",
             "Matched density: every cloud has a random number of points, in training and test. Unseen objects: encoder "
-            "and explainer learned from other objects. Other sources: they learned from one other source. Wrong labels: "
-            "among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
+            "and explainer learned from other objects. Other sources: they learned from one other source. Wrong "
+            "labels: among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
             "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
             "AUROC: how well the entropy of the scores separates wrong from right answers. A dash marks a head that is "
             "trained with the encoder and learns no labels, and a source that does not admit a control.",
