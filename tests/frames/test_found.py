@@ -25,6 +25,7 @@ def test_what_was_found_of_backbones_stands_in_the_reference():
     assert (best["attribution"], best["seen"], best["unseen"]) == ("pointnet2-none", "pointnext-none", "dgcnn-none")
     dgcnn, pair = frames.loc["dgcnn-none"], frames.loc["gpca_pair"]
     assert f"DGCNN reaches {dgcnn['attribution']:.1f} %" in found
+    assert f"GP-CA reaches {dgcnn['attribution']:.1f} %" in (ROOT / "README.md").read_text()
     assert f"PointNet++ reaches {frames.loc['pointnet2-none', 'attribution']:.1f} %" in found
     assert (
         f"PointNeXt-S is best with {frames.loc['pointnext-none', 'seen']:.1f} % (DGCNN {dgcnn['seen']:.1f} %)" in found
