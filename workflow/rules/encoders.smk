@@ -75,7 +75,7 @@ rule pretrain_encoder:
     threads: 1
     resources:
         mem_mb=3000,
-        runtime=60,
+        runtime=180,
     params:
         settings=lambda wildcards: encoder_settings(
             wildcards, REAL_WORLD["pretraining"]

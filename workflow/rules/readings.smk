@@ -43,7 +43,7 @@ rule reading:
     threads: 1
     resources:
         mem_mb=3000,
-        runtime=30,
+        runtime=120,
     params:
         settings=lambda wildcards: as_json(
             {
