@@ -52,7 +52,7 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
             whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone] or names, list
         )
     if left_out["real_world.datasets"] and not _at(whole, "real_world.datasets"):
-        _change(whole, "real_world.virtual", lambda _frames: None)  # whose models would be rendered?
+        _change(whole, "real_world.virtual", lambda _frames: None)  # no models are left to render
     gone = left_out["encoders"]
     _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}

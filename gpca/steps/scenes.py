@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,11 +46,15 @@ def run(options: Namespace) -> None:
             write_scenes(surfaces, options.source, settings, options.out)
 
 
-def _models(options: Namespace, datasets: dict[str, dict]) -> Iterable[Surface]:
+def _models(options: Namespace, datasets: dict[str, dict]) -> list[Surface]:
     """Return the models of all objects that the datasets' frames show, those that datasets share once.
 
     Those that cannot be rendered or stood on a table are skipped, with a line on stderr.
+
+    Raises:
+        InputError: none is left.
     """
+    models = []
     found = datasets_of(datasets, options.data_dir, options.downloads, None)
     for surface in distinct_surfaces(models_of(found)):
         try:
@@ -60,4 +63,8 @@ def _models(options: Namespace, datasets: dict[str, dict]) -> Iterable[Surface]:
         except InputError as fault:
             print(f"skipped: {fault}", file=sys.stderr)
         else:
-            yield model
+            models.append(model)
+    if not models:
+        remedy = "set real_world.virtual to null, or name other datasets"
+        raise InputError("real_world.datasets", "no model of them can be rendered on a table", remedy)
+    return models

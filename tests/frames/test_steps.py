@@ -118,6 +118,20 @@ def test_models_that_cannot_stand_on_a_table_are_skipped(scenes, tmp_path, capsy
     assert len(drawn) == len(shown) - 2
 
 
+def test_datasets_without_any_model_that_can_stand_are_refused(scenes, tmp_path, capsys):
+    shutil.copytree(scenes, tmp_path / "set")
+    for path in (tmp_path / "set/models").glob("*.ply"):
+        trimesh.PointCloud(trimesh.load(path).sample(2000)).export(path)
+    given = settings(count=2, views=1, objects=[2, 2], datasets={"tiny": {"location": str(tmp_path / "set")}})
+    assert main(["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]) == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert told == (
+        "gpca scenes: real_world.datasets: no model of them can be rendered on a table; set real_world.virtual to "
+        "null, or name other datasets"
+    )
+    assert not (tmp_path / "drawn").exists()
+
+
 @pytest.mark.parametrize(
     ("given", "expected"),
     [
