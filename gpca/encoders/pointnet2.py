@@ -12,9 +12,9 @@ from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
 class PointNet2(nn.Module):
     """Set abstraction at 256 and 64 centroids, then of the whole cloud: the published network for ModelNet40.
 
-    It has 512 and 128 centroids for clouds of 1024 points; with 512 points the shares are kept. Its radii of 0.2 and
-    0.4 are for clouds in the unit sphere, of diameter 2; here the object's diameter is 1, so they are 0.1 and 0.2. In a
-    cloud with fewer points than centroids each point is one.
+    It has 512 and 128 centroids for clouds of 1024 points; with 512 points the shares are kept, and so they are in
+    smaller clouds: at most half of the points are centroids of the first level. Its radii of 0.2 and 0.4 are for clouds
+    in the unit sphere, of diameter 2; here the object's diameter is 1, so they are 0.1 and 0.2.
 
     A ball's points are given relative to its centroid, as published, so the first two levels would not see where on
     the object a ball lies before the last one tells them. Therefore the points' own coordinates go in as features too,
@@ -23,7 +23,7 @@ class PointNet2(nn.Module):
 
     Args:
         width: that of the first layer, 64 as published; all others grow with it.
-        centroids: how many the first level has; the second has a quarter of them.
+        centroids: how many the first level has, at most; the second has a quarter of its number.
         radius: that of the first level's balls, in units of the object's diameter; the second's is twice as large.
         neighbours: points of a ball on the first level, at most; twice as many on the second.
 
@@ -35,16 +35,18 @@ class PointNet2(nn.Module):
         super().__init__()
         w = width
         self.embedding_size = 16 * w
-        self._levels = ((centroids, radius, neighbours), (max(1, centroids // 4), 2 * radius, 2 * neighbours))
+        self.centroids = centroids
+        self.balls = ((radius, neighbours), (2 * radius, 2 * neighbours))
         self.levels = nn.ModuleList([GroupMLP(3, (w, w, 2 * w)), GroupMLP(2 * w, (2 * w, 2 * w, 4 * w))])
         self.whole = GroupMLP(4 * w, (4 * w, 8 * w, self.embedding_size))
 
     def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
         """Return embeddings (B, d) of clouds in the target's frame, in units of the object's diameter."""
         x_B_N_F = points_B_N_3
-        for layers, (centroids, radius, neighbours) in zip(self.levels, self._levels, strict=True):
+        centroids = min(self.centroids, max(1, points_B_N_3.shape[1] // 2))
+        for layers, (radius, neighbours) in zip(self.levels, self.balls, strict=True):
             centres_B_M_3 = take(points_B_N_3, farthest_points(points_B_N_3, centroids))
             groups = Groups(centres_B_M_3, *ball_query(points_B_N_3, centres_B_M_3, radius, neighbours), radius)
             x_B_N_F = layers(points_B_N_3, x_B_N_F, groups)
-            points_B_N_3 = centres_B_M_3
+            points_B_N_3, centroids = centres_B_M_3, max(1, centroids // 4)
         return self.whole(points_B_N_3, x_B_N_F, Groups.whole(points_B_N_3))[:, 0]
