@@ -4,7 +4,7 @@ Run it with ``python docs/tutorial.py``, or cell by cell in an editor that knows
 and the model comes with the package (docs/explain.md).
 """
 
-# %% 1. Two clouds. The target is the reference, a whole figure of a cat in metres; the source is what a sensor saw of
+# %% 1. Two clouds. The target is the reference, a whole figure of a cat in meters; the source is what a sensor saw of
 # it. Both are drawn from the same surface here, but share no point. Yours would come from files.
 import numpy as np
 

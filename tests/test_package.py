@@ -72,7 +72,7 @@ def test_the_wheel_holds_every_module_and_every_data_file_and_nothing_else(wheel
     assert {"gpca/py.typed", "baselines/py.typed", "gpca/config/config.schema.yaml"} <= names
 
 
-def test_the_wheel_says_its_version_licence_and_command(wheel):
+def test_the_wheel_says_its_version_license_and_command(wheel):
     with zipfile.ZipFile(wheel) as archive:
         [metadata] = [name for name in archive.namelist() if name.endswith(".dist-info/METADATA")]
         entry_points = archive.read(metadata.replace("METADATA", "entry_points.txt")).decode()

@@ -1,4 +1,4 @@
-"""The card of a model that is handed on: data and their licences, scores, limits; all from the files of its run."""
+"""The card of a model that is handed on: data and their licenses, scores, limits; all from the files of its run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gpca.diagnosis.measures import RECALL
 from gpca.errors import InputError
 from gpca.model.diagnoser import Diagnoser
 from gpca.model.file import VERSION, Model
-from gpca.model.origin import Licence, Origin
+from gpca.model.origin import License, Origin
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -60,7 +60,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
         "## File",
         _file(name, content, origin),
         *("## What it learned", *_learnt(model, diagnoser, origin)),
-        *("## Data and licences", *_licences(origin)),
+        *("## Data and licenses", *_licenses(origin)),
         *("## Scores", *_scores(origin, scores)),
         *("## Limits", "\n".join(_wrapped(f"- {line}", "  ") for line in limits)),
     ]
@@ -91,17 +91,17 @@ def _learnt(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
     ]
 
 
-def _licences(origin: Origin) -> list[str]:
-    used: dict[Licence, list[str]] = {}
+def _licenses(origin: Origin) -> list[str]:
+    used: dict[License, list[str]] = {}
     for source in origin.sources:
-        for licence in source.licences:
-            used.setdefault(licence, []).append(source.title)
-    rows = [(of.dataset, of.licence, of.known, "; ".join(dict.fromkeys(titles))) for of, titles in used.items()]
+        for license in source.licenses:
+            used.setdefault(license, []).append(source.title)
+    rows = [(of.dataset, of.license, of.known, "; ".join(dict.fromkeys(titles))) for of, titles in used.items()]
     return [
         "The file holds weights, descriptors and embeddings that were computed from these data, but none of their "
-        "points or images. The data stay under their own licences; whether these reach a trained model is not for this "
+        "points or images. The data stay under their own licenses; whether these reach a trained model is not for this "
         'page to say. "Seen" means read in the stated place, "from memory" means not confirmed.',
-        _table(["dataset", "licence", "how that is known", "part of"], rows),
+        _table(["dataset", "license", "how that is known", "part of"], rows),
     ]
 
 

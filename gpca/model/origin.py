@@ -1,4 +1,4 @@
-"""Where a model comes from: the data of its run, with their licences, as the run's provenance tells."""
+"""Where a model comes from: the data of its run, with their licenses, as the run's provenance tells."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from gpca.json_file import read_json
 from gpca.objects.canonical import ObjectClouds
 from gpca.structured_text import load_own_yaml
 
-LICENCES = Path(__file__).with_name("licences.yaml")
+LICENSES = Path(__file__).with_name("licenses.yaml")
 REMEDY = "ship a model from the folder of the run that made it"
 _READ = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # among the inputs of a model
 
 
 @dataclass(frozen=True)
-class Licence:
-    """What is known of the licence of a dataset.
+class License:
+    """What is known of the license of a dataset.
 
     Attributes:
-        dataset, licence: their names.
-        known: where the licence was read.
+        dataset, license: their names.
+        known: where the license was read.
     """
 
     dataset: str
-    licence: str
+    license: str
     known: str
 
 
@@ -40,14 +40,14 @@ class Source:
         name, title: in the run.
         diagnosed: whether the diagnosis learnt from them, or else GP-CA.
         objects: how many there are.
-        licences: of all datasets that they were read from.
+        licenses: of all datasets that they were read from.
     """
 
     name: str
     title: str
     diagnosed: bool
     objects: int
-    licences: tuple[Licence, ...]
+    licenses: tuple[License, ...]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Origin:
             title: of the frames, which the provenance of a dataset's objects does not name.
 
         Raises:
-            InputError: provenance that is missing or incomplete, objects drawn by the package, data without a licence.
+            InputError: provenance that is missing or incomplete, objects drawn by the package, data without a license.
         """
         record = _provenance(model)
         found = [match.groups() for path in record["inputs_sha256"] if (match := _READ.search(f"/{path}"))]
@@ -92,8 +92,8 @@ def _source(run: Path, name: str, diagnosed: bool, title: str) -> Source:
     if entry.get("stand_in"):
         raise InputError(objects, "contains objects that the package drew", "ship a model of real objects")
     places = list(record["inputs_sha256"]) or _addresses(settings)
-    licences = {licence: None for place in places for licence in _licences_of(place, objects)}
-    return Source(name, entry["title"], diagnosed, len(ObjectClouds.load(objects)), tuple(licences))
+    licenses = {license: None for place in places for license in _licenses_of(place, objects)}
+    return Source(name, entry["title"], diagnosed, len(ObjectClouds.load(objects)), tuple(licenses))
 
 
 def _addresses(settings: Mapping) -> list[str]:
@@ -102,19 +102,19 @@ def _addresses(settings: Mapping) -> list[str]:
     return [url for entry in entries for url in (entry.get("urls") or [entry["url"]])]
 
 
-def _licences_of(place: str, objects: Path) -> list[Licence]:
-    known = [licence for words, licence in _licences() if any(word in place for word in words)]
+def _licenses_of(place: str, objects: Path) -> list[License]:
+    known = [license for words, license in _licenses() if any(word in place for word in words)]
     if not known:
         fault = f"was made from '{Path(place).name}', which is from a dataset without a known license"
-        raise InputError(objects, fault, f"add the dataset to {LICENCES}")
+        raise InputError(objects, fault, f"add the dataset to {LICENSES}")
     return known
 
 
 @cache
-def _licences() -> tuple[tuple[tuple[str, ...], Licence], ...]:
+def _licenses() -> tuple[tuple[tuple[str, ...], License], ...]:
     return tuple(
-        (tuple(entry["found"]), Licence(dataset, entry["licence"], entry["known"]))
-        for dataset, entry in load_own_yaml(LICENCES).items()
+        (tuple(entry["found"]), License(dataset, entry["license"], entry["known"]))
+        for dataset, entry in load_own_yaml(LICENSES).items()
     )
 
 

@@ -27,7 +27,7 @@ SPECIFICATION = "https://w3id.org/ro/crate/1.1"
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 CONTEXT = (f"{SPECIFICATION}/context", "https://w3id.org/ro/terms/workflow-run/context")
 PAPER = "https://arxiv.org/abs/2509.18786"
-LICENCE = "The suite is under the MIT licence; the datasets that the run read keep their own licences."
+LICENSE = "The suite is under the MIT license; the datasets that the run read keep their own licenses."
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
         "name": name,
         "description": description,
         "datePublished": max(job.ended for job in jobs).date().isoformat(),
-        "license": LICENCE,
+        "license": LICENSE,
         "conformsTo": {"@id": PROFILE},
         "citation": {"@id": PAPER},
         "hasPart": _references(parts),
