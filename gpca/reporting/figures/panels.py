@@ -7,17 +7,17 @@ from textwrap import wrap
 
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 
-PANELS_PER_ROW = 4
+MOST_PER_ROW = 4
 
 
 def small_panels(count: int, panel_height_in: float):
-    """Return a figure with that many panels, their axes shared, and the panels."""
+    """Return a figure with that many panels, their axes shared, and the panels; rows are as even as they can be."""
     use_style()
     import matplotlib.pyplot as plt
 
-    lines = -(-count // PANELS_PER_ROW)
+    lines = -(-count // MOST_PER_ROW)
     size = (TEXT_WIDTH_IN, 0.75 + panel_height_in * lines)
-    figure, axes = plt.subplots(lines, PANELS_PER_ROW, figsize=size, sharex=True, sharey=True, squeeze=False)
+    figure, axes = plt.subplots(lines, -(-count // lines), figsize=size, sharex=True, sharey=True, squeeze=False)
     for spare in axes.flat[count:]:
         spare.set_visible(False)
     return figure, list(axes.flat[:count])
@@ -36,10 +36,11 @@ def finish_panels(
 ) -> None:
     """Label the outer panels, set a title above all and a legend below, and write the figure."""
     height_in = figure.get_size_inches()[1]
+    per_row = panels[0].get_gridspec().ncols
     for i, panel in enumerate(panels):
-        if i % PANELS_PER_ROW == 0:
+        if i % per_row == 0:
             panel.set_ylabel(up)
-        if i + PANELS_PER_ROW >= len(panels):
+        if i + per_row >= len(panels):
             panel.set_xlabel(across)
             panel.tick_params(labelbottom=True)
     figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
