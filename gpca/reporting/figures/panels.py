@@ -7,7 +7,7 @@ from textwrap import wrap
 
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 
-MOST_PER_ROW = 4
+MOST_PER_ROW = 5
 
 
 def small_panels(count: int, panel_height_in: float):
