@@ -3,11 +3,12 @@
 import pandas as pd
 
 from gpca.code_files import ROOT
+from tests.documents import unwrapped
 
 REFERENCE = ROOT / "results/reference/real"
 TABLES = REFERENCE / "tables"
 MOST = 400  # labels of a run where the concept is rare
-PAGE = " ".join((ROOT / "docs/active_learning.md").read_text().split())
+PAGE = unwrapped("docs/active_learning.md")
 CONCEPTS = ("noise", "pose", "overlap")
 
 

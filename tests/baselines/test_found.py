@@ -3,12 +3,9 @@
 import pandas as pd
 
 from gpca.code_files import ROOT
+from tests.documents import unwrapped
 
 TABLE = ROOT / "results/reference/real/tables/table1_extended.csv"
-
-
-def page():
-    return " ".join((ROOT / "docs/baselines.md").read_text().split())
 
 
 def span(explainer):
@@ -19,7 +16,7 @@ def span(explainer):
 
 
 def test_what_was_found_of_shap_and_sensitivity_analysis_stands_in_the_reference():
-    found = page()
+    found = unwrapped("docs/baselines.md")
     assert f"Additive SHAP reaches {span('shap_additive')}" in found
     assert f"local SA {span('sa_local_additive')}" in found
     by_residual = (span(f"{name}_removal_residual") for name in ("shap", "sa_local"))
@@ -30,7 +27,7 @@ def test_what_was_found_of_shap_and_sensitivity_analysis_stands_in_the_reference
 
 
 def test_what_was_found_of_rivals_with_labels_stands_in_the_reference():
-    found = page()
+    found = unwrapped("docs/baselines.md")
     assert f"a random forest reach GP-CA's accuracy**, {span('residuals_forest')}" in found
     assert f"{span('analytical_gpc')} with it" in found
     assert f"{span('analytical_gpc_no_counts')} without" in found

@@ -16,6 +16,7 @@ from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
 from gpca.reporting.tables.claims import counted
 from gpca.reporting.tables.comparison import counts_table, summary
+from tests.documents import unwrapped
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
 TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items()}
@@ -77,7 +78,7 @@ def test_every_repeat_has_the_value_that_was_judged(shown):
 def test_the_readme_counts_the_sentences_of_the_reference():
     verdicts = read_verdicts(ROOT / "results/reference/real/claims.csv")
     assert list(dict.fromkeys(verdicts["claim"])) == [claim.name for claim in read_claims()]
-    assert counted(verdicts) in " ".join((ROOT / "README.md").read_text().split())
+    assert counted(verdicts) in unwrapped("README.md")
     assert counted(verdicts) in (ROOT / "results/reference/real/tables/claims.md").read_text()
 
 
@@ -102,7 +103,7 @@ def test_the_readme_counts_the_verdicts_of_the_reference(shown):
 
 
 def test_what_was_found_of_readings_stands_in_the_reference(shown):
-    found = " ".join((ROOT / "docs/comparison.md").read_text().split())
+    found = unwrapped("docs/comparison.md")
     keys = ["table", "row", "column"]
     judged = judge_readings(
         read_published(), shown, read_metrics(ROOT / "results/reference/real" / READINGS), TOLERANCES

@@ -6,12 +6,9 @@ The rows that the page prints are held to it by tests/test_documented_numbers.py
 import pandas as pd
 
 from gpca.code_files import ROOT
+from tests.documents import unwrapped
 
 TABLES = ROOT / "results/reference/real/tables"
-
-
-def page(path):
-    return " ".join((ROOT / path).read_text().split())
 
 
 def pooled():
@@ -20,7 +17,7 @@ def pooled():
 
 
 def test_what_the_readme_says_of_unseen_objects_stands_in_the_reference():
-    by, readme = pooled(), page("README.md")
+    by, readme = pooled(), unwrapped("README.md")
     gpca, pair = by.loc["gpca"], by.loc["gpca_pair"]
     assert (
         f"falls from {gpca['paper']:.1f} to {gpca['unseen_objects']:.0f} %, and on other datasets to "
@@ -30,7 +27,7 @@ def test_what_the_readme_says_of_unseen_objects_stands_in_the_reference():
 
 
 def test_what_is_said_of_density_and_of_doubt_stands_in_the_reference():
-    by, found = pooled(), page("docs/controls.md")
+    by, found = pooled(), unwrapped("docs/controls.md")
     assert round(by.loc["gpca", "paper"] - by.loc["gpca", "density"]) == 1
     lost = by.loc["analytical_gpc", "paper"] - by.loc["analytical_gpc", "density"]
     assert f"while classic features lose {lost:.0f}." in found

@@ -3,13 +3,10 @@
 import pandas as pd
 
 from gpca.code_files import ROOT
+from tests.documents import unwrapped
 
 TABLES = ROOT / "results/reference/real/tables"
 LOCAL = ["point_to_point", "point_to_plane", "gicp", "trimmed"]
-
-
-def page(name):
-    return " ".join((ROOT / f"docs/{name}.md").read_text().split())
 
 
 def span(values, joint="to"):
@@ -19,7 +16,7 @@ def span(values, joint="to"):
 def test_what_was_found_of_estimators_stands_in_the_reference():
     tidy = pd.read_csv(TABLES / "table14_estimator_explanations.csv")
     rows = tidy.pivot(index=["explainer", "estimator"], columns="metric", values="mean")
-    found = page("estimators")
+    found = unwrapped("docs/estimators.md")
     assert f"{tidy['n_test'].max()} test samples" in found
     assert f"classifier keeps {span(rows.loc['residuals_logistic', 'all'])}" in found
     shap = rows.loc["shap_additive"]
@@ -32,7 +29,7 @@ def test_what_was_found_of_estimators_stands_in_the_reference():
 def test_what_was_found_of_methods_stands_in_the_reference():
     rows = pd.read_csv(TABLES / "table14_method_matrix.csv")
     cells = rows[rows["asked_of"] != "another"].set_index(["explainer", "learnt_from", "asked_of"])["mean"]
-    found = page("registration")
+    found = unwrapped("docs/registration.md")
     assert f"{span(cells['gpca'])} in every cell" in found
     pair = cells["gpca_pair"]
     assert (

@@ -5,12 +5,9 @@ import re
 import pandas as pd
 
 from gpca.code_files import ROOT
+from tests.documents import unwrapped
 
 TABLES = ROOT / "results/reference/real/tables"
-
-
-def page(name):
-    return " ".join((ROOT / f"docs/{name}.md").read_text().split())
 
 
 def cells(table, *keys):
@@ -18,7 +15,7 @@ def cells(table, *keys):
 
 
 def test_what_was_found_of_backbones_stands_in_the_reference():
-    found, by = page("real_world"), cells("table6_seen_unseen", "condition", "method", "samples")
+    found, by = unwrapped("docs/real_world.md"), cells("table6_seen_unseen", "condition", "method", "samples")
     frames = by.loc["real_rgbd"].unstack()
     unreduced = frames[frames.index.str.endswith("-none") & ~frames.index.str.startswith("analytical")]
     best = unreduced.idxmax()
@@ -43,19 +40,19 @@ def test_what_was_found_of_confusions_stands_in_the_reference():
     compared = pd.read_csv(TABLES.parent / "comparison.csv")
     rows = compared[compared["row"].str.startswith("DGCNN, depth frames")].set_index("column")["reproduced"]
     words = f"pose for overlap in {rows['Taken for overlap']:.1f} % of the cases and overlap for pose in"
-    assert f"{words} {rows['Taken for pose']:.1f} %" in page("real_world")
+    assert f"{words} {rows['Taken for pose']:.1f} %" in unwrapped("docs/real_world.md")
 
 
 def test_what_was_found_of_labels_stands_in_the_reference():
     labels = cells("table6_labels", "seen", "quantity")
     assert labels.unstack()["validation"].idxmax() == "pointnet2"
     by_bald, at_random = (labels.loc["pointnet2", name] for name in ("bald_kmeans_70", "random_70"))
-    assert f"70 % with {by_bald:.0f} labels by BALD and {at_random:.0f} at random" in page("real_world")
-    assert f"active learning saves {100 * (1 - by_bald / at_random):.0f} % of them" in page("real_world")
+    assert f"70 % with {by_bald:.0f} labels by BALD and {at_random:.0f} at random" in unwrapped("docs/real_world.md")
+    assert f"active learning saves {100 * (1 - by_bald / at_random):.0f} % of them" in unwrapped("docs/real_world.md")
 
 
 def test_what_was_found_of_causes_stands_in_the_reference():
-    found = page("causes")
+    found = unwrapped("docs/causes.md")
     note = (TABLES / "table9_frames.md").read_text()
     told = (
         r"Of (\d+) registrations .* (\d+) failed: (\d+) mostly by noise, (\d+) mostly by pose, (\d+) mostly by overlap"

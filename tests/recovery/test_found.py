@@ -3,10 +3,11 @@
 import pandas as pd
 
 from gpca.code_files import ROOT
+from tests.documents import unwrapped
 
 
 def test_what_was_found_stands_in_the_reference():
-    found = " ".join((ROOT / "docs/recovery.md").read_text().split())
+    found = unwrapped("docs/recovery.md")
     tidy = pd.read_csv(ROOT / "results/reference/real/tables/table8_recovery.csv")
     rows = tidy.pivot(index="policy", columns="metric", values="mean")
     one, two, three = (rows[f"recovered_within_{actions}"] for actions in (1, 2, 3))

@@ -3,12 +3,10 @@
 import pandas as pd
 
 from gpca.code_files import ROOT
+from tests.documents import unwrapped
 
 REFERENCE = ROOT / "results/reference/real"
-
-
-def page():
-    return " ".join((ROOT / "docs/diagnostics.md").read_text().split())
+PAGE = "docs/diagnostics.md"
 
 
 def means(table):
@@ -22,7 +20,7 @@ def of(quantity, table):
 
 
 def test_what_was_found_of_the_papers_setting_stands_in_the_reference():
-    accuracy, ece, found = of("accuracy", "table5_learners"), of("ece", "table5_learners"), page()
+    accuracy, ece, found = of("accuracy", "table5_learners"), of("ece", "table5_learners"), unwrapped(PAGE)
     behind = accuracy.loc[["learner_forest", "learner_linear_svm"]] - accuracy.loc["gpca_paper"]
     assert behind["coffee_cup"].abs().max() < 1
     farther = behind[["linemod", "ycb"]]
@@ -36,7 +34,7 @@ def test_what_was_found_of_shift_stands_in_the_reference():
     claims = pd.read_csv(REFERENCE / "claims.csv")
     verdicts = claims[claims["claim"] == "gpc_tracks_shift"].groupby("other")["verdict"].value_counts()
     forest, svm = verdicts["learner_forest"], verdicts["learner_linear_svm"]
-    found = page()
+    found = unwrapped(PAGE)
     assert "supported" not in forest and f"{forest['refuted']} of {forest.sum()} comparisons refute" in found
     assert f"{svm['supported']} of {svm.sum()} support" in found
     for quantity in ("rho_severity", "rho_source"):
@@ -46,4 +44,4 @@ def test_what_was_found_of_shift_stands_in_the_reference():
 def test_what_was_found_of_unseen_objects_and_sources_stands_in_the_reference():
     objects, sources = (of(f"accuracy_{name}", "table5_shift") for name in ("objects", "source"))
     fallen = pd.concat([objects[["linemod", "ycb"]], sources])
-    assert f"accuracy falls to {fallen.min(axis=None):.0f} to {fallen.max(axis=None):.0f} %" in page()
+    assert f"accuracy falls to {fallen.min(axis=None):.0f} to {fallen.max(axis=None):.0f} %" in unwrapped(PAGE)
