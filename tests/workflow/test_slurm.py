@@ -1,6 +1,7 @@
-"""A small part of the smoke run through the profile of SLURM, with a cluster of one node on this machine.
+"""The smoke run through the profile of SLURM, with a cluster of one node on this machine: a part of it, and the whole.
 
-It needs Debian's packages slurm-wlm and munge, root, and the executor plugin; without one of them it is skipped.
+Both need Debian's packages slurm-wlm and munge, root, and the executor plugin; without one of them they are skipped.
+The whole run has to be asked for as well: `GPCA_WHOLE_SLURM=1 make test PYTEST_ARGS=tests/workflow/test_slurm.py`.
 """
 
 import os
@@ -106,19 +107,35 @@ def said(*command):
     return subprocess.run(command, capture_output=True, text=True).stdout
 
 
-def test_the_queue_sees_compute_alone_and_groups_of_jobs_as_one(cluster, project):
-    wanted = ["figures/objects_ycb.png", *(f"predictions/ycb/{name}/seed0.csv" for name in ("gpca", "gpca_paper"))]
-    # This cluster keeps no accounts, so the states come from the queue; and its jobs take seconds.
-    here = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2")
-    project.snakemake(
-        *(f"results/smoke/{name}" for name in wanted),
-        *("--profile", "workflow/profiles/slurm", "--configfile", "config/smoke.yaml"),
-        *("--latency-wait", "5", "--seconds-between-status-checks", "2", *here),
-    )
-    assert [name for name in wanted if not (project.folder / f"results/smoke/{name}").is_file()] == []
+# This cluster keeps no accounts, so the states come from the queue; and its jobs take seconds.
+HERE = (
+    *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2"),
+    *("--latency-wait", "5", "--seconds-between-status-checks", "2"),
+)
+
+
+def submit(project, *targets):
+    """Run the targets of the smoke run through the queue; return the names of the jobs that it completed."""
+    project.snakemake(*targets, "--profile", "workflow/profiles/slurm", "--configfile", "config/smoke.yaml", *HERE)
     jobs = [line.split("|") for line in said("squeue", "--states=all", "--noheader", "--format=%k|%T").splitlines()]
     assert {state for _, state in jobs} == {"COMPLETED"}
+    return [name for name, _ in jobs]
+
+
+def test_the_queue_sees_compute_alone_and_groups_of_jobs_as_one(cluster, project):
+    wanted = ["figures/objects_ycb.png", *(f"predictions/ycb/{name}/seed0.csv" for name in ("gpca", "gpca_paper"))]
+    jobs = submit(project, *(f"results/smoke/{name}" for name in wanted))
+    assert [name for name in wanted if not (project.folder / f"results/smoke/{name}").is_file()] == []
     # A training with its embedding is one job of the queue, as are the explainers (of two seeds); the figure is none.
     names = ("sample_objects", "register", "encoder", "attribute")
     expected = {"sample_objects": 1, "register": 2, "encoder": 2, "attribute": 1}
-    assert Counter(re.match(f"rule_({'|'.join(names)})", name)[1] for name, _ in jobs) == expected
+    assert Counter(re.match(f"rule_({'|'.join(names)})", name)[1] for name in jobs) == expected
+
+
+@pytest.mark.skipif("GPCA_WHOLE_SLURM" not in os.environ, reason="long: set GPCA_WHOLE_SLURM=1")
+def test_the_whole_run_through_the_queue_has_the_bytes_of_a_local_one(cluster, smoke, project):
+    jobs = submit(project, "all")
+    assert len(jobs) > 80  # of 211 of the workflow: groups are one, and tables and figures are none
+    through_queue, local = project.results(".npz", ".pt", ".csv"), smoke.results(".npz", ".pt", ".csv")
+    assert through_queue.keys() == local.keys()
+    assert [name for name in local if local[name] != through_queue[name]] == []
