@@ -91,7 +91,7 @@ def _seeds(*given: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataF
 def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     found = {STATE: _state_accuracy(samples, weights_B_N), **measure(samples, weights_B_N)}
     found[SAMPLES] = np.full(len(weights_B_N), float(len(samples)))  # also where nothing else can be measured
-    return {metric: value_B for metric, value_B in found.items() if np.isfinite(value_B[0])}
+    return found
 
 
 def _state_accuracy(samples: Judged, weights_B_N: np.ndarray) -> np.ndarray:

@@ -78,7 +78,10 @@ def rows_of(
     """
     any_samples = next(iter(samples_of.values()))
     weights_B_N = np.vstack([np.ones(len(any_samples)), drawn_B_N])
-    values = {explainer: measured(samples, weights_B_N) for explainer, samples in samples_of.items()}
+    values = {
+        explainer: {metric: found for metric, found in measured(samples, weights_B_N).items() if np.isfinite(found[0])}
+        for explainer, samples in samples_of.items()
+    }
     seeds = len(set(any_samples.seed.tolist()))
     rows = []
     for metric in metrics:

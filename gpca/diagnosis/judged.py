@@ -112,11 +112,10 @@ def ceiling_of(causes: Causes, seed: int) -> Judged:
     error_N = again.error[:, -1]
     shares_N_3 = np.maximum(again.phi, 0) + 1e-12
     shares_N_3 = shares_N_3 / shares_N_3.sum(axis=1, keepdims=True)
-    nominal_N = (again.state == NOMINAL).astype(float)
-    scores_N_4 = np.column_stack([nominal_N, (1 - nominal_N[:, None]) * shares_N_3])
     # A sample that lies between the limits this time is named by the nearer one.
-    middle = (again.nominal_limit + again.failed_limit) / 2
-    named_N = np.where(error_N < middle, NOMINAL, np.array(CONCEPTS)[again.phi.argmax(axis=1)])
+    is_nominal_N = error_N < (again.nominal_limit + again.failed_limit) / 2
+    scores_N_4 = np.column_stack([is_nominal_N.astype(float), ~is_nominal_N[:, None] * shares_N_3])
+    named_N = np.where(is_nominal_N, NOMINAL, np.array(CONCEPTS)[again.phi.argmax(axis=1)])
     return _judged(causes, seed, error_N, scores_N_4, named_N)
 
 

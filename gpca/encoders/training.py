@@ -116,6 +116,7 @@ def train_encoder(
         if _is_settled(curve, settings.patience):
             break
         model.train()
+        torch.manual_seed(seed_of(source, seed, "dropout", epoch))  # whether or not it is the first epoch of a process
         loss_sum = correct = 0.0
         order = generator(source, seed, "order", epoch).permutation(rows)
         for batch_rows in np.array_split(order, batches):
@@ -143,7 +144,7 @@ def train_encoder(
         if not np.isfinite(loss_sum):
             raise InputError(title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
         if len(held_out):
-            curve[-1] |= _validate(model, registrations, held_out, wanted_S, source, seed, settings)
+            curve[-1] |= _validate(model, registrations, held_out, wanted_S, source, seed, settings, draw)
             if curve[-1]["validation_loss"] == min(record["validation_loss"] for record in curve):
                 best.load_state_dict(model.state_dict())
         keep(checkpoint, identity, state, curve)
@@ -173,6 +174,7 @@ def _validate(
     source: str,
     seed: int,
     settings: EncoderSettings,
+    draw: Draw,
 ) -> dict[str, float]:
     """Return loss and accuracy on rows, of one draw from each cloud that is the same in every epoch.
 
@@ -182,7 +184,7 @@ def _validate(
     model.eval()
     parts = []
     for batch_rows in np.array_split(rows, -(-len(rows) // settings.batch_size)):
-        clouds = draw_points(
+        clouds = draw(
             registrations, batch_rows, settings.draw_points, source, seed, "validation", fewest=settings.fewest_points
         )
         parts.append(model(_on(next(model.parameters()).device, clouds)).cpu())

@@ -67,7 +67,7 @@ class Answers:
         return [self._answers[CaseKey(explainer, episode, actions[:n])] for n in range(len(actions) + 1)]
 
 
-def record_of(episode: Episode, taken: tuple[str, ...], actions: Sequence[str], budget: int = 1) -> dict:
+def record_of(episode: Episode, taken: tuple[str, ...], actions: Sequence[str], budget: int) -> dict:
     """Return a registration's row; its sample number, which names random numbers, tells episode and actions taken.
 
     Args:
@@ -79,9 +79,9 @@ def record_of(episode: Episode, taken: tuple[str, ...], actions: Sequence[str], 
     return episode.outcomes[taken].record | {"sample": base**budget * episode.number + code, "split": "test"}
 
 
-def starts_of(episodes: Sequence[Episode], actions: Sequence[str]) -> Registrations:
-    """Return the first registrations of episodes, with their causes."""
-    return as_registrations([record_of(episode, (), actions) for episode in episodes])[0]
+def starts_of(episodes: Sequence[Episode], actions: Sequence[str], budget: int) -> Registrations:
+    """Return the first registrations of episodes, with their causes, numbered as the policies' explainers see them."""
+    return as_registrations([record_of(episode, (), actions, budget) for episode in episodes])[0]
 
 
 def answers_of(said: Attribution) -> list[Answer]:

@@ -112,12 +112,14 @@ def learners_of(
     rehearsal: Rehearsal | None,
     judged: Sequence[Episode],
     explainers: LoopExplainers,
+    budget: int,
 ) -> dict[str, Callable[[], Learner]]:
     """Return what makes the learner of each of these policies that queues cases or learns from rehearsals.
 
     Args:
         rehearsal: its failures are what is queued; None where no policy learns.
         judged: other failures.
+        budget: how many actions a failure may take.
     """
     if rehearsal is None:
         return {}
@@ -128,7 +130,7 @@ def learners_of(
     for name, entry in entries.items():
         if not (entry.learns or entry.queues) or any(entry.learns and entries[other].learns for other in learners):
             continue  # policies of the same chances learn the same
-        starts = [starts_of(episodes, means.actions) for episodes in (queued, judged)]
+        starts = [starts_of(episodes, means.actions, budget) for episodes in (queued, judged)]
         if entry.queues:
             own, others = (explainers.attach[entry.explainer](registrations) for registrations in starts)
             fitted, treatments = explainers.fitted[entry.explainer], means.policy.treatments

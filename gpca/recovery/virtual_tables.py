@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.meshes import simplified
-from gpca.frames.situations import Shelf, Situations
+from gpca.frames.situations import REDRAWS, Shelf, Situations
 from gpca.objects.surface import Surface
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
 from gpca.progress import progress
-from gpca.recovery.cases import register_first
+from gpca.recovery.cases import FEWEST_POINTS, register_first
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 
 PARTS = ("train", "test", "rehearsals", "failures")
@@ -44,15 +45,21 @@ def register_situations(
 
     Args:
         situations: those of ``train`` and ``test``, which share no table.
+
+    Raises:
+        InputError: the camera sees too little of the objects.
     """
     records = []
     for split, count in (("train", train), ("test", calibration)):
         for number in progress(range(count), f"situations of split {split}"):
             cause = CONCEPTS[number % len(CONCEPTS)]
-            start, redraw = None, 0
-            while start is None:
+            for redraw in range(REDRAWS):
                 situation, _ = situations[split].draw(cause, cause, number, redraw)
                 start = register_first(situation, settings.cloud_points, settings.icp)
-                redraw += 1
+                if start is not None:
+                    break
+            else:
+                fault = f"{REDRAWS} views of its objects show fewer than {FEWEST_POINTS} points of them"
+                raise InputError("the virtual camera", fault, "give recovery.camera more pixels")
             records.append(start.record | {"sample": number, "split": split})
     return as_registrations(records)[0]

@@ -11,6 +11,7 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import Classifier, embed, train_encoder
 from gpca.explainers.analytical_features import analytical_features
 from gpca.objects.canonical import ObjectClouds
+from gpca.objects.views import instance_of
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.synthesis import make_registrations
 from gpca.seeds import generator
@@ -46,25 +47,30 @@ def make_sets(
         h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
         parts[name] = replace(parts[name], attached={"embedding": h_S_d})
     measured = [_measured(parts, source, seed, settings)]
-    held_out = held_out_objects(registrations.object_name, settings.held_out_share, source, seed)
+    held_out = held_out_objects(_instances(registrations), settings.held_out_share, source, seed)
     if len(held_out):
         parts = _of_unseen_objects(registrations, held_out, source, seed, settings)
         measured.append(_measured(parts, source, seed, settings))
     return ShiftedSets.join(measured)
 
 
-def held_out_objects(names: np.ndarray, share: float, source: str, seed: int) -> np.ndarray:
+def held_out_objects(instances: np.ndarray, share: float, source: str, seed: int) -> np.ndarray:
     """Return the objects to be held out: a share of them, rounded, at least one; none where there is only one."""
-    names = np.unique(names)
-    count = min(max(1, round(share * len(names))), len(names) - 1)
-    return np.sort(generator(source, seed, "held-out objects").permutation(names)[:count])
+    instances = np.unique(instances)
+    count = min(max(1, round(share * len(instances))), len(instances) - 1)
+    return np.sort(generator(source, seed, "held-out objects").permutation(instances)[:count])
+
+
+def _instances(registrations: Registrations) -> np.ndarray:
+    """Return the object of each sample, of which several views may have names of their own."""
+    return np.array([instance_of(name) for name in registrations.object_name.tolist()])
 
 
 def _of_unseen_objects(
     registrations: Registrations, held_out: np.ndarray, source: str, seed: int, settings: ShiftSettings
 ) -> dict[str, Registrations]:
     """Train an encoder that never sees some objects; return what it saw with its kind, and what it never saw."""
-    held_out_S = np.isin(registrations.object_name, held_out)
+    held_out_S = np.isin(_instances(registrations), held_out)
     is_train_S = registrations.split == "train"
     train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
     seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))

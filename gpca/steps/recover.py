@@ -81,7 +81,7 @@ def run(options: Namespace) -> None:
         rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes).run(recovery["policies"])
         judged = [episode for episode in episodes if episode.failed]
         solved = [{name: is_right(e.take((name,), actions, loop)) for name in actions} for e in judged]
-        learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers)
+        learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers, loop.budget)
         write_csv(options.queue, error_by_labels(learners, solved, rehearsal, axes))
         write_csv(options.out, rows)
         write_csv(options.timings, seconds)

@@ -4,7 +4,7 @@ import pytest
 from gpca.attribution.metrics import write_metrics
 from gpca.diagnosis import intervals
 from gpca.diagnosis.intervals import collect, read_intervals
-from gpca.diagnosis.judged import CEILING
+from gpca.diagnosis.judged import CEILING, Judged
 from gpca.errors import InputError
 
 from .conftest import random_judged
@@ -35,3 +35,11 @@ def test_a_run_is_collected_written_and_read(causes, tmp_path):
     (tmp_path / "intervals.csv").write_text((tmp_path / "intervals.csv").read_text().replace(",1.0,", ",one,", 1))
     with pytest.raises(InputError, match="contains values that are not finite numbers"):
         read_intervals(tmp_path / "intervals.csv")
+
+
+def test_a_label_that_no_sample_has_leaves_measures_out_and_the_rest_readable(tmp_path):
+    judged = random_judged(60)
+    kept = Judged(**{name: array[judged.label != "noise"] for name, array in vars(judged).items()})
+    rows = intervals._of_source("tiny", {"one": kept, "other": kept})
+    assert "auroc_failed" in {row[2] for row in rows}
+    assert np.isfinite([row[5] for row in rows]).all()

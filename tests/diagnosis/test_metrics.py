@@ -1,8 +1,8 @@
 import pytest
 
 from gpca.causes.labels import LABELS, labels_of
-from gpca.causes.truth import BORDERLINE
-from gpca.diagnosis.judged import CEILING, POOLED, read_judged
+from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.diagnosis.judged import CEILING, POOLED, ceiling_of, read_judged
 from gpca.diagnosis.metrics import collect
 from gpca.errors import InputError
 
@@ -25,6 +25,13 @@ def test_who_is_right_has_full_marks_and_who_says_the_same_has_those_of_chance(c
     assert set(present) <= set(LABELS)
     assert values(rows, method="always_pose", metric="balanced_accuracy") == [1 / len(LABELS)]
     assert values(rows, method=CEILING, metric="auroc_failed")[0] > 0.8
+
+
+def test_what_the_ceiling_names_nominal_has_its_score_of_it(causes):
+    ceiling = ceiling_of(causes.subset(causes.rows("test")), seed=0)
+    assert ((ceiling.named == NOMINAL) == (ceiling.nominal == 1)).all()
+    assert (ceiling.nominal[ceiling.named != NOMINAL] == 0).all()
+    assert ceiling.nominal + ceiling.scores.sum(axis=1) == pytest.approx(1)
 
 
 def test_the_confusion_counts_every_sample_that_has_a_label(causes, tmp_path):

@@ -74,10 +74,14 @@ def test_test_samples_are_not_trained_on(registrations, unbroken):
     assert same_weights(train(registrations.subset(registrations.rows("train")))[0], unbroken[0])
 
 
-def test_an_interrupted_training_ends_with_the_same_weights(tmp_path, registrations, unbroken, epochs_run):
+@pytest.mark.parametrize("head", ["linear", "two_layer"])
+def test_an_interrupted_training_ends_with_the_same_weights(tmp_path, registrations, epochs_run, head):
+    settings = dataclasses.replace(SETTINGS, head=head)
+    unbroken = train(registrations, settings=settings)
     checkpoint = tmp_path / "seed0.checkpoint"
-    interrupted(registrations, checkpoint, after=2)
-    encoder, curve = train(registrations, checkpoint)
+    interrupted(registrations, checkpoint, after=2, settings=settings)
+    epochs_run.clear()
+    encoder, curve = train(registrations, checkpoint, settings=settings)
     assert epochs_run == [3, 4, 5, 6]
     assert same_weights(encoder, unbroken[0])
     assert curve == unbroken[1]

@@ -1,4 +1,8 @@
+import pytest
+
+from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery import virtual_tables
 from gpca.recovery.virtual_tables import register_situations
 
 from .conftest import LOOP
@@ -8,3 +12,9 @@ def test_the_classifier_learns_from_all_causes(situations):
     registrations = register_situations(situations, 6, 3, LOOP)
     assert registrations.concept.tolist() == list(CONCEPTS) * 3
     assert registrations.split.tolist() == ["train"] * 6 + ["test"] * 3
+
+
+def test_a_camera_that_sees_too_little_is_a_fault(situations, monkeypatch):
+    monkeypatch.setattr(virtual_tables, "register_first", lambda *_: None)
+    with pytest.raises(InputError, match=r"40 views .* fewer than 64 points of them; give recovery.camera more pixels"):
+        register_situations(situations, 1, 0, LOOP)

@@ -95,3 +95,13 @@ def test_of_a_single_object_none_is_held_out_and_those_sets_are_left_out(objects
     alone = replace(registrations, object_name=np.full(len(registrations), "cup"))
     sets = make_sets(objects, alone, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
     assert set(sets.set) == {"in_distribution", "severity"}
+
+
+def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
+    model, registrations = embedded
+    views = {name: f"mug_{i // 2}_1_{i}" for i, name in enumerate(np.unique(registrations.object_name).tolist())}
+    viewed = replace(registrations, object_name=np.array([views[name] for name in registrations.object_name.tolist()]))
+    sets = make_sets(objects, viewed, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    seen, unseen = ({name[:5] for name in sets.object_name[sets.set == part]} for part in ("seen_objects", "objects"))
+    assert unseen
+    assert not seen & unseen

@@ -23,6 +23,7 @@ from gpca.uncertainty.estimators.interface import EstimatorEntry as Entry
 
 FEWEST_EXAMPLES = 8
 FLOOR = 1e-8  # squared radians and diameters, of a training variance
+LEAST_SINGULAR = 1e-6  # of the largest: what is below is rounding
 
 
 def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, learning_rate: float = 0.05) -> Estimator:
@@ -70,17 +71,22 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
 
 
 class Reduction:
-    """Descriptors, standardised and limited, onto their first principal components."""
+    """Descriptors, standardised and limited, onto their first principal components.
+
+    There are at most one fewer than training pairs: along any other axis these do not differ, and another pair would
+    lie infinitely far away.
+    """
 
     def __init__(self, descriptors: Sequence[np.ndarray], components: int) -> None:
         stacked_E_F = np.array(descriptors)
         self._mean_F, deviation_F = stacked_E_F.mean(axis=0), stacked_E_F.std(axis=0)
         self._deviation_F = np.where(deviation_F > 1e-9, deviation_F, np.inf)  # what never changes says nothing
-        axes_F_F = np.linalg.svd(self._standard(stacked_E_F), full_matrices=False)[2]
+        _, singular_F, axes_F_F = np.linalg.svd(self._standard(stacked_E_F), full_matrices=False)
+        axes_F_F = axes_F_F[singular_F > LEAST_SINGULAR * singular_F[0]]
         largest = np.abs(axes_F_F).argmax(axis=1)  # a component's sign is arbitrary
         signs = np.sign(axes_F_F[np.arange(len(axes_F_F)), largest])
         self._axes_K_F = (axes_F_F * signs[:, None])[:components]
-        self._size_K = np.maximum(np.einsum("ef,kf->ek", self._standard(stacked_E_F), self._axes_K_F).std(axis=0), 1e-9)
+        self._size_K = np.einsum("ef,kf->ek", self._standard(stacked_E_F), self._axes_K_F).std(axis=0)
 
     def __call__(self, descriptors_n_F: np.ndarray) -> np.ndarray:
         """Return the components (n, K), of unit deviation over the training pairs."""

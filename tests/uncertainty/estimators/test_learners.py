@@ -90,6 +90,15 @@ def test_what_never_changes_says_nothing():
     assert reduce(np.array([[2.0, 1.0, 9.0]])) == pytest.approx(reduce(np.array([[1.0, 1.0, 5.0]])))
 
 
+@pytest.mark.parametrize("examples", [6, 8])
+def test_of_fewer_examples_than_components_no_axis_is_kept_along_which_they_do_not_differ(examples):
+    random = np.random.default_rng(0)
+    reduce = cello.Reduction(random.normal(size=(examples, 20)), 16)
+    another = reduce(random.normal(size=(5, 20)))
+    assert another.shape[1] == examples - 1
+    assert np.abs(another).max() < 10
+
+
 def test_twists_go_to_the_axes_and_back():
     twist = np.arange(6.0)[None] / 50
     along = cello.twists_along_axes(twist, FRAME)
