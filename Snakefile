@@ -42,6 +42,13 @@ for topic in TOPICS.split():
     include: f"workflow/rules/{topic}.smk"
 
 
+onstart:
+    # For every job that has ended, this limit makes Snakemake look for work once more per second, for the whole run.
+    # What starts on one machine is limited by its cores.
+    if workflow.local_exec:
+        workflow.scheduler.job_rate_limiter = None
+
+
 rule all:
     default_target: True
     input:
