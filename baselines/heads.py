@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
+from typing import Annotated
 
 import numpy as np
 
@@ -20,8 +21,10 @@ from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
+from gpca.settings import Bounds
 
 BATCH_SIZE = 64
+DropoutRate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
 
 
 class Heads:
@@ -40,7 +43,7 @@ class Heads:
         self,
         *axes: object,
         heads: int = 1,
-        rate: float = 0.0,
+        rate: DropoutRate = 0.0,
         hidden: int = 128,
         steps: int = 300,
         learning_rate: float = 2e-3,
@@ -155,7 +158,7 @@ class Ensemble(HeadLearner):
 class Dropout(HeadLearner):
     """Monte-Carlo dropout: every pass is a draw, its mask shared by all samples, as one network is."""
 
-    def __init__(self, source: str, seed: int, rate: float = 0.5, passes: int = 100, **training) -> None:
+    def __init__(self, source: str, seed: int, rate: DropoutRate = 0.5, passes: int = 100, **training) -> None:
         super().__init__(source, seed, rate=rate, **training)
         self._rate = rate
         self._passes = passes

@@ -11,6 +11,7 @@ import math
 from baselines.residuals import FLOOR, Residuals
 from gpca.explainers.interface import ExplainerEntry
 from gpca.seeds import seed_of
+from gpca.settings import OpenShare
 
 # How a person reads the three features: name, unit, and how often the logarithm counts the quantity. The sixth root of
 # a covariance's determinant is a variance, and the root of this a deviation.
@@ -31,7 +32,7 @@ class ResidualRules(Residuals):
     """
 
     def __init__(
-        self, source: str, seed: int, depth: int = 3, smallest_leaf: float = 0.02, floor: float = FLOOR
+        self, source: str, seed: int, depth: int = 3, smallest_leaf: OpenShare = 0.02, floor: float = FLOOR
     ) -> None:
         from sklearn.tree import DecisionTreeClassifier
 

@@ -9,14 +9,10 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.errors import InputError
-
-if TYPE_CHECKING:
-    pass
 
 MOST_PIXELS = 2**26  # of an image; depth cameras have a tenth of that, and a few bytes may unpack to any number
 IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content, and runs programs for some

@@ -10,9 +10,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cache
-from inspect import signature
+from inspect import isclass, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from gpca.errors import InputError
 from gpca.structured_text import load_own_yaml
@@ -75,18 +75,30 @@ def require_arguments(subject: str, function: Callable, given: int, settings: Ma
         function: what takes them, after `given` other arguments.
 
     Raises:
-        InputError: an unknown setting, or one that is no number from 0 to `LARGEST` where the default is such a one.
+        InputError: an unknown setting; one that its type does not allow (`Bounds`, or a literal); or one that is no
+            number from 0 to `LARGEST` where the default is such a one.
     """
     try:
         bound = signature(function).bind(*[None] * given, **settings)
     except TypeError as fault:
         raise InputError(subject, str(fault), "correct its settings") from fault
+    function = getattr(function, "func", function)  # of a partial
+    hints = get_type_hints(function.__init__ if isclass(function) else function, include_extras=True)
     for name, value in settings.items():
-        default: Any = getattr(bound.signature.parameters.get(name), "default", None)
-        kind = {int: "integer", float: "number"}.get(type(default))
-        if kind and default >= 0:
-            schema = {"properties": {name: {"type": kind, "minimum": 0, "maximum": LARGEST[kind]}}}
-            require_valid({name: value}, schema, f"{subject}: setting")
+        if get_origin(hints.get(name)) is Literal and value not in (choices := get_args(hints[name])):
+            raise InputError(f"{subject}: setting {name}", f"must be one of {', '.join(choices)}, not {value!r}")
+        default = getattr(bound.signature.parameters.get(name), "default", None)
+        schema = {"properties": {name: _schema_of_argument(default, hints.get(name))}}
+        require_valid({name: value}, schema, f"{subject}: setting")
+
+
+def _schema_of_argument(default: Any, hint: Any) -> dict[str, Any]:
+    """Return what a function's argument may be, by its default and its type."""
+    kind = {int: "integer", float: "number"}.get(type(default))
+    schema = {"type": kind, "minimum": 0, "maximum": LARGEST[kind]} if kind and default >= 0 else {}
+    for bounds in getattr(hint, "__metadata__", ()):
+        schema |= bounds.keywords
+    return schema
 
 
 def require_valid(instance: dict, schema: dict, subject: str, complete: bool = True) -> None:

@@ -65,8 +65,8 @@ def area_under_curve(curve: pd.DataFrame) -> float:
 def stream_metrics(curve: pd.DataFrame) -> dict[str, float]:
     """Return the metrics of one stream.
 
-    Its delay counts the arrivals from the new concept's first sample to the row in which at least `RECOGNISED` of its
-    test samples are named right; never recognised, it is that to the end, a lower bound.
+    Its delay counts the arrivals from the first row with samples of the new concept to that in which at least
+    `RECOGNISED` of its test samples are named right; never recognised, it is that to the end, a lower bound.
     """
     hits = (curve["present"] == 1) & (curve["accuracy_new"] >= RECOGNISED)
     first = int(hits.argmax()) if hits.any() else len(curve) - 1

@@ -44,11 +44,6 @@ def augrc(confidence_S: np.ndarray, wrong_S: np.ndarray) -> float:
     return float(_cumulative_errors(confidence_S, wrong_S).mean() / len(wrong_S))
 
 
-def worst_aurc(error_rate: float) -> float:
-    """Return the largest area that an error rate e allows, in the limit of many samples: e (1 + ln 1/e)."""
-    return error_rate * (1 - np.log(error_rate)) if error_rate > 0 else 0.0
-
-
 def calibration_error(p_S_C: np.ndarray, target_S: np.ndarray, adaptive: bool = False) -> float:
     """Return the expected calibration error of the largest probability (ECE).
 

@@ -10,7 +10,7 @@ import numpy as np
 from gpca.causes.shapley import ALL, NONE, shapley_values
 from gpca.pairs.perturbation import CONCEPTS
 
-NOMINAL, BORDERLINE, FAILED = STATES = ("nominal", "borderline", "failed")
+NOMINAL, BORDERLINE, FAILED = ("nominal", "borderline", "failed")
 LARGEST_ERROR = 0.5  # diameters: a pose that is farther off is as wrong as one can be
 GEOMETRY = "geometry"  # the clean pair is off already: too little shape to hold the pose
 
@@ -46,11 +46,6 @@ class Truth:
     def phi(self) -> np.ndarray:
         """(S, 3) what each cause adds to the error; together v(all) − v(none)."""
         return shapley_values(self.error)
-
-    @cached_property
-    def phi_uncertainty(self) -> np.ndarray:
-        """(S, 3) what each cause adds to the uncertainty, nats: the paper's quantity."""
-        return shapley_values(self.uncertainty)
 
     @cached_property
     def state(self) -> np.ndarray:

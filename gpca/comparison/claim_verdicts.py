@@ -33,7 +33,6 @@ CLAIM_COLUMNS = (
     *("value", "low", "high", "n", "verdict", "claim_verdict", "note"),
 )
 LEVEL = 0.95
-_Interval = tuple[float, float]
 
 
 def judge(
@@ -98,7 +97,7 @@ def _row(claim: Claim, compared: Compared, results, objects, strict: float) -> t
         **{"source": places[0].sources[0], "table": places[0].table},
         **{"one": _named(compared.one, places), "other": _named(compared.other, places)},
     }
-    found = _difference(claim, compared, results)
+    found = _difference(claim, compared, results, strict)
     if found is None:
         return row | {"verdict": NOT_RUN}, NOT_RUN
     value, intervals, n, at_least, at_most = found
@@ -124,9 +123,8 @@ def _of_claim(verdicts: Sequence[str], strict: Sequence[str]) -> str:
     return SUPPORTED if set(judged) == {SUPPORTED} else INCONCLUSIVE
 
 
-def _difference(claim: Claim, compared: Compared, results):
-    """Return the difference, level -> its bounds, repeats, and whether it is a lower and an upper bound only."""
-    strict = 1 - (1 - LEVEL) / len(claim.compared)
+def _difference(claim: Claim, compared: Compared, results, strict: float):
+    """Return the difference, bounds at `LEVEL` and `strict`, repeats, and whether it is a lower and an upper bound."""
     files = {place.file for place in compared.counterparts}
     if not files <= set(results):
         return None

@@ -27,7 +27,8 @@ KINDS = (
     *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "delay", "calls", "parameters")),
     *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*")),
     *(("*recovery.csv", counted, "count") for counted in ("episodes", "tries", "acted_first", "actions")),
-    *(("tables/table5_*", pattern, "share") for pattern in ("*aurc", "augrc", "ece*", "brier")),
+    *(("tables/table5_*", pattern, "share") for pattern in ("*aurc", "augrc", "brier")),
+    *(("tables/*", pattern, "share") for pattern in ("ece*", "nominal_calibration")),
     ("tables/*", "*", "percent"),
     ("*", "*", "share"),
 )

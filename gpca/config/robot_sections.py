@@ -112,4 +112,4 @@ class Recovery:
     hidden: tuple[Hidden, Hidden]
     estimator: Annotated[Estimator, Keys(without=("rotation_deg", "translation"))]
     model_points: SurfacePoints
-    encoder: EncoderSettings
+    encoder: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]

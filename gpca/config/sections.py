@@ -65,7 +65,7 @@ class ActiveLearning(ActiveLearningSettings):
     target: PositiveShare
     rare_share: OpenShare | None = None
     rare_labels: Count = 1
-    without: EncoderSettings
+    without: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]
     stream: StreamSettings
     strategies: tuple[str, ...]
 

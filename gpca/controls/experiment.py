@@ -52,7 +52,7 @@ class Experiment:
         embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
         embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one,
             and by those that are trained otherwise, of the samples of unseen objects.
-        costs: what the explainers took, of the last run.
+        costs: what the explainers took under the paper's protocol.
     """
 
     source: str

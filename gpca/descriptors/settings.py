@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from gpca.settings import Bounds, Positive
+from gpca.uncertainty.settings import start_deviation
 
 
 @dataclass(frozen=True)
@@ -33,10 +34,6 @@ class DescriptorSettings:
     def twists(self, near_k_6: np.ndarray, far_k_6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the twists of the starts near by and farther off, of standard normal numbers (k, 6)."""
         return (
-            near_k_6 * _deviation_6(self.start_rotation_deg, self.start_translation),
-            far_k_6 * _deviation_6(self.restart_rotation_deg, self.restart_translation),
+            near_k_6 * start_deviation(self.start_rotation_deg, self.start_translation),
+            far_k_6 * start_deviation(self.restart_rotation_deg, self.restart_translation),
         )
-
-
-def _deviation_6(rotation_deg: float, translation: float) -> np.ndarray:
-    return np.repeat(np.array([np.deg2rad(rotation_deg), translation]) / np.sqrt(3), 3)

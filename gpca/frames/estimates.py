@@ -53,7 +53,7 @@ class Estimators:
 
 
 @dataclass
-class PoseErrors:
+class EstimatorErrors:
     """Errors that estimators made, by dataset and object id; objects without any get those of others.
 
     Attributes:

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, without_background
-from gpca.frames.estimates import Estimators, PoseErrors, error_of, read_pose_errors
+from gpca.frames.estimates import EstimatorErrors, Estimators, error_of, read_pose_errors
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
 from gpca.frames.instances import Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_usual_form
@@ -178,7 +178,7 @@ def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], see
     """Return what finds an initial pose: an estimator's where one spoke of the object, else the truth with an error."""
     estimators = {name: _estimators(dataset) for name, (dataset, _, _) in datasets.items()}
     said: dict[int, tuple[str, np.ndarray]] = {}
-    errors = PoseErrors({(found.name, number) for found, _, _, _ in seen for number in found.symmetric_ids()})
+    errors = EstimatorErrors({(found.name, number) for found, _, _, _ in seen for number in found.symmetric_ids()})
     for name, (dataset, _, models) in datasets.items():
         for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
             errors.add((name, number), T_error)

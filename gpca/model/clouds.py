@@ -11,7 +11,7 @@ from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points,
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
-from gpca.objects.canonical import estimate_normals
+from gpca.objects.canonical import normals_towards_camera
 
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 
@@ -68,7 +68,7 @@ class Clouds:
         seen = _thinned(source, cloud_points, "source", notes)
         source = frame.coordinates(transform(T_init, seen))
         _require_like_sizes(source, target)
-        normals = None if settings.method == "point_to_point" else estimate_normals(target)
+        normals = None if settings.method == "point_to_point" else normals_towards_camera(target)
         return cls(seen, T_init, frame, source, target, BatchedICP(target, settings, normals))
 
 

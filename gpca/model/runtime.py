@@ -10,7 +10,6 @@ import numpy as np
 
 from gpca.active_learning.rounds import Task, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings
-from gpca.alignment.rigid import inverse, transform
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.labelling_times import time_labelling
@@ -84,8 +83,7 @@ def measure(
 
 def _pair(registrations: Registrations, row: int) -> CloudPair:
     """Return source and target of a registration before ICP, in diameters."""
-    T_source_target = inverse(registrations.T_target_source("icp", row))
-    return transform(T_source_target, registrations.cloud(row).astype(float)), registrations.target(row).astype(float)
+    return registrations.source(row), registrations.target(row).astype(float)
 
 
 def _drawn(cloud: np.ndarray, random: np.random.Generator) -> np.ndarray:

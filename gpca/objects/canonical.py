@@ -136,11 +136,11 @@ def _sampled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple
 
 def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     order = rng.permutation(len(surface.vertices_m))
-    normals = estimate_normals(surface.vertices_m) if surface.normals is None else surface.normals
+    normals = normals_towards_camera(surface.vertices_m) if surface.normals is None else surface.normals
     return surface.vertices_m[order], normals[order]
 
 
-def estimate_normals(points_m: np.ndarray) -> np.ndarray:
+def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
     """Return unit normals (P, 3) by the nearest neighbours of points (P, 3), turned towards a camera at the origin."""
     o3d = require_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))

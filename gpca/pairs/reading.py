@@ -32,7 +32,8 @@ def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Reg
         return registrations
     if reading == "observed":
         rows = range(len(registrations))
-        clouds = [registrations.source(row).astype(np.float32) for row in rows]
+        starts = [transform(registrations.T_target_source("init", row), registrations.source(row)) for row in rows]
+        clouds = [start.astype(np.float32) for start in starts]
         seen: dict[str, Any] = ragged(clouds, [registrations.target(row) for row in rows])
         return replace(registrations, **seen, T_target_source_icp=registrations.T_target_source_init)
     if reading == "reversed":
@@ -49,8 +50,7 @@ def registered_backwards(registrations: Registrations, settings: ICPSettings) ->
     for row in range(len(registrations)):
         target = registrations.target(row).astype(np.float64)
         T_init = registrations.T_target_source("init", row)
-        T_source_aligned = inverse(registrations.T_target_source("icp", row))
-        observed = transform(T_source_aligned, registrations.cloud(row).astype(np.float64))
+        observed = registrations.source(row)
         normals = None if settings.method == "point_to_point" else estimate_normals(observed)
         found = ICP(observed, normals, settings).register(target, inverse(T_init))
         T_target_source = inverse(found.T_target_source)  # ICP's target was the source

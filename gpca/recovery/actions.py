@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from gpca.alignment.icp import clipped_cost
 from gpca.alignment.rigid import inverse, scale_translation
 from gpca.errors import require_known
 from gpca.frames.shots import Shot, agreement, fuse
@@ -96,8 +97,7 @@ def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: 
     T_world_object_n[0] = holding.T_world_object
     starts_n = np.array([scale_translation(inverse(T), 1 / d) for T in T_world_object_n])
     poses_n, fitness_n, rmse_n = icp.register(thinned_m / d, starts_n)
-    reach = LOOSER * settings.correspondence_distance
-    cost_n = fitness_n * rmse_n**2 + (1 - fitness_n) * reach**2
+    cost_n = clipped_cost(fitness_n, rmse_n, LOOSER * settings.correspondence_distance)
     return [inverse(scale_translation(poses_n[n], d)) for n in np.argsort(cost_n, kind="stable")[:JUDGED]]
 
 
@@ -151,7 +151,7 @@ def look_around(
 
 
 def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames: int = 10) -> Holding:
-    """Take several frames at every viewpoint and average them, and remove statistical outliers, from now on."""
+    """Take several frames at every viewpoint and take their median, and remove statistical outliers, from now on."""
     if holding.filtered:  # it was taken before, and its frames count too
         frames += holding.frames
     shots = tuple(robot.shoot(shot.T_world_camera, frames) for shot in holding.shots)

@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from gpca.settings import Bounds, PositiveShare
+from gpca.uncertainty.settings import start_deviation
 
 
 @dataclass(frozen=True)
@@ -56,5 +57,4 @@ class EstimatorPairSettings:
 
     def deviation_6(self) -> np.ndarray:
         """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
-        per_axis = np.array([np.deg2rad(self.start_rotation_deg), self.start_translation]) / np.sqrt(3)
-        return np.repeat(per_axis, 3)
+        return start_deviation(self.start_rotation_deg, self.start_translation)

@@ -14,6 +14,11 @@ from gpca.settings import Bounds
 FEWEST_STARTS = 13  # the 2·6 + 1 of an unscented estimate; a 6×6 covariance of 6 samples or fewer is singular
 
 
+def start_deviation(rotation_deg: float, translation: float) -> np.ndarray:
+    """Return the standard deviations (6,) of a start's twist per axis, from those of its rotation and translation."""
+    return np.repeat(np.array([np.deg2rad(rotation_deg), translation]) / np.sqrt(3), 3)
+
+
 @dataclass(frozen=True)
 class UncertaintySettings:
     """How the spread is measured.
@@ -42,5 +47,4 @@ class UncertaintySettings:
 
     def deviation_6(self) -> np.ndarray:
         """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
-        per_axis = np.array([np.deg2rad(self.start_rotation_deg), self.start_translation]) / np.sqrt(3)
-        return np.repeat(per_axis, 3)
+        return start_deviation(self.start_rotation_deg, self.start_translation)

@@ -35,7 +35,6 @@ def test_every_group_has_its_share(causes, split, states):
 
 def test_a_cause_that_was_not_applied_has_no_part(causes):
     assert (causes.truth.phi[~causes.applied] == 0).all()
-    assert (causes.truth.phi_uncertainty[~causes.applied] == 0).all()
 
 
 def test_training_and_testing_share_no_object(causes):

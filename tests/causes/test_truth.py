@@ -46,11 +46,6 @@ def test_a_cause_that_helps_has_a_negative_part():
     assert found.causes.tolist() == [[False, True, False]]
 
 
-def test_the_uncertainty_is_attributed_alike():
-    found = truth((0.0, 0.1), u=3.0)
-    assert found.phi_uncertainty.sum() == pytest.approx(3.0)
-
-
 def test_truths_are_joined_and_chosen_from():
     both = joined([truth((0.0, 0.1)), truth((0.0, 0.2), (0.0, 0.3))])
     assert both.error[:, -1].tolist() == [0.1, 0.2, 0.3]

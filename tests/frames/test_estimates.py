@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.frames.estimates import Estimators, PoseErrors, error_of, read_pose_errors
+from gpca.frames.estimates import EstimatorErrors, Estimators, error_of, read_pose_errors
 
 HEAD = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
 SEEN = {
@@ -35,7 +35,7 @@ def test_among_equal_objects_an_estimate_elsewhere_is_of_another_one():
 
 
 def test_errors_are_those_of_the_object_or_of_others_without_symmetry():
-    errors = PoseErrors(symmetric={("a", 2)})
+    errors = EstimatorErrors(symmetric={("a", 2)})
     for object_, x_m in ((("a", 1), 0.1), (("a", 2), 0.2), (("b", 1), 0.3)):
         errors.add(object_, pose(x_m))
     random = np.random.default_rng(0)
@@ -46,7 +46,7 @@ def test_errors_are_those_of_the_object_or_of_others_without_symmetry():
     assert drawn(("a", 2)) == {0.2}
     assert drawn(("b", 7)) == {0.1, 0.3}
     with pytest.raises(InputError, match="no estimator has a result for an object without symmetry"):
-        PoseErrors(symmetric=()).draw(("a", 1), random)
+        EstimatorErrors(symmetric=()).draw(("a", 1), random)
 
 
 def test_an_error_takes_the_true_pose_to_the_estimated_one():

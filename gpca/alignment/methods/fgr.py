@@ -14,13 +14,14 @@ from gpca.alignment.methods.interface import (
     as_array,
 )
 from gpca.environment import require_open3d
+from gpca.settings import Share
 
 
 def align(
     pair: Pair,
     feature_radius: float = RADIUS,
     inlier_distance: float = 0.05,
-    tuple_similarity: float = 0.95,
+    tuple_similarity: Share = 0.95,
     tuples: int = 1000,
     iterations: int = 64,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,

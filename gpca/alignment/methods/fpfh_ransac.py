@@ -13,15 +13,16 @@ from gpca.alignment.methods.interface import (
     as_array,
 )
 from gpca.environment import require_open3d
+from gpca.settings import Share
 
 
 def align(
     pair: Pair,
     feature_radius: float = RADIUS,
     inlier_distance: float = 0.05,
-    edge_similarity: float = 0.9,
+    edge_similarity: Share = 0.9,
     iterations: int = 20_000,
-    confidence: float = 0.999,
+    confidence: Share = 0.999,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
 ) -> Outcome:
     """Take the pose of three matches that agrees with most others.

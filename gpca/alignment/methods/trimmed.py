@@ -7,6 +7,7 @@ import numpy as np
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
 from gpca.alignment.methods.stages import Stages, run_stages
 from gpca.alignment.methods.variants import nearest
+from gpca.settings import Share
 
 LEAST_OVERLAP = 0.4  # the paper's; so far down the overlap is searched
 EXPONENT = 2.0  # the paper's λ: how much a larger overlap is worth
@@ -14,7 +15,7 @@ EXPONENT = 2.0  # the paper's λ: how much a larger overlap is worth
 
 def align(
     pair: Pair,
-    overlap: float = 0.0,
+    overlap: Share = 0.0,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:

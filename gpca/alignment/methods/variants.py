@@ -7,13 +7,14 @@ same side of the surface (:func:`gpca.alignment.normals.estimate_normals`).
 from __future__ import annotations
 
 from functools import partial
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
 from gpca.alignment.methods.stages import Matches, Metric, Stages, align_by_stages
 from gpca.seeds import generator
+from gpca.settings import Bounds, PositiveShare
 
 Sampling = Literal["all", "random", "normal_space"]
 Criterion = Literal["none", "distance", "normals", "trimming"]
@@ -27,10 +28,10 @@ def align(
     rejection: Criterion = "none",
     weighting: Weighting = "none",
     metric: Metric = "point_to_plane",
-    sampled: float = 0.5,
+    sampled: PositiveShare = 0.5,
     deviations: float = 2.5,
-    angle_deg: float = 45.0,
-    worst: float = 0.1,
+    angle_deg: Annotated[float, Bounds(minimum=0, maximum=180)] = 45.0,
+    worst: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)] = 0.1,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:

@@ -23,6 +23,10 @@ LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the pa
 
 def check_registrations(config: dict) -> None:
     """Check that settings agree with each other, and that the samples of one file can be held in memory."""
+    if (method := config["registrations"]["icp"]["method"]) != "point_to_point":
+        fault = f"is '{method}', but uncertainty and causes are measured by reruns of point-to-point ICP"
+        remedy = "use point_to_point; exchange.methods puts other methods beneath the explainers"
+        raise InputError("config key registrations.icp.method", fault, remedy)
     with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
     for key, causes in {"causes": {}, "model.causes": config["model"]["causes"]}.items():

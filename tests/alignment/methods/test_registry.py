@@ -173,6 +173,8 @@ def test_an_unknown_name_lists_the_known():
         ("gicp", {"max_iterations": 2.5}, "max_iterations: 2.5 is not of type 'integer'"),
         ("teaser", {"noise": float("nan")}, "noise: nan is not of type 'number'"),
         ("trimmed", {"overlap": -0.5}, "overlap: -0.5 is less than the minimum"),
+        ("trimmed", {"overlap": 5}, "overlap: 5 is greater than the maximum of 1"),
+        ("reject_worst", {"worst": 1}, "worst: 1 is greater than or equal to the maximum of 1"),
         ("huber", {"scale": "wide"}, "scale: 'wide' is not of type 'number'"),
         (
             "random_sampling",
