@@ -90,9 +90,9 @@ def test_the_readme_counts_the_verdicts_of_the_reference(shown):
     chances = chance(shown, TOLERANCES)
     of_all = chances.pop(ALL)
     told = (
-        f"{of_all.agree} numbers are reproduced or close; {of_all.expected:.1f} would be if our values were shuffled "
-        f"within their columns (p = {of_all.p:.2f}). The levels agree, but the order of the rows does not, except for "
-        "the kernels of Table IV."
+        f"{of_all.agree} numbers are reproduced or close; {of_all.expected:.1f} would be expected if our values were "
+        f"shuffled within their columns (p = {of_all.p:.2f}). The levels agree, but the order of the rows does not, "
+        "except for the kernels of Table IV."
     )
     assert told in words
     assert min(chances, key=lambda table: chances[table].p) == "IV"
