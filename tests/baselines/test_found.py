@@ -28,6 +28,6 @@ def test_what_was_found_of_shap_and_sensitivity_analysis_stands_in_the_reference
 
 def test_what_was_found_of_rivals_with_labels_stands_in_the_reference():
     found = unwrapped("docs/baselines.md")
-    assert f"a random forest reach GP-CA's accuracy**, {span('residuals_forest')}" in found
+    assert f"the spread of reruns reaches GP-CA's accuracy**, {span('residuals_forest')}" in found
     assert f"{span('analytical_gpc')} with it" in found
     assert f"{span('analytical_gpc_no_counts')} without" in found

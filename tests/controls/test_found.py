@@ -23,7 +23,7 @@ def test_what_the_readme_says_of_unseen_objects_stands_in_the_reference():
         f"falls from {gpca['paper']:.1f} to {gpca['unseen_objects']:.0f} %, and on other datasets to "
         f"{gpca['transfer']:.0f} %" in readme
     )
-    assert f"on the pair keeps {pair['unseen_objects']:.1f} and {pair['transfer']:.1f} %" in readme
+    assert f"the same classifier keeps {pair['unseen_objects']:.1f} and {pair['transfer']:.1f} %" in readme
 
 
 def test_what_is_said_of_density_and_of_doubt_stands_in_the_reference():
