@@ -25,7 +25,7 @@ KINDS = (
     ("tables/table12_*", "auroc_failed", "share"),
     *(("*", pattern, "nats") for pattern in ("*nll*", "*elbo*")),
     *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "delay", "calls", "parameters")),
-    *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*")),
+    *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*", "*_wrong")),
     *(("*recovery.csv", counted, "count") for counted in ("episodes", "tries", "acted_first", "actions")),
     *(("tables/table5_*", pattern, "share") for pattern in ("*aurc", "augrc", "brier")),
     *(("tables/*", pattern, "share") for pattern in ("ece*", "nominal_calibration")),

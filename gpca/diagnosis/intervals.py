@@ -11,7 +11,7 @@ import numpy as np
 from gpca.attribution.bootstrap import bounds, pigeonhole_weights
 from gpca.csv_file import numbers, read_csv
 from gpca.diagnosis.judged import CEILING, Judged, joined, read_judged
-from gpca.diagnosis.measures import MEASURES, SMALLER_IS_BETTER, measure
+from gpca.diagnosis.measures import MEASURES, SMALLER_IS_BETTER, counted, measure
 from gpca.diagnosis.metrics import with_pooled
 from gpca.seeds import generator
 
@@ -69,7 +69,7 @@ def rows_of(
     measured: Callable[[Judged, np.ndarray], dict[str, np.ndarray]],
     metrics: Iterable[str],
 ) -> list[tuple]:
-    """Return rows of `COLUMNS`, of those metrics that have a value.
+    """Return rows of `COLUMNS`, of those metrics that have a value; `samples` are those that the metric counts.
 
     Args:
         samples_of: explainer -> the same N samples beside what it said of them.
@@ -95,6 +95,6 @@ def rows_of(
             rival = next((name for name in ranked if name != explainer), "") if explainer != CEILING else ""
             apart = found[metric] - values[rival][metric] if rival else np.full(len(weights_B_N), np.nan)
             of_value, of_difference = bounds(found[metric][1:]), bounds(apart[1:])
-            own = (source, explainer, metric, len(any_samples), seeds)
+            own = (source, explainer, metric, counted(any_samples, metric), seeds)
             rows.append((*own, found[metric][0], *of_value, rival, apart[0], *of_difference))
     return rows

@@ -21,6 +21,7 @@ OF_CAUSES = (
     *("spearman_attribution", "cosine_attribution", "deletion_gain"),
 )
 MEASURES = (*OF_CAUSES[:2], *OF_ALARM, *OF_CAUSES[2:])
+OF_FAILED = ("dominant_accuracy", "spearman_attribution", "cosine_attribution", "deletion_gain")
 SMALLER_IS_BETTER = ("false_alarm_rate", "nominal_calibration")
 BINS = 10  # of the calibration error
 
@@ -48,6 +49,14 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     if samples.names_causes:
         measures |= _of_causes(samples, labelled_N, failed_N, weights_B_N)
     return measures
+
+
+def counted(samples: Judged, metric: str) -> int:
+    """Return how many samples a measure is taken over: those of a label, and of these the nominal or the failed."""
+    labelled_N, nominal_N = samples.label != BORDERLINE, samples.label == NOMINAL
+    if metric in OF_FAILED:
+        return int((labelled_N & ~nominal_N).sum())
+    return int((nominal_N if metric == "false_alarm_rate" else labelled_N).sum())
 
 
 def _of_causes(samples: Judged, labelled_N, failed_N, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

@@ -12,7 +12,7 @@ from gpca.recovery.policy import NOTHING, QUEUE
 
 WORDS = {  # what a reader is told of each branch
     NOTHING: "none",
-    "reinitialise": "reinitialise ICP with a broader search",
+    "reinitialize": "reinitialize ICP with a broader search",
     "new_view": "change the viewpoint",
     "denoise": "filter and check the sensor",
     QUEUE: "queue for labeling, so that the cause can be learned",

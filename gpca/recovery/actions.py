@@ -62,7 +62,7 @@ class Holding:
 Action = Callable[..., Holding]
 
 
-def reinitialise(holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64) -> Holding:
+def reinitialize(holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64) -> Holding:
     """Search all orientations by ICP with a larger reach, and start from the pose that explains the shots best.
 
     The results of least cost are judged, see :func:`best_start`.
@@ -177,7 +177,7 @@ def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None
     return replace(holding, T_world_object_init=known[int(np.argmax(shares))])
 
 
-ACTIONS: dict[str, Action] = {"reinitialise": reinitialise, "new_view": new_view, "denoise": denoise}
+ACTIONS: dict[str, Action] = {"reinitialize": reinitialize, "new_view": new_view, "denoise": denoise}
 
 
 def action_of(name: str, settings: Mapping[str, object]) -> Action:

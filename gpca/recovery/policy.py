@@ -1,7 +1,7 @@
 """What to do about an uncertain registration: from concept scores to one of four branches (paper Sec. V, Fig. 6).
 
 A case is queued for labeling where the classifier is uncertain about it or no concept dominates; else the dominant
-concept is treated: reinitialise ICP with a broader search (pose), change the viewpoint (overlap), filter and check the
+concept is treated: reinitialize ICP with a broader search (pose), change the viewpoint (overlap), filter and check the
 sensor (noise). After each action the scores are worked out anew, and after a few attempts that improved too little
 the case is queued as well.
 """
@@ -19,7 +19,7 @@ from gpca.settings import NotNegative, Share
 
 NOTHING = "nothing"  # the branch of a registration that is fine
 QUEUE = "queue"  # the branch that acts no more: a person labels the case, and the classifier learns it
-TREATMENTS = {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"}  # the paper maps them so
+TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}  # the paper maps them so
 
 
 @dataclass(frozen=True)

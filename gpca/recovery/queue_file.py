@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gpca.attribution.wilson import wilson_interval
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
-from gpca.recovery.metrics import wilson_interval
 
 if TYPE_CHECKING:
     import pandas as pd

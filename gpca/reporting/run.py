@@ -156,6 +156,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
             **config["new_concepts"],
             "seeds": new_concept_seeds(config),
             "test": config["registrations"]["test"],
+            "of_causes": config["causes"],
         },
         "frame_labels": {**learning, **config["frame_labels"], "train": frames["train"], "test": frames["test"]},
         "unreduced_methods": unreduced_methods(frames),

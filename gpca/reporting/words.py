@@ -19,11 +19,23 @@ BOP_NAMES = {  # what datasets of the BOP benchmark call their objects, from num
     "icbin": ("coffee cup", "juice carton"),
     "visp": ("toy cube", "dragon"),
 }
+BOP_TITLES = {
+    "lm": "LINEMOD",
+    "lmo": "LINEMOD-Occlusion",
+    "ycbv": "YCB-Video",
+    "icbin": "IC-BIN",
+    "visp": "ViSP",
+}
 
 
 def plural(count: int | str, noun: str) -> str:
     """Return e.g. ``1 seed``, ``5 seeds`` or ``2 to 3 seeds``."""
     return f"{count} {noun}" if str(count) == "1" else f"{count} {noun}s"
+
+
+def dataset_in_words(name: str) -> str:
+    """Return what a reader calls a dataset of depth frames: ``YCB-Video`` for ``ycbv``."""
+    return BOP_TITLES.get(name, in_words(name))
 
 
 def in_words(name: object) -> str:

@@ -33,6 +33,7 @@ from .conftest import SETTINGS
         ("tables/table11_severity.csv", "pose_low", "percent"),
         ("tables/table4_grid.csv", "ece", "share"),
         ("tables/table9_causes.csv", "nominal_calibration", "share"),
+        ("tables/table10_controls.csv", "paper_auroc_wrong", "count"),
         ("tables/table5_learners.csv", "ece", "share"),
         ("tables/table5_shift.csv", "ece_severity", "share"),
         ("tables/table5_learners.csv", "rho", "correlation"),

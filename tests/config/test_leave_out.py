@@ -39,7 +39,7 @@ def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
 def test_an_action_takes_its_own_policy_along():
     config = merged(load(), {"recovery": {"actions": {"new_view": False}, "treatments": {"overlap": "denoise"}}})
     recovery = without_false(config)["recovery"]
-    assert list(recovery["actions"]) == ["reinitialise", "denoise"]
+    assert list(recovery["actions"]) == ["reinitialize", "denoise"]
     assert "always_denoise" in recovery["policies"]
     assert "always_new_view" not in recovery["policies"]
 
@@ -90,7 +90,7 @@ def test_virtual_frames_stay_while_a_dataset_does():
         ("uncertainty.sobol", "uncertainty: no uncertainty 'sobol'; choose one of additive, "),
         ("active_learning.strategies.bold", "active_learning.strategies: no strategy 'bold'; choose one of random, "),
         ("recovery.policies.always_pray", "recovery.policies: no policy 'always_pray'; choose one of gpca, "),
-        ("recovery.actions.pray", "recovery.actions: no action 'pray'; choose one of reinitialise, "),
+        ("recovery.actions.pray", "recovery.actions: no action 'pray'; choose one of reinitialize, "),
     ],
 )
 def test_what_cannot_be_left_out_is_one_line_that_names_the_key(key, message):

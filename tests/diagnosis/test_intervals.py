@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.attribution.metrics import write_metrics
+from gpca.causes.truth import BORDERLINE
 from gpca.diagnosis import intervals
 from gpca.diagnosis.intervals import collect, read_intervals
 from gpca.diagnosis.judged import CEILING, Judged
@@ -21,6 +22,7 @@ def test_of_two_explainers_the_better_leads_by_what_the_other_lacks():
     assert 0 < record["difference_low"] < record["difference"] < record["difference_high"]
     assert rows["poor"][9] == pytest.approx(-record["difference"])
     assert rows[CEILING][8] == ""
+    assert record["samples"] == (good.label != BORDERLINE).sum() < len(good)
 
 
 def test_a_run_is_collected_written_and_read(causes, tmp_path):

@@ -7,7 +7,7 @@ from sklearn.metrics import average_precision_score, balanced_accuracy_score, ro
 
 from gpca.causes.labels import LABELS
 from gpca.causes.truth import BORDERLINE, NOMINAL
-from gpca.diagnosis.measures import MEASURES, OF_ALARM, RECALL, measure
+from gpca.diagnosis.measures import MEASURES, OF_ALARM, OF_FAILED, RECALL, counted, measure
 
 
 def one(samples, weights=None):
@@ -21,6 +21,16 @@ def weights(request, judged):
     if request.param:
         return np.random.default_rng(1).integers(0, 4, size=len(judged)).astype(float)
     return np.ones(len(judged))
+
+
+@pytest.mark.parametrize("metric", MEASURES)
+def test_a_measure_depends_on_as_many_samples_as_are_counted(judged, metric):
+    kinds = {"failed": ~np.isin(judged.label, [NOMINAL, BORDERLINE]), "nominal": judged.label == NOMINAL}
+    wanted = ["failed"] if metric in OF_FAILED else ["nominal"] if metric == "false_alarm_rate" else list(kinds)
+    assert counted(judged, metric) == sum(kinds[kind].sum() for kind in wanted)
+    if metric in OF_FAILED:  # the others need no sample: their weights may be anything
+        alone = np.where(kinds["failed"], 1.0, 0.0)
+        assert one(judged, alone)[metric] == pytest.approx(one(judged)[metric])
 
 
 def test_what_is_known_to_scikit_learn_agrees_with_it(judged, weights):

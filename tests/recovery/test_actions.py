@@ -15,7 +15,7 @@ ICP = LOOP.icp
 
 def test_a_broader_search_finds_what_explains_the_shots(start):
     situation, outcome = start
-    found = ACTIONS["reinitialise"](outcome.holding, RobotIn(situation), np.random.default_rng(0), starts=48)
+    found = ACTIONS["reinitialize"](outcome.holding, RobotIn(situation), np.random.default_rng(0), starts=48)
     assert register_held(situation, found, LOOP.cloud_points, ICP).error < outcome.error
     assert found.shots is outcome.holding.shots
 
@@ -60,7 +60,7 @@ def test_the_pose_that_explains_the_shots_is_started_from(start):
 
 @pytest.mark.parametrize(
     ("name", "given", "fault"),
-    [("pray", {}, "unknown; choose one of reinitialise"), ("denoise", {"framse": 3}, "unexpected keyword argument")],
+    [("pray", {}, "unknown; choose one of reinitialize"), ("denoise", {"framse": 3}, "unexpected keyword argument")],
 )
 def test_unknown_actions_and_settings_are_refused(name, given, fault):
     with pytest.raises(InputError, match=fault):

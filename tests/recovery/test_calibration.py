@@ -11,7 +11,7 @@ from gpca.recovery.rehearsal import Rehearsal
 
 SECTION = {
     "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},
-    "treatments": {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"},
+    "treatments": {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"},
     "loop": {"budget": 3},
 }
 

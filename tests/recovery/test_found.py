@@ -13,11 +13,11 @@ def test_what_was_found_stands_in_the_reference():
     one, two, three = (rows[f"recovered_within_{actions}"] for actions in (1, 2, 3))
     assert f"{tidy['n_test'].max()} failures" in found
     fixed = [policy for policy in rows.index if policy.startswith("always_")]
-    assert one[fixed].idxmax() == two[fixed].idxmax() == "always_reinitialise"
+    assert one[fixed].idxmax() == two[fixed].idxmax() == "always_reinitialize"
     assert (one["utility_acting"], two["utility_acting"]) > (one[fixed].max(), two[fixed].max())
     for policy, words in (
         ("utility_acting", "`utility` recovers {:.1f} % within one action and {:.1f} % within two"),
-        ("always_reinitialise", "the best fixed action, recovers {:.1f} and {:.1f} %"),
+        ("always_reinitialize", "the best fixed action, recovers {:.1f} and {:.1f} %"),
         ("oracle", "which treats the true cause, {:.1f} and {:.1f} %"),
     ):
         assert words.format(one[policy], two[policy]) in found

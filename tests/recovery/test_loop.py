@@ -55,7 +55,7 @@ def test_policies_share_what_an_action_gives_and_end_with_success_or_the_budget(
     firsts = rows[rows["step"] == 1].set_index("policy")
     for same in ("softmax_head", "always_new_view"):
         assert firsts.loc[same, "error_after"] == firsts.loc["gpca", "error_after"]
-    assert firsts.loc["oracle", "action"] == "reinitialise"
+    assert firsts.loc["oracle", "action"] == "reinitialize"
     for _, of_policy in rows.groupby("policy"):
         assert not of_policy["recovered"].iloc[:-1].any()
         assert of_policy["recovered"].iloc[-1] or len(of_policy) == LOOP.budget

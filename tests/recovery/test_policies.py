@@ -7,7 +7,7 @@ from gpca.recovery.policies import Case, Means, policy_entry
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.seeds import generator
 
-ACTIONS = ("reinitialise", "new_view", "denoise")
+ACTIONS = ("reinitialize", "new_view", "denoise")
 POLICY = RecoveryPolicy(Thresholds(uncertain=0.2, dominant=0.4))
 
 
@@ -31,7 +31,7 @@ def test_gpca_follows_the_scores_and_queues_what_is_uncertain_while_the_acting_o
 def test_after_an_action_the_fall_of_its_concept_counts():
     scores = [[0.1, 0.2, 0.7], [0.1, 0.25, 0.65]]
     stuck = case(actions=("new_view",), scores=scores, bald=[0.1, 0.1])
-    assert made("gpca")(stuck).action == "reinitialise"
+    assert made("gpca")(stuck).action == "reinitialize"
     fallen = case(actions=("new_view",), scores=[[0.1, 0.0, 0.9], [0.1, 0.25, 0.65]], bald=[0.1, 0.1])
     assert made("gpca")(fallen).action == "new_view"
 
@@ -76,7 +76,7 @@ def test_fixed_actions_and_the_oracle():
     assert made("always_denoise")(case()).action == "denoise"
     assert [made("oracle")(case(cause=cause)).action for cause in ("noise", "pose", "overlap")] == [
         "denoise",
-        "reinitialise",
+        "reinitialize",
         "new_view",
     ]
     assert made("oracle")(case()).action == NOTHING  # it is told that nothing is wrong

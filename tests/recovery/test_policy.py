@@ -13,7 +13,7 @@ def scores(**given):
 
 
 @pytest.mark.parametrize(
-    ("concept", "action"), [("noise", "denoise"), ("pose", "reinitialise"), ("overlap", "new_view")]
+    ("concept", "action"), [("noise", "denoise"), ("pose", "reinitialize"), ("overlap", "new_view")]
 )
 def test_the_dominant_concept_is_treated(concept, action):
     said = np.where(np.array(CONCEPTS) == concept, 0.6, 0.2)
@@ -33,7 +33,7 @@ def test_what_is_uncertain_or_has_no_dominant_concept_is_queued():
 def test_a_treatment_that_improved_too_little_is_followed_by_the_next_concept():
     said = scores(noise=0.1, pose=0.6, overlap=0.3)
     assert POLICY.decide(said, before=[Treated("pose", 0.05)]).action == "new_view"
-    assert POLICY.decide(said, before=[Treated("pose", 0.15)]).action == "reinitialise"
+    assert POLICY.decide(said, before=[Treated("pose", 0.15)]).action == "reinitialize"
     twice = [Treated("pose", 0.0), Treated("overlap", -0.2)]
     assert POLICY.decide(said, before=twice).action == "denoise"
 
@@ -46,9 +46,9 @@ def test_after_attempts_without_improvement_a_case_is_queued():
 
 
 def test_a_concept_that_nothing_treats_is_queued():
-    policy = RecoveryPolicy(treatments={"pose": "reinitialise"})
+    policy = RecoveryPolicy(treatments={"pose": "reinitialize"})
     assert policy.decide(scores(noise=0.8, pose=0.1, overlap=0.1)).action == QUEUE
-    assert policy.decide(scores(noise=0.1, pose=0.8, overlap=0.1)).action == "reinitialise"
+    assert policy.decide(scores(noise=0.1, pose=0.8, overlap=0.1)).action == "reinitialize"
 
 
 def test_the_chosen_uncertainty_is_exceeded_by_the_declared_share_at_most():
@@ -61,9 +61,9 @@ def test_the_chosen_uncertainty_is_exceeded_by_the_declared_share_at_most():
 def test_the_policy_of_a_config_chooses_only_what_is_not_declared():
     thresholds = {"uncertain": None, "queued_share": 0.25, "dominant": 0.4, "improvement": 0.1}
     bald_N = np.arange(8) / 8
-    chosen = RecoveryPolicy.of_settings(thresholds, {"pose": "reinitialise"}, 2, bald_N)
+    chosen = RecoveryPolicy.of_settings(thresholds, {"pose": "reinitialize"}, 2, bald_N)
     assert chosen.thresholds == Thresholds(0.625, 0.4, 0.1, 2)
-    assert chosen.treatments == {"pose": "reinitialise"}
+    assert chosen.treatments == {"pose": "reinitialize"}
     declared = RecoveryPolicy.of_settings(thresholds | {"uncertain": 0.2}, {}, 2, bald_N)
     assert declared.thresholds.uncertain == 0.2
 

@@ -75,6 +75,19 @@ def write_uncertainties(path, registrations):
 
 
 @pytest.fixture
+def figures(monkeypatch):
+    """Keep every figure that is drawn, in place of its PNG."""
+    from gpca.reporting.figures import style
+
+    kept = []
+    monkeypatch.setattr(style, "save_png", lambda figure, path: kept.append(figure))
+    yield kept
+    import matplotlib.pyplot as plt
+
+    plt.close("all")
+
+
+@pytest.fixture
 def written(monkeypatch):
     """Draw and return all words of the figure that was saved last, of its panels too."""
     from gpca.reporting.figures import style

@@ -8,10 +8,10 @@ import pytest
 
 from gpca.arrays import save_arrays
 from gpca.attribution.metrics import tidy
+from gpca.attribution.wilson import wilson_interval
 from gpca.errors import InputError
 from gpca.files import read_image
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.metrics import wilson_interval
 from gpca.reporting.figures.policy import draw_mitigation, read_policy
 from gpca.reporting.figures.queued_labels import draw_queued_labels
 from gpca.reporting.figures.recovery_example import draw_recovery_example
@@ -22,7 +22,7 @@ TITLE = "Tables, YCB"
 POLICIES = {"gpca": "GP-CA", "random": "Random action", "absent": "Absent"}
 POLICY = {
     "thresholds": {"uncertain": 0.25, "dominant": 0.4, "improvement": 0.1, "attempts": 3},
-    "treatments": {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"},
+    "treatments": {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"},
 }
 
 
@@ -69,6 +69,9 @@ def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
     text = table.markdown()
     assert "24 failures over 2 seeds: 8 by noise among 80 registrations" in text
     assert TITLE in text
+    assert "| GP-CA | **50.0 (31.4 to 68.6)** |" in text
+    for told in ("as if all failures were independent", "fixed by design", "a repaired pose is worth 1"):
+        assert told in text
     with pytest.raises(InputError, match="have no recovery"):
         table8_recovery(metrics, {}, TITLE, {"absent": "Absent"}, 3)
 
@@ -88,6 +91,12 @@ def test_rates_are_drawn(metrics, tmp_path):
         draw_recovery_rates(metrics, TITLE, {"absent": "Absent"}, 3, tmp_path / "c.pdf", tmp_path / "c.png")
 
 
+def test_rates_by_cause_say_of_how_many_failures_they_are(metrics, tmp_path, figures):
+    draw_recovery_rates(metrics, TITLE, POLICIES, 3, tmp_path / "a.pdf", tmp_path / "a.png")
+    _, by_cause = figures[0].axes
+    assert [text.get_text() for text in by_cause.get_legend().get_texts()] == [f"{c} ($n$ = 8)" for c in CONCEPTS]
+
+
 def test_the_mapping_is_drawn_from_the_thresholds(tmp_path):
     path = tmp_path / "policy.json"
     path.write_text(json.dumps(POLICY))
@@ -96,7 +105,8 @@ def test_the_mapping_is_drawn_from_the_thresholds(tmp_path):
     assert (drawn_twice(lambda *out: draw_mitigation(TITLE, path, *out), tmp_path) != first).any()
 
 
-def test_what_queued_cases_teach_is_drawn(tmp_path):
+@pytest.fixture
+def queues():
     rows = [
         (policy, order, labels, 24, 0.6 - share * labels, 0.3, 0.7)
         for policy in ("gpca", "random")
@@ -104,7 +114,20 @@ def test_what_queued_cases_teach_is_drawn(tmp_path):
         for labels in (0, 4, 8)
     ]
     columns = ["policy", "order", "labels", "failures", "error", "low", "high"]
-    queues = pd.DataFrame(rows, columns=columns)
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_both_orders_of_queued_cases_have_a_band_and_the_axis_ends_above_them(queues, tmp_path, figures):
+    draw_queued_labels(queues, TITLE, POLICIES, tmp_path / "a.pdf", tmp_path / "a.png")
+    [figure] = figures
+    assert [text.get_text() for text in figure.texts] == [f"{TITLE}: judged on 24 failures"]
+    assert len(figure.legends[0].get_texts()) == 2
+    for panel in figure.axes:
+        assert len(panel.collections) == 2
+        assert panel.get_ylim() == pytest.approx((0, 73.5))  # 70 is the largest bound
+
+
+def test_what_queued_cases_teach_is_drawn(queues, tmp_path):
     image = drawn_twice(lambda *out: draw_queued_labels(queues, TITLE, POLICIES, *out), tmp_path)
     flat = drawn_twice(lambda *out: draw_queued_labels(queues.assign(error=0.5), TITLE, POLICIES, *out), tmp_path)
     assert (image != flat).any()

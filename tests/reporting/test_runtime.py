@@ -6,7 +6,7 @@ import pytest
 from gpca.comparison.published import printed_seconds, read_published
 from gpca.errors import InputError
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
-from gpca.reporting.figures.runtime import _bars, draw_runtime
+from gpca.reporting.figures.runtime import ALL_STAGES, _stages, draw_runtime
 from gpca.reporting.tables.runtime import table7_runtime
 
 
@@ -51,12 +51,26 @@ def test_the_csv_holds_milliseconds_and_the_number_of_runs():
     assert records["retraining", "CPU", "published"][4:] == (10000.0, "", "", 1, 100, True)
 
 
-def test_the_bars_add_up_to_one_explanation(tmp_path):
-    paper, cpu, gpu = _bars(RUNTIME, NUMBERS).values()
-    assert sum(paper.values()) == pytest.approx(4225)
+def test_the_stages_add_up_to_one_explanation():
+    paper, cpu, gpu = _stages(RUNTIME, NUMBERS).values()
+    assert sum(stage.mean for stage in paper.values()) == pytest.approx(4225)
+    assert {stage.deviation for stage in paper.values()} == {0}
     assert list(cpu) == list(gpu) == list(OF_ONE_EXPLANATION)
-    assert sum(cpu.values()) == pytest.approx(1 + 3 + 4 + 5)
-    assert gpu == cpu | {"features": pytest.approx(0.1)}
+    assert sum(stage.mean for stage in cpu.values()) == pytest.approx(1 + 3 + 4 + 5)
+    assert gpu == cpu | {"features": pytest.approx((0.1, 0.5))}
+
+
+def test_all_times_are_on_one_scale_and_ours_have_their_spread(tmp_path, figures):
+    draw_runtime(RUNTIME, "Tiny", NUMBERS, tmp_path / "a.pdf", tmp_path / "a.png")
+    [panel] = figures[0].axes
+    assert panel.get_xscale() == "log"
+    assert [label.get_text() for label in panel.get_yticklabels()][-1] == ALL_STAGES
+    spans = [line.get_xdata() for line in panel.get_lines() if len(line.get_xdata()) == 2 and line.get_linewidth() == 1]
+    icp = next(span for span in spans if span[0] != span[1])
+    assert list(icp) == pytest.approx([0.5, 1.5])
+
+
+def test_the_figure_is_the_same_bytes_each_time(tmp_path):
     for name in ("a", "b"):
         draw_runtime(RUNTIME, "Tiny", NUMBERS, tmp_path / f"{name}.pdf", tmp_path / f"{name}.png")
     for suffix in ("pdf", "png"):
@@ -65,6 +79,6 @@ def test_the_bars_add_up_to_one_explanation(tmp_path):
 
 def test_what_was_not_measured_is_named():
     with pytest.raises(InputError, match="has no row of 'scores'"):
-        _bars(RUNTIME[RUNTIME["component"] != "scores"], NUMBERS)
+        _stages(RUNTIME[RUNTIME["component"] != "scores"], NUMBERS)
     with pytest.raises(InputError, match="has no rows"):
         table7_runtime(RUNTIME[:0], "Tiny", NUMBERS)

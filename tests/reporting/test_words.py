@@ -1,6 +1,6 @@
 import pytest
 
-from gpca.reporting.words import in_words, object_in_words, object_of_frames, plural
+from gpca.reporting.words import dataset_in_words, in_words, object_in_words, object_of_frames, plural
 
 
 @pytest.mark.parametrize(
@@ -8,6 +8,11 @@ from gpca.reporting.words import in_words, object_in_words, object_of_frames, pl
 )
 def test_only_one_has_no_s(count, words):
     assert plural(count, "seed") == words
+
+
+@pytest.mark.parametrize(("name", "words"), [("lmo", "LINEMOD-Occlusion"), ("visp", "ViSP"), ("my_own", "my own")])
+def test_a_dataset_is_called_by_its_title(name, words):
+    assert dataset_in_words(name) == words
 
 
 def test_a_name_is_read_as_words():

@@ -12,7 +12,7 @@ from gpca.arrays import save_arrays
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {
     "thresholds": {"uncertain": None, "queued_share": 0.1, "dominant": 0.4, "improvement": 0.1},
-    "treatments": {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"},
+    "treatments": {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"},
     "loop": {"budget": 3},
 }
 LEARNING = {

@@ -23,7 +23,9 @@ from gpca.reporting.figures.style import (
     VERMILION,
     save_figure,
     use_style,
+    write_title,
 )
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,11 +40,11 @@ STYLES = {  # The paper's two strategies are thick, with their intervals; an unk
     "random_stratified": (BLACK, ":", 0.9),
     "bald": (BLUE, "--", 0.9),
     "bald_stochastic": (SKY_BLUE, "-", 0.9),
-    "entropy": (VERMILION, "-", 0.9),
+    "entropy": (VERMILION, "-.", 0.9),
     "margin": (ORANGE, "-", 0.9),
     "badge": (GREEN, "-", 0.9),
     "coreset": (PURPLE, "-", 0.9),
-    "typiclust": (PURPLE, "--", 0.9),
+    "typiclust": (GREEN, "--", 0.9),
 }
 _OTHER = (GREY, "-", 0.9)
 
@@ -100,6 +102,8 @@ def draw_panels(
 ) -> None:
     """Draw curves as lines of panels; rows share an axis of labels where they have as many of them.
 
+    The title says over how many seeds the means are.
+
     Args:
         curves: What :func:`mean_curves` makes of them, by source, row and line.
         sources, rows, lines: The title of each name, in order; those without curves are left out.
@@ -120,8 +124,9 @@ def draw_panels(
 
     longest = max(len(lines[line]) for line in across)
     beside = max(1, min(LEGEND_COLUMNS, LEGEND_LETTERS // (longest + LEGEND_LETTERS_OF_LINE)))
-    below = -(-len(across) // beside)
-    height_in = 0.22 + 0.2 * below + 1.5 * len(down)
+    below = -(-(len(across) + 1) // beside)
+    height_in = 0.42 + 0.2 * below + 1.5 * len(down)
+    aim = f"target ({100 * target:g} %)"
     alike = len({curves[key]["labels"].iloc[-1] for key in shown}) == 1
     figure, axes = plt.subplots(
         *(len(down), len(columns)),
@@ -133,7 +138,7 @@ def draw_panels(
     for row, name in enumerate(down):
         for column, source in enumerate(columns):
             panel = axes[row, column]
-            panel.axhline(100 * target, color=GREY, linewidth=0.6, linestyle=(0, (4, 3)))
+            panel.axhline(100 * target, color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
             for line in reversed(across):
                 if (source, name, line) in shown:
                     _draw(panel, styles.get(line, _OTHER), lines[line], curves[source, name, line])
@@ -144,16 +149,21 @@ def draw_panels(
                 panel.set_xlabel("labels")
         axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}")
     handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
-    ordered = [lines[line] for line in across]
+    ordered = [*(lines[line] for line in across), aim]
     figure.legend([handles[title] for title in ordered], ordered, ncol=beside, loc="lower center", columnspacing=1.4)
-    figure.tight_layout(rect=(0, 0.2 * below / height_in, 1, 1), pad=0.4, h_pad=0.8)
+    seeds = {count for key in shown for count in curves[key]["seeds"]}
+    span = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else str(max(seeds))
+    write_title(figure, f"Means over {plural(span, 'seed')}")
+    figure.tight_layout(rect=(0, 0.2 * below / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8)
     save_figure(figure, pdf_path, png_path)
 
 
 def mean_curves(
     curve_files: Iterable[str | Path], held_out: Collection[str] | None = None
 ) -> dict[tuple[str, str, str], pd.DataFrame]:
-    """Return labels, mean, low and high accuracy in % by source, strategy and setting; intervals are over the seeds.
+    """Return curves of accuracy in % by source, strategy and setting: labels, mean, low, high, number of seeds.
+
+    The intervals are over the seeds; of one seed they are NaN.
 
     Args:
         curve_files: As for :func:`draw_learning_curves`.
@@ -171,8 +181,11 @@ def mean_curves(
     means = {}
     for key, of_key in parts.items():
         of_seed = pd.concat(of_key).groupby(["labels", "seed"])["accuracy"].mean()
-        rows = [(labels, *(100 * np.array(mean_interval(part)))) for labels, part in of_seed.groupby(level="labels")]
-        means[key] = pd.DataFrame(rows, columns=["labels", "mean", "low", "high"])
+        rows = [
+            (labels, *(100 * np.array(mean_interval(part))), len(part))
+            for labels, part in of_seed.groupby(level="labels")
+        ]
+        means[key] = pd.DataFrame(rows, columns=["labels", "mean", "low", "high", "seeds"])
     return means
 
 

@@ -19,7 +19,7 @@ from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
-from gpca.reporting.figures.style import GREY, SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
+from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
 from gpca.reporting.words import object_in_words
 
 PANEL_IN = 1.02
@@ -27,7 +27,9 @@ HEAD_IN = 0.3
 CAPTION_IN = 0.17
 LEFT_IN = 4 * PANEL_IN
 NAMES_IN = 1.75
-TRUTH = "measured φ (share)"
+TRUTH = "measured share φ"
+ROW_IN = 0.19
+GAP = 0.5  # of a row, between what was measured and the scores, which are not shares
 
 
 def draw_causes_example(
@@ -67,7 +69,8 @@ def draw_causes_example(
     use_style()
     import matplotlib.pyplot as plt
 
-    height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), 0.35 + 0.19 * len(names))
+    rows_in = ROW_IN * (len(names) + GAP)
+    height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), 0.35 + rows_in)
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
     view = widest_views(shown.model)[0]
     everything = np.concatenate([shown.model @ view.T, *(cloud @ view.T for cloud in shown.observed)])
@@ -85,7 +88,6 @@ def draw_causes_example(
         words = "all three" if subset == ALL else words
         figure.text(*where, f"{words}: {error}", ha="center", va="top", fontsize=SMALL_PT)
     table_in = TEXT_WIDTH_IN - LEFT_IN - NAMES_IN - 0.1
-    rows_in = 0.19 * len(names)
     left = (LEFT_IN + NAMES_IN) / TEXT_WIDTH_IN
     bottom = (height_in - HEAD_IN - 0.2 - rows_in) / height_in
     panel = figure.add_axes((left, bottom, table_in / TEXT_WIDTH_IN, rows_in / height_in))
@@ -128,13 +130,20 @@ def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: M
 
 
 def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray) -> None:
-    panel.imshow(scores_R_4, cmap=blues(), vmin=0, vmax=1, aspect="auto")
+    """Draw the measured shares, and with a gap below them the scores; the largest of each row is bold."""
+    place_R = np.arange(len(names)) + GAP * (np.arange(len(names)) > 0)
+    sides = -0.5, len(LABELS) - 0.5
+    for rows in (slice(0, 1), slice(1, None)):
+        if len(place_R[rows]):
+            extent = (*sides, place_R[rows][-1] + 0.5, place_R[rows][0] - 0.5)
+            panel.imshow(scores_R_4[rows], cmap=blues(), vmin=0, vmax=1, aspect="auto", extent=extent)
+    panel.set(xlim=sides, ylim=(place_R[-1] + 0.5, -0.5))
     for (row, column), score in np.ndenumerate(scores_R_4):
         weight = "bold" if score == scores_R_4[row].max() else "normal"
         colour = "white" if score > 0.65 else "black"
         panel.text(
             column,
-            row,
+            place_R[row],
             f"{score:.2f}",
             ha="center",
             va="center_baseline",
@@ -142,7 +151,7 @@ def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray) -> None:
             color=colour,
             weight=weight,
         )
-    panel.axhline(0.5, color=GREY, linewidth=0.8)
-    panel.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
+    panel.spines[:].set_visible(False)
+    panel.set_yticks(place_R, names, fontsize=SMALL_PT)
     panel.set_xticks(range(len(LABELS)), LABELS, fontsize=SMALL_PT)
     panel.tick_params(length=0, pad=2, labeltop=True, labelbottom=False)

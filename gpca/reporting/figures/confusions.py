@@ -29,13 +29,15 @@ if TYPE_CHECKING:
 WIDEST_KEY = 3  # concepts fit into a line over the names of the explainers
 LABEL_IN = 1.45  # The explainers' titles are this wide.
 HEAD_IN = 0.62
-ROW_IN = 0.53
-PANEL_IN = 0.43
+CELL_IN = 0.145  # A row of a matrix is this high.
+MATRIX = 0.58  # The matrix takes this share of the room that it has with its bars.
+WIDE_IN = 0.19  # A cell that is this wide holds larger numbers.
 FOOT_IN = 0.04
 LEAST_SOURCE_IN = 1.4
 LARGEST_SOURCE_IN = 1.9
 LETTERS_IN = 0.14  # The letters left of a matrix take this.
 GAP_IN = 0.2  # This lies between matrix and bars, and after the bars.
+GAP_OF_ROWS_IN = 0.1
 
 
 def draw_confusions_figure(
@@ -48,7 +50,8 @@ def draw_confusions_figure(
     """Draw two panels for each explainer (rows) and source (columns), pooled over the seeds.
 
     The matrix is the share in % of each true concept that is taken for each concept; what is missing to 100 is
-    abstained. The bars are the predicted classes' shares of all test samples, with a dash at the true share.
+    abstained. The bars are the predicted classes' shares of all test samples, with a dash at the true share; abstained
+    samples have one where any explainer abstains.
 
     Args:
         metrics_csv: The file that :func:`gpca.attribution.metrics.collect` makes.
@@ -66,37 +69,47 @@ def draw_confusions_figure(
     use_style()
     import matplotlib.pyplot as plt
 
+    drawn = {(source, name): confusions[source, name] for source in columns for name in rows
+             if (source, name) in confusions}  # fmt: skip
+    concepts = len(next(iter(drawn.values())).columns) - 1
+    abstained = any(confusion[ABSTAINED].any() for confusion in drawn.values())
     source_in = float(np.clip((TEXT_WIDTH_IN - LABEL_IN) / len(columns), LEAST_SOURCE_IN, LARGEST_SOURCE_IN))
-    panel_in = (source_in - LETTERS_IN - 2 * GAP_IN) / 2
+    matrix_in = MATRIX * (source_in - LETTERS_IN - 2 * GAP_IN)
+    bars_in = matrix_in / MATRIX - matrix_in
+    numbers_pt = SMALL_PT + (matrix_in / concepts >= WIDE_IN)
+    panel_in = CELL_IN * concepts
+    row_in = panel_in + GAP_OF_ROWS_IN
     width_in = LABEL_IN + len(columns) * source_in
-    height_in = HEAD_IN + len(rows) * ROW_IN + FOOT_IN
+    height_in = HEAD_IN + len(rows) * row_in + FOOT_IN
     figure = plt.figure(figsize=(width_in, height_in))
 
     def text(x_in, y_in, words, **style):
         figure.text(x_in / width_in, 1 - y_in / height_in, words, **style)
 
-    def panel(left_in, top_in):
-        bounds = (left_in / width_in, 1 - (top_in + PANEL_IN) / height_in, panel_in / width_in, PANEL_IN / height_in)
-        return figure.add_axes(bounds)
+    def panel(left_in, top_in, of_width_in):
+        corner = (left_in / width_in, 1 - (top_in + panel_in) / height_in)
+        return figure.add_axes((*corner, of_width_in / width_in, panel_in / height_in))
 
     top = {source: next(name for name in rows if (source, name) in confusions) for source in columns}
     for number, explainer in enumerate(rows):
-        top_in = HEAD_IN + number * ROW_IN
+        top_in = HEAD_IN + number * row_in
         title = _wrapped(explainers[explainer], LABEL_IN, 7)
-        text(LABEL_IN - 0.04, top_in + PANEL_IN / 2, title, ha="right", va="center", fontsize=SMALL_PT, linespacing=1.1)
+        text(LABEL_IN - 0.04, top_in + panel_in / 2, title, ha="right", va="center", fontsize=SMALL_PT, linespacing=1.1)
         for place, source in enumerate(columns):
-            if (source, explainer) in confusions:
+            if (source, explainer) in drawn:
                 left_in = LABEL_IN + place * source_in + LETTERS_IN
-                confusion = confusions[source, explainer]
-                draw_matrix(panel(left_in, top_in), confusion, head=explainer == top[source])
-                draw_bars(panel(left_in + panel_in + GAP_IN, top_in), confusion, head=explainer == top[source])
+                confusion, head = drawn[source, explainer], explainer == top[source]
+                draw_matrix(panel(left_in, top_in, matrix_in), confusion, head, numbers_pt)
+                draw_bars(panel(left_in + matrix_in + GAP_IN, top_in, bars_in), confusion, head, abstained)
     for place, source in enumerate(columns):
         left_in = LABEL_IN + place * source_in + LETTERS_IN
         title = _wrapped(sources[source], source_in, 8)
-        text(left_in + panel_in + GAP_IN / 2, 0.03, title, ha="center", va="top", linespacing=1.1)
-        text(left_in + panel_in / 2, 0.42, "of each true (%)", ha="center", va="center", fontsize=SMALL_PT)
-        text(left_in + 1.5 * panel_in + GAP_IN, 0.42, "of all (%)", ha="center", va="center", fontsize=SMALL_PT)
-    text(0.04, 0.03, _key(next(iter(confusions.values()))), ha="left", va="top", fontsize=SMALL_PT)
+        middle_in = left_in + (matrix_in + GAP_IN + bars_in) / 2
+        text(middle_in, 0.03, title, ha="center", va="top", linespacing=1.1)
+        text(left_in + matrix_in / 2, 0.42, "of each true (%)", ha="center", va="center", fontsize=SMALL_PT)
+        of_bars_in = left_in + matrix_in + GAP_IN + bars_in / 2
+        text(of_bars_in, 0.42, "of all (%)", ha="center", va="center", fontsize=SMALL_PT)
+    text(0.04, 0.03, _key(next(iter(drawn.values())), abstained), ha="left", va="top", fontsize=SMALL_PT)
     save_figure(figure, pdf_path, png_path)
 
 
@@ -126,13 +139,14 @@ def _wrapped(title: str, width_in: float, size_pt: float) -> str:
     return "\n".join(textwrap.wrap(title, int(width_in / letter_in), break_on_hyphens=False))
 
 
-def _key(confusion: pd.DataFrame) -> str:
+def _key(confusion: pd.DataFrame, abstained: bool) -> str:
     concepts = list(confusion.columns[:-1])
     named = [f"{letter} {concept}" for letter, concept in zip(letters(concepts), concepts, strict=True)]
+    last = ["– abstained"] if abstained else []
     if len(named) > WIDEST_KEY:
-        names = f"{', '.join(named[:2])},\n{', '.join([*named[2:], '– abstained'])}"
+        names = f"{', '.join(named[:2])},\n{', '.join([*named[2:], *last])}"
     else:
-        names = f"{', '.join(named)}\n– abstained"
+        names = "\n".join([", ".join(named), *last])
     return f"{names}\nmatrix: true (rows), predicted\nbars: predicted (dash: true)"
 
 
@@ -143,14 +157,14 @@ def letters(concepts: list[str]) -> list[str]:
     return ["OK" if concept == NOMINAL else concept[:length].capitalize() for concept in concepts]
 
 
-def draw_matrix(axes, confusion: pd.DataFrame, head: bool) -> None:
+def draw_matrix(axes, confusion: pd.DataFrame, head: bool, numbers_pt: float = SMALL_PT) -> None:
     """Draw the rows' shares; a concept without samples has none. Predicted concepts are named only at the `head`."""
     concepts = list(confusion.columns[:-1])
     _, shares_C_C = counts_and_shares(confusion)
     axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues(), vmin=0, vmax=1, aspect="auto")
     for (row, column), share in np.ndenumerate(shares_C_C):
         if np.isfinite(share):
-            style = {"fontsize": SMALL_PT, "color": "white" if share > 0.65 else "black"}
+            style = {"fontsize": numbers_pt, "color": "white" if share > 0.65 else "black"}
             axes.text(column, row, f"{100 * share:.0f}", ha="center", va="center_baseline", **style)
     names = letters(concepts)
     axes.set_yticks(range(len(names)), names)
@@ -159,19 +173,23 @@ def draw_matrix(axes, confusion: pd.DataFrame, head: bool) -> None:
     axes.tick_params(length=0, pad=1.5, labelsize=SMALL_PT, labeltop=True, labelbottom=False)
 
 
-def draw_bars(axes, confusion: pd.DataFrame, head: bool) -> None:
-    """Draw the predicted classes' shares of all samples; a dash stands at the share that truly is of a concept."""
+def draw_bars(axes, confusion: pd.DataFrame, head: bool, abstained: bool = True) -> None:
+    """Draw the predicted classes' shares of all samples; a dash stands at the share that truly is of a concept.
+
+    What is abstained has a bar of its own, where such are shown.
+    """
     concepts = list(confusion.columns[:-1])
+    names = [*letters(concepts), "–"] if abstained else letters(concepts)
     total = confusion.to_numpy().sum()
-    shares = confusion.sum() / total
+    shares = confusion.sum().iloc[: len(names)] / total
     truth = confusion.sum(axis=1) / total
     of_abstained = LIGHT_GREY
-    colours = [*(CONCEPT_COLOURS.get(concept, GREY) for concept in concepts), of_abstained]
+    colours = [*(CONCEPT_COLOURS.get(concept, GREY) for concept in concepts), of_abstained][: len(names)]
     axes.bar(range(len(shares)), shares, color=colours, width=0.7)
     places = np.array([concepts.index(concept) for concept in truth.index])
     axes.hlines(truth, places - 0.45, places + 0.45, color="black", linewidth=0.6)
     axes.set(xlim=(-0.6, len(shares) - 0.4), ylim=(0, 1))
     axes.set_yticks([0, 0.5, 1], ["0", "50", "100"] if head else [])
-    axes.set_xticks(range(len(shares)), [*letters(concepts), "–"] if head else [])
+    axes.set_xticks(range(len(shares)), names if head else [])
     axes.tick_params(length=0, pad=1.5, labelsize=SMALL_PT, labeltop=True, labelbottom=False)
     axes.tick_params(axis="y", length=1.5, labelsize=SMALL_PT)

@@ -4,47 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.reporting.figures.estimator_ellipses import draw_ellipses, style_of
 from gpca.reporting.figures.style import (
     BLACK,
-    BLUE,
-    GREEN,
     GREY,
     LIGHT_GREY,
-    ORANGE,
-    PURPLE,
-    SKY_BLUE,
     SMALL_PT,
     TEXT_WIDTH_IN,
-    VERMILION,
     save_figure,
     use_style,
     write_title,
 )
-from gpca.trials.covariances import REFERENCE, ReferenceSamples, covariance_of
+from gpca.trials.covariances import REFERENCE, ReferenceSamples
 
 if TYPE_CHECKING:
     import pandas as pd
 
-STYLES = {  # An estimator has a colour and a line everywhere in the figure.
-    REFERENCE: (GREY, "-"),
-    "monte_carlo": (BLACK, "-"),
-    "censi": (VERMILION, "-"),
-    "bonnabel": (VERMILION, (0, (1, 1))),
-    "brossard": (BLUE, "-"),
-    "bayesian_icp": (ORANGE, "-"),
-    "stein_icp": (ORANGE, (0, (4, 1.5))),
-    "cello": (GREEN, "-"),
-    "learned": (PURPLE, "-"),
-}
-_OTHER = (SKY_BLUE, "-")
-TURN = np.linspace(0, 2 * np.pi, 181)
 LEVELS = np.linspace(0.01, 0.99, 99)
-PLANE = 95.0  # per cent that an ellipse holds
 FEWEST_SAMPLES = 20  # of the reference, that a registration shows
 
 
@@ -80,7 +61,7 @@ def draw_estimators(
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, 5.35))
-    panels = figure.add_gridspec(1, 4, left=0.065, right=0.995, top=0.875, bottom=0.63, wspace=0.42)
+    panels = figure.add_gridspec(1, 4, left=0.065, right=0.995, top=0.875, bottom=0.63, wspace=0.5)
     for column, (kind, place) in enumerate(shown.items()):
         for part, (block, unit, factor) in enumerate(
             (("rotation", "degrees", np.rad2deg(1.0)), ("translation", "% of the diameter", 100.0))
@@ -88,24 +69,33 @@ def draw_estimators(
             panel = figure.add_subplot(panels[0, 2 * column + part])
             said = {name: _said(of_shown[name], samples.sample[place]) for name in titles}
             axes = slice(0, 3) if block == "rotation" else slice(3, 6)
-            _draw_ellipses(panel, samples, place, said, axes, factor)
+            draw_ellipses(panel, samples, place, said, axes, factor)
             panel.set_title(f"{kind}: {block}", fontsize=8, pad=3)
-            panel.set_xlabel(unit, fontsize=SMALL_PT, labelpad=1)
+            panel.set_xlabel(f"first axis ({unit})", fontsize=SMALL_PT, labelpad=1)
+            panel.set_ylabel(f"second axis ({unit})", fontsize=SMALL_PT, labelpad=0)
     names = [name for name in titles if len(pooled[name])]
     told = [name for name in names if name != REFERENCE] or names
     of_scatter = figure.add_gridspec(2, 4, left=0.065, right=0.675, top=0.545, bottom=0.075, wspace=0.1, hspace=0.2)
     limits = _limits([pooled[name] for name in told])
     for i, name in enumerate([REFERENCE, *(name for name in told if name != REFERENCE)][:8]):
         panel = figure.add_subplot(of_scatter[i // 4, i % 4])
-        _draw_scatter(panel, pooled[name], titles[name], _style(name)[0], limits, i % 4 == 0, i >= 4)
+        _draw_scatter(panel, pooled[name], titles[name], style_of(name)[0], limits, i % 4 == 0, i >= 4)
+        if i == 0:
+            _write(panel, (0.04, 0.97), "too confident")
+            _write(panel, (0.97, 0.03), "too cautious")
     figure.text(0.37, 0.005, "predicted spread (% of the diameter)", ha="center", va="bottom", fontsize=SMALL_PT)
     figure.text(0.003, 0.31, "error (% of the diameter)", ha="left", va="center", rotation=90, fontsize=SMALL_PT)
     _draw_coverage(figure.add_axes((0.74, 0.075, 0.245, 0.47)), pooled, names)
-    handles = [plt.Line2D([], [], color=_style(n)[0], linestyle=_style(n)[1], label=titles[n]) for n in names]
-    handles.append(plt.Line2D([], [], color=BLACK, marker="*", linestyle="", label="true pose"))
+    handles = [plt.Line2D([], [], color=style_of(n)[0], linestyle=style_of(n)[1], label=titles[n]) for n in names]
+    signs: list[tuple[str, str, dict[str, Any]]] = [
+        ("the reference's results", ".", {"color": LIGHT_GREY}),
+        ("true pose", "*", {}),
+        ("succeeded", "o", {"markerfacecolor": "none", "markersize": 3}),
+        ("failed", "x", {"markersize": 3}),
+    ]
     handles += [
-        plt.Line2D([], [], color=BLACK, marker=marker, linestyle="", markerfacecolor="none", markersize=3, label=label)
-        for label, marker in (("succeeded", "o"), ("failed", "x"))
+        plt.Line2D([], [], **({"color": BLACK} | look), marker=marker, linestyle="", label=label)
+        for label, marker, look in signs
     ]
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.972), ncols=6, columnspacing=1.2)
     write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over the reference's results; below, all datasets")
@@ -117,13 +107,6 @@ def coverages(mahalanobis_S: np.ndarray) -> np.ndarray:
     from scipy.stats import chi2
 
     return (mahalanobis_S[:, None] <= chi2.ppf(LEVELS, 6)).mean(axis=0)
-
-
-def ellipse(covariance_2_2: np.ndarray) -> np.ndarray:
-    """Return the outline (n, 2) of what holds `PLANE` per cent of a Gaussian about zero."""
-    values_2, axes_2_2 = np.linalg.eigh(covariance_2_2)
-    radius = np.sqrt(-2 * np.log(1 - PLANE / 100))
-    return radius * np.column_stack([np.cos(TURN), np.sin(TURN)]) * np.sqrt(np.maximum(values_2, 0)) @ axes_2_2.T
 
 
 def _of_method(rows: Mapping, key: tuple, method: str, samples_npz: str | Path) -> pd.DataFrame:
@@ -163,26 +146,6 @@ def _said(rows: pd.DataFrame, sample: int) -> pd.Series | None:
     return None if told.empty else told.iloc[0]
 
 
-def _draw_ellipses(panel, samples: ReferenceSamples, place: int, said: Mapping, block: slice, factor: float) -> None:
-    """Draw one registration in the plane in which the reference's results spread most."""
-    twists_n_3 = factor * samples.twists_of(place)[:, block]
-    values_3, axes_3_3 = np.linalg.eigh(np.cov(twists_n_3, rowvar=False))
-    plane_3_2 = axes_3_3[:, ::-1][:, :2]
-    dots_n_2, true_2 = twists_n_3 @ plane_3_2, factor * samples.true_twist[place, block] @ plane_3_2
-    panel.scatter(*dots_n_2.T, s=1.2, color=LIGHT_GREY, linewidths=0, rasterized=True, zorder=1)
-    for name, row in said.items():
-        if row is None or name == REFERENCE:
-            continue
-        covariance_2_2 = factor**2 * plane_3_2.T @ covariance_of(row)[block, block] @ plane_3_2
-        colour, line = _style(name)
-        panel.plot(*ellipse(covariance_2_2).T, color=colour, linestyle=line, linewidth=0.9, zorder=3)
-    panel.plot(*true_2, marker="*", color=BLACK, markersize=7, markeredgecolor="white", markeredgewidth=0.5, zorder=4)
-    reach = 1.12 * max(np.quantile(np.abs(dots_n_2), 0.985), 2.6 * np.sqrt(max(values_3[-1], 0)), *np.abs(true_2))
-    panel.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    panel.locator_params(nbins=4)
-    panel.tick_params(pad=1.5, length=2)
-
-
 def _draw_scatter(panel, rows: pd.DataFrame, title: str, colour: str, limits, left: bool, below: bool) -> None:
     """Draw errors over predicted spreads; on the diagonal the prediction is right on average."""
     from matplotlib.ticker import FixedLocator, NullLocator
@@ -206,7 +169,7 @@ def _draw_scatter(panel, rows: pd.DataFrame, title: str, colour: str, limits, le
 def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:
     panel.plot([0, 100], [0, 100], color=GREY, linewidth=0.6)
     for name in names:
-        colour, line = _style(name)
+        colour, line = style_of(name)
         width = 1.8 if name == REFERENCE else 1.1
         shares = 100 * coverages(pooled[name]["mahalanobis"].to_numpy())
         panel.plot(100 * LEVELS, shares, color=colour, linestyle=line, linewidth=width)
@@ -215,6 +178,13 @@ def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:
     panel.set_ylabel("true poses within (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_title("Coverage", fontsize=8, pad=3)
     panel.tick_params(pad=1.5, length=2)
+    _write(panel, (0.04, 0.97), "too cautious")  # Curves lie in the other corner.
+
+
+def _write(panel, place: tuple[float, float], words: str) -> None:
+    """Say in a corner of a panel what it means to lie there."""
+    across, up = ("left", "top") if place[0] < 0.5 else ("right", "bottom")
+    panel.text(*place, words, transform=panel.transAxes, ha=across, va=up, fontsize=SMALL_PT, color=GREY)
 
 
 def _limits(tables: Sequence[pd.DataFrame]) -> tuple[float, float]:
@@ -222,7 +192,3 @@ def _limits(tables: Sequence[pd.DataFrame]) -> tuple[float, float]:
     both = np.concatenate([table[["spread", "add_relative"]].to_numpy().ravel() for table in tables])
     low, high = 100 * np.quantile(np.maximum(both, 1e-5), (0.0, 1.0))
     return 0.8 * low, 1.25 * high
-
-
-def _style(name: str) -> tuple:
-    return STYLES.get(name, _OTHER)

@@ -49,7 +49,7 @@ def draw_frame_reliability(
     for panel, method in zip(panels, shown, strict=True):
         confidence_N, hit_N = (np.concatenate(columns) for columns in zip(*parts[method], strict=True))
         gap = draw_reliability_panel(panel, confidence_N, hit_N, BINS)
-        panel.set_title(f"{methods[method]}\nECE {gap:.3f}", fontsize=SMALL_PT)
+        panel.set_title(f"{methods[method]}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
         panel.set_xlim(1 / 3 - 0.03, 1.02)
         panel.set_xticks([0.4, 0.6, 0.8, 1.0], ["0.4", "0.6", "0.8", "1"])
     handles, labels = panels[0].get_legend_handles_labels()

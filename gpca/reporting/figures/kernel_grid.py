@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 COLOURS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
 LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # The largest learning rate has the first.
+# Kernels whose curves coincide show beneath each other: the first drawn is the widest.
+WIDTHS = {"matern32": 2.2, "polynomial": 1.0, "rbf": 1.0}
 PRINTED_MARKERS = ("D", "v")  # of what the paper prints for the largest learning rate, and for a smaller one
 BESIDE = dict(zip(COLOURS, (1.15, 1.32, 1.52), strict=True))  # Equal printed numbers would hide one another.
 MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
@@ -60,10 +62,11 @@ def draw_kernel_curves(
         means = of_source.groupby(["kernel", "learning_rate", "iterations"])[list(MEASURES)].mean()
         for row, measure in enumerate(MEASURES):
             panel = axes[row, column]
-            for (kernel, rate), curve in means[measure].groupby(level=["kernel", "learning_rate"]):
+            by_kernel = means[measure].groupby(level=["kernel", "learning_rate"])
+            for (kernel, rate), curve in sorted(by_kernel, key=lambda item: list(WIDTHS).index(item[0][0])):
                 iterations = curve.index.get_level_values("iterations")
                 line = LINES[rates.index(rate) % len(LINES)]
-                panel.plot(iterations, 100 * curve, color=COLOURS[kernel], linestyle=line, linewidth=1.0)
+                panel.plot(iterations, 100 * curve, color=COLOURS[kernel], linestyle=line, linewidth=WIDTHS[kernel])
             for setting in PRINTED:
                 if setting in means.index:
                     marker = {"color": COLOURS[setting[0]], "markerfacecolor": "white", "markersize": 5}
@@ -85,7 +88,7 @@ def draw_kernel_curves(
     for row, label in enumerate(MEASURES.values()):
         axes[row, 0].set_ylabel(label)
     handles = [
-        Line2D([], [], color=COLOURS[kernel], label=TITLES[kernel])
+        Line2D([], [], color=COLOURS[kernel], linewidth=WIDTHS[kernel], label=TITLES[kernel])
         for kernel in COLOURS
         if (grid["kernel"] == kernel).any()
     ]

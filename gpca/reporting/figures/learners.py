@@ -40,14 +40,17 @@ SETS = {  # those whose ρ Table V has, alone and under shift
     with_training_like("objects"): "+ unseen objects",
 }
 Titles = Mapping[str, str]
-COVERAGES = np.linspace(0.02, 1, 99)
+COVERAGES = np.linspace(0.1, 1, 91)  # Of fewer samples, a single error would decide the share of errors.
 DISTANCE_BINS = 10  # of equally many samples
 
 
 def draw_coverage_risk(
     learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
 ) -> None:
-    """Draw the mean over the seeds of the risk, by the largest score, on the test samples like the training's."""
+    """Draw the mean over the seeds of the risk, by the largest score, on the test samples like the training's.
+
+    A panel in which no classifier errs says so.
+    """
     shown, columns = _known(learned, sources, learners)
     use_style()
     import matplotlib.pyplot as plt
@@ -67,6 +70,9 @@ def draw_coverage_risk(
         panel.set_title(sources[source])
         panel.set_xlabel("coverage (%)")
         panel.set_xlim(0, 100)
+        lines = panel.get_lines()
+        if lines and not any(line.get_ydata().any() for line in lines):
+            panel.text(0.5, 0.5, "no errors", transform=panel.transAxes, ha="center", va="center")
     axes[0, 0].set_ylim(bottom=0)
     axes[0, 0].set_ylabel("risk: errors among the covered (%)")
     _write_legend(figure, shown, learners)
@@ -89,7 +95,7 @@ def draw_reliability(
         confidence_S = np.concatenate([1 - rows["max_score"].to_numpy() for rows in parts])
         hit_S = np.concatenate([~wrong(rows) for rows in parts])
         gap = draw_reliability_panel(panel, confidence_S, hit_S, BINS)
-        panel.set_title(f"{learners[learner]}\nECE {gap:.3f}", fontsize=SMALL_PT)
+        panel.set_title(f"{learners[learner]}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
     handles, labels = panels[0].get_legend_handles_labels()
     title = ", ".join(sources[name] for name in columns)
     finish_panels(figure, panels, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
@@ -100,11 +106,12 @@ def draw_uncertainty_vs_distance(
 ) -> None:
     """Draw the mean of 1 - largest score over the distance to the training samples: sources as columns, sets as rows.
 
-    Above a panel stands ρ of the paper's learners, in their colours, as Table V has it: the mean over the seeds of the
-    rank correlation over all samples.
+    Above a panel stands ρ of the paper's learners by the letters of the legend, as Table V has it: the mean over the
+    seeds of the rank correlation over all samples.
     """
     shown, columns = _known(learned, sources, learners)
     parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
+    letters = dict(zip(_paper_first(shown), "abcdefgh", strict=False))
     down = [name for name in SETS if any(name in of_key for of_key in parts.values())]
     use_style()
     import matplotlib.pyplot as plt
@@ -123,7 +130,7 @@ def draw_uncertainty_vs_distance(
                     panel.plot(*distance_curve(of_set), **_look(learner))
                     rho_R = [rank_correlation(rows["max_score"], rows[DISTANCES[0]]) for rows in of_set]
                     correlations[learner] = float(np.mean(rho_R))
-            _write_correlations(panel, {key: correlations[key] for key in _paper_first(correlations)})
+            _write_correlations(panel, {letters[key]: correlations[key] for key in _paper_first(correlations)})
             if row == 0:
                 panel.text(0.5, 1.2, sources[source], transform=panel.transAxes, ha="center", va="bottom")
         axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=SMALL_PT)
@@ -134,8 +141,9 @@ def draw_uncertainty_vs_distance(
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         panel.xaxis.set_minor_locator(NullLocator())
     axes[0, 0].set_ylim(bottom=0)
-    _write_legend(figure, shown, learners)
-    write_title(figure, "ρ of the paper's learners above each panel, in their colors")
+    lettered = {name: f"{letters[name]}: {learners[name]}" for name in letters}
+    _write_legend(figure, shown, lettered)
+    write_title(figure, "Above each panel: rank correlation ρ of the learners that have a letter")
     figure.tight_layout(rect=(0, 0.22 / height_in, 1, 1 - 0.3 / height_in), pad=0.4, h_pad=0.5)
     save_figure(figure, pdf_path, png_path)
 
@@ -151,10 +159,9 @@ def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray]:
 
 def _write_correlations(panel, correlations: Mapping[str, float]) -> None:
     panel.text(0.02, 1.03, "ρ", transform=panel.transAxes, ha="left", va="bottom", fontsize=SMALL_PT)
-    for place, (learner, rho) in enumerate(correlations.items()):
-        where = 0.12 + 0.88 * place / len(correlations), 1.03
-        look = {"color": METHOD_LOOKS[learner][0], "fontsize": SMALL_PT, "va": "bottom"}
-        panel.text(*where, f"{rho:.3f}", transform=panel.transAxes, **look)
+    for place, (letter, rho) in enumerate(correlations.items()):
+        where = 0.1 + 0.9 * place / len(correlations), 1.03
+        panel.text(*where, f"{letter} {rho:.3f}", transform=panel.transAxes, fontsize=SMALL_PT, va="bottom")
 
 
 def _look(learner: str) -> dict:

@@ -12,7 +12,7 @@ from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, s
 from gpca.reporting.words import in_words, plural
 
 WORDS = {
-    "reinitialise": "Reinitialise ICP\nbroader search over orientations",
+    "reinitialize": "Reinitialize ICP\nbroader search over orientations",
     "new_view": "Change the viewpoint\nmore of the surface in sight",
     "denoise": "Filter, check the sensor\nseveral frames, outliers removed",
 }

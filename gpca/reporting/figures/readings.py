@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import shorten, wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,11 +13,11 @@ from gpca.comparison.readings import asked_about
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.figures.style import (
-    GREY,
     LIGHT_GREY,
     PALETTE,
     SMALL_PT,
     TEXT_WIDTH_IN,
+    YELLOW,
     save_figure,
     use_style,
     write_title,
@@ -26,9 +27,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = 3
-ROW_IN = 2.1
+PANEL_IN, LINE_IN = 1.9, 0.13  # the height of a row of panels, and what each line of the legends below it adds
 FARTHEST = 30.0  # times what is close
-MOST_NAMED = 6  # numbers with a colour of their own; a panel with more has one colour for all
+COLOURS = tuple(colour for colour in PALETTE if colour != YELLOW)  # Yellow lines are hard to see on white.
+NUMBER = ["table", "row", "column"]  # what names a printed number
+LETTERS = 48  # of a number's name, which a panel has room for
+LINES = ("-", "--", ":")  # of the first numbers in a panel that have a color each, the next such, …
 
 
 def draw_readings(
@@ -58,44 +62,56 @@ def draw_readings(
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     columns = min(COLUMNS, len(shown))
-    lines = -(-len(shown) // columns)
-    height_in = ROW_IN * lines + 0.3
+    of_groups = [dict(list(missed[missed["group"] == name].groupby(NUMBER, sort=False))) for name in shown]
+    rows = [of_groups[i : i + columns] for i in range(0, len(shown), columns)]
+    height_in = sum(PANEL_IN + LINE_IN * max(map(len, row)) for row in rows) + 0.5
     figure, axes = plt.subplots(
-        lines,
+        len(rows),
         columns,
         figsize=(TEXT_WIDTH_IN, height_in),
         sharey=True,
         squeeze=False,
         layout=ConstrainedLayoutEngine(rect=(0, 0, 1, 1 - 0.25 / height_in)),
     )
-    for panel, group in zip(axes.flat, shown, strict=False):
-        _draw_group(panel, missed[missed["group"] == group])
-        panel.set_title(groups[group], fontsize=8)
+    for panel, group, of_group in zip(axes.flat, shown, of_groups, strict=False):
+        _draw_group(panel, of_group)
+        panel.set_title("\n".join(wrap(groups[group], 40)), fontsize=8)
     for panel in axes.flat[len(shown) :]:
         panel.set_visible(False)
-    figure.supylabel("distance from the printed number\n(times what is close)", fontsize=8)
-    figure.supxlabel("share of the readings, from the lowest to the highest value", fontsize=8)
+    linear = "linear up to what is close, logarithmic beyond"
+    figure.supylabel(f"distance from the printed number (times what is close; {linear})", fontsize=8)
+    figure.supxlabel("share of the readings (%), from the lowest to the highest value", fontsize=8)
     write_title(figure, f"Every reading of the unstated{stand_in_clause(sources.values())}")
     save_figure(figure, pdf_path, png_path)
 
 
-def _draw_group(panel, rows: pd.DataFrame) -> None:
+def _draw_group(panel, of_numbers: Mapping[tuple[str, str, str], pd.DataFrame]) -> None:
+    """Draw the curve of each number, and name them all below the panel, where no curve is."""
     panel.axhspan(-1, 1, color=LIGHT_GREY, linewidth=0)
-    curves = list(rows.groupby(["table", "row", "column"], sort=False))
-    for number, (key, of_number) in enumerate(curves):
+    for place, (key, of_number) in enumerate(of_numbers.items()):
         distance_R = np.sort(of_number["distance"].to_numpy().clip(-FARTHEST, FARTHEST))
         share_R = np.linspace(0, 100, len(distance_R)) if len(distance_R) > 1 else np.array([50.0])
-        named = len(curves) <= MOST_NAMED
-        style = {"color": PALETTE[number], "label": _short(key)} if named else {"color": GREY, "alpha": 0.5}
-        panel.plot(share_R, distance_R, marker="o", markersize=1.6, linewidth=0.8, **style)
-    if len(curves) <= MOST_NAMED:
-        panel.legend(fontsize=SMALL_PT, loc="best", handlelength=1.2, borderpad=0.2, labelspacing=0.2)
+        look = {
+            "color": COLOURS[place % len(COLOURS)],
+            "linestyle": LINES[place // len(COLOURS) % len(LINES)],
+            "label": _words(key),
+        }
+        panel.plot(share_R, distance_R, marker="o", markersize=1.6, linewidth=0.8, **look)
+    panel.legend(
+        fontsize=SMALL_PT,
+        loc="upper left",
+        bbox_to_anchor=(-0.1, -0.16),
+        handlelength=1.6,
+        borderaxespad=0,
+        borderpad=0,
+        labelspacing=0.2,
+    )
     panel.set_yscale("symlog", linthresh=1)
     panel.set_ylim(-FARTHEST, FARTHEST)
     panel.set_yticks([-10, -1, 0, 1, 10], ["-10", "-1", "0", "1", "10"])
 
 
-def _short(key: tuple[str, str, str]) -> str:
-    """Return a number's place in one line: its table, and the start of its row and column."""
+def _words(key: tuple[str, str, str]) -> str:
+    """Return a number's place in one line: its table, row and column."""
     table, row, column = key
-    return f"{table}: {row.split(',')[0][:12]}, {column[:10]}"
+    return shorten(f"{table}: {row}, {column}", LETTERS, placeholder=" …")

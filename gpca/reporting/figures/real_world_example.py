@@ -32,6 +32,13 @@ from gpca.reporting.words import object_of_frames
 if TYPE_CHECKING:
     import pandas as pd
 
+DATASETS = {  # what readers call the datasets of frames
+    "ycbv": "YCB-Video",
+    "lm": "LINEMOD",
+    "lmo": "LINEMOD-Occlusion",
+    "icbin": "IC-BIN",
+    "visp": "ViSP",
+}
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
 PANEL_IN = 1.88  # The three pictures are square.
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
@@ -126,7 +133,8 @@ def draw_real_world_example(
         if panel is not panels[3]:
             panel.set_axis_off()
     lost = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
-    write_title(figure, f"{title}: {object_of_frames(registrations.object_name[row])}, {lost}")
+    name = str(registrations.object_name[row])
+    write_title(figure, f"{title_of_frame(name, title)}: {object_of_frames(name)}, {lost}")
     legend_of_clouds(figure, "model", "measured", gap=0.1)
     save_figure(figure, pdf_path, png_path)
 
@@ -142,6 +150,12 @@ def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray)
     sized = overlap.assign(pixels=pixels_I[overlap["instance"].to_numpy(int)])
     ranked = sized.nlargest((len(sized) + 1) // 2, "pixels").sort_values(["score_overlap", "sample"])
     return int(ranked.index[len(ranked) // 2])
+
+
+def title_of_frame(object_name: str, title: str) -> str:
+    """Return what the one frame is called, by the dataset before its object's name; else the title of all frames."""
+    dataset = DATASETS.get(object_name.partition(" ")[0], "")
+    return f"{dataset} frame" if dataset and dataset in title else title
 
 
 def covered(own_P_2: np.ndarray, kept_P_2: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

@@ -7,9 +7,10 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gpca.attribution.wilson import wilson_interval
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.metrics import pool_share, wilson_interval
+from gpca.recovery.metrics import pool_share
 from gpca.reporting.figures.style import (
     BLACK,
     BLUE,
@@ -26,6 +27,8 @@ from gpca.reporting.words import plural
 if TYPE_CHECKING:
     import pandas as pd
 
+ROW_IN = 0.33  # In less, the markers of one policy overlap.
+APART = 0.26  # of a row
 SHADES = (SKY_BLUE, BLUE, BLACK)  # The shade grows darker with every action.
 
 
@@ -55,15 +58,17 @@ def draw_recovery_rates(
     use_style()
     import matplotlib.pyplot as plt
 
-    height_in = 0.75 + 0.24 * len(shown)
+    height_in = 0.75 + ROW_IN * len(shown)
     figure, axes = plt.subplots(1, 2, figsize=(TEXT_WIDTH_IN, height_in), sharey=True, width_ratios=(1.5, 1))
     for k in range(1, budget + 1):
-        offset = 0.22 * (k - (budget + 1) / 2)
+        offset = APART * (k - (budget + 1) / 2)
         look = {"color": SHADES[(k - 1) % len(SHADES)], "marker": "o", "label": f"within {plural(k, 'action')}"}
         _draw(axes[0], metrics, shown, f"recovered_within_{k}", "all", offset, look)
     for n, cause in enumerate(CONCEPTS):
-        look = {"color": CONCEPT_COLOURS[cause], "marker": CONCEPT_MARKERS[cause], "label": cause}
-        _draw(axes[1], metrics, shown, f"recovered_within_{budget}", cause, 0.22 * (n - 1), look)
+        _, failures = pool_share(metrics, shown[0], f"recovered_within_{budget}", cause) or (nan, 0)
+        label = f"{cause} ($n$ = {failures})"
+        look = {"color": CONCEPT_COLOURS[cause], "marker": CONCEPT_MARKERS[cause], "label": label}
+        _draw(axes[1], metrics, shown, f"recovered_within_{budget}", cause, APART * (n - 1), look)
     axes[0].set_yticks(range(len(shown)), [policies[name] for name in shown])
     axes[0].set_ylim(len(shown) - 0.4, -0.6)
     for panel in axes:

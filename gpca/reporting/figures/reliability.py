@@ -51,7 +51,7 @@ def draw_nominal_reliability(
         clear_S = label_S != BORDERLINE
         came_true_S = label_S[clear_S] == NOMINAL
         gap = draw_reliability_panel(panel, score_S[clear_S], came_true_S, BINS_OF_NOMINAL, "share that is nominal")
-        panel.set_title(f"{explainers[name]}\nECE {gap:.3f}", fontsize=SMALL_PT)
+        panel.set_title(f"{explainers[name]}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
     handles, labels = panels[0].get_legend_handles_labels()
     drawn = {source for source, own, _ in judged if own in shown}
     title = ", ".join(title for name, title in sources.items() if name in drawn)

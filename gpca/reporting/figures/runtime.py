@@ -1,26 +1,45 @@
-"""Draws where the time of one explanation goes, here and in the paper: one stacked bar each, on its own scale."""
+"""Draws where the time of one explanation goes, here and in the paper: its stages as rows, on one scale."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from gpca.comparison.published import HARDWARE, Number, printed_seconds
 from gpca.errors import InputError
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION
-from gpca.reporting.figures.style import BLUE, GREEN, ORANGE, TEXT_WIDTH_IN, YELLOW, save_figure, use_style, write_title
+from gpca.reporting.figures.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SMALL_PT,
+    TEXT_WIDTH_IN,
+    save_figure,
+    use_style,
+    write_title,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
-COLOURS = dict(zip(OF_ONE_EXPLANATION, (BLUE, ORANGE, GREEN, YELLOW), strict=True))
+LOOKS = ((GREY, "D"), (BLUE, "o"), (GREEN, "s"), (ORANGE, "^"))  # the paper's first, then those of our devices
+ROW_IN = 0.34
+ALL_STAGES = "All four"
+
+
+class Stage(NamedTuple):
+    """The mean time of a stage and its standard deviation over the runs, in ms; the paper prints no deviation."""
+
+    mean: float
+    deviation: float = 0.0
 
 
 def draw_runtime(
     runtime: pd.DataFrame, title: str, numbers: Iterable[Number], pdf_path: str | Path, png_path: str | Path
 ) -> None:
-    """Draw the stages of one explanation as stacked bars.
+    """Draw the mean of every stage of one explanation and of their sum, ours with one standard deviation.
 
     Args:
         runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.
@@ -31,39 +50,55 @@ def draw_runtime(
     Raises:
         InputError: A stage was not measured.
     """
-    bars = _bars(runtime, numbers)
+    series = _stages(runtime, numbers)
     use_style()
     import matplotlib.pyplot as plt
 
-    figure, panels = plt.subplots(len(bars), 1, figsize=(TEXT_WIDTH_IN, 0.8 + 0.75 * len(bars)), squeeze=False)
-    for panel, (name, milliseconds) in zip(panels[:, 0], bars.items(), strict=True):
-        left = 0.0
-        for component, width in milliseconds.items():
-            panel.barh(0, width, left=left, color=COLOURS[component], label=COMPONENTS[component], height=0.6)
-            left += width
-        panel.set(yticks=[], xlim=(0, 1.02 * left))
-        panel.set_title(f"{name}: {left:,.3g} ms" if left < 1000 else f"{name}: {left:,.0f} ms", loc="left")
-        panel.spines["left"].set_visible(False)
-    panels[-1, 0].set_xlabel("milliseconds; each bar has its own scale")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
+    rows = [*(COMPONENTS[component] for component in OF_ONE_EXPLANATION), ALL_STAGES]
+    figure, panel = plt.subplots(figsize=(TEXT_WIDTH_IN, 0.9 + ROW_IN * len(rows)))
+    step = 0.7 / len(series)
+    for place, (name, stages) in enumerate(series.items()):
+        colour, marker = LOOKS[min(place, len(LOOKS) - 1)]
+        drawn = [*stages.values(), Stage(sum(stage.mean for stage in stages.values()))]
+        for row, (mean, deviation) in enumerate(drawn):
+            y = row + step * (place - (len(series) - 1) / 2)
+            # A logarithmic axis has no place for what lies below zero.
+            low, high = max(mean - deviation, 0.1 * mean), mean + deviation
+            panel.plot([low, high], [y, y], color=colour, linewidth=1.0)
+            panel.plot(mean, y, marker, color=colour, linestyle="", label=name if row == 0 else None)
+            words = f"{mean:,.3g}" if mean < 1000 else f"{mean:,.0f}"
+            panel.annotate(
+                words, (high, y), (5, 0), textcoords="offset points", va="center_baseline", fontsize=SMALL_PT
+            )
+    panel.margins(x=0.08)  # The last number needs room.
+    panel.axhline(len(rows) - 1.5, color=GREY, linewidth=0.6)
+    panel.set_yticks(range(len(rows)), rows)
+    panel.set(ylim=(len(rows) - 0.5, -0.5), xscale="log", xlabel="milliseconds")
+    panel.xaxis.set_major_formatter("{x:g}")
+    panel.tick_params(axis="y", length=0)
+    panel.grid(axis="x")
+    panel.set_axisbelow(True)
     write_title(figure, f"One explanation on {title}")
     below_title = 1 - 0.2 / figure.get_size_inches()[1]
     figure.set_layout_engine("constrained", rect=(0, 0, 1, below_title))
-    figure.legend(handles, labels, loc="outside lower center", ncol=len(labels))
+    figure.legend(loc="outside lower center", ncol=len(series))
     save_figure(figure, pdf_path, png_path)
 
 
-def _bars(runtime: pd.DataFrame, numbers: Iterable[Number]) -> dict[str, dict[str, float]]:
-    """Return for each bar the milliseconds of its stages: the paper's, and here without and with a GPU."""
-    mean_ms = {(row.component, row.device): 1e3 * row.mean_s for row in runtime.itertuples()}
+def _stages(runtime: pd.DataFrame, numbers: Iterable[Number]) -> dict[str, dict[str, Stage]]:
+    """Return the times of the stages by what measured them: the paper, and here without and with a GPU."""
+    measured = {
+        (row.component, row.device): Stage(1e3 * row.mean_s, 1e3 * row.deviation_s) for row in runtime.itertuples()
+    }
     hardware = {row.device: row.hardware for row in runtime.itertuples()}
     printed = printed_seconds(numbers)
-    bars = {f"Paper, {' and '.join(HARDWARE.values())}": {c: 1e3 * printed[c].value for c in COLOURS}}
+    of_paper = {component: Stage(1e3 * printed[component].value) for component in OF_ONE_EXPLANATION}
+    series = {f"Paper, {' and '.join(HARDWARE.values())}": of_paper}
     for device, name in hardware.items():
-        stages = bars.setdefault(f"Here, {name}", {})
-        for component in COLOURS:
-            milliseconds = mean_ms.get((component, device), mean_ms.get((component, "CPU")))
-            if milliseconds is None:
+        stages = series.setdefault(f"Here, {name}", {})
+        for component in OF_ONE_EXPLANATION:
+            stage = measured.get((component, device), measured.get((component, "CPU")))
+            if stage is None:
                 raise InputError("runtime", f"has no row of '{component}'", "rerun the step 'runtime'")
-            stages[component] = milliseconds
-    return bars
+            stages[component] = stage
+    return series

@@ -75,12 +75,18 @@ def table3_active_learning(
         footnotes=(
             f"{mean_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
-            f"Rare: {conditions['rare_share']:.0%} of the pool belong to the new concept, and up to "
-            f"{conditions['rare_labels']} labels are given.",
+            *_rare(conditions),
             f"Retraining is a warm start of at most {conditions['iterations']} passes over the labels. Epochs: passes "
             "until the target, over all rounds. Acc.: after all labels.",
         ),
     )
+
+
+def _rare(conditions: Mapping) -> list[str]:
+    if not conditions["rare_share"]:
+        return []
+    labels = f"up to {conditions['rare_labels']} labels are given"
+    return [f"Rare: {conditions['rare_share']:.0%} of the pool belong to the new concept, and {labels}."]
 
 
 def table3_extended(
@@ -133,7 +139,7 @@ def table3_stream(
         f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **COUNT), concept=c) for c in _concepts(metrics)
     } | {
         "labels": Quantity("labels", Column("Labels", interval=False, **COUNT)),
-        "new_labels": Quantity("new_labels", Column("of the new", interval=False, **COUNT)),
+        "new_labels": Quantity("new_labels", Column("Labels of the new", interval=False, **COUNT)),
         "running_accuracy": Quantity("running_accuracy", Column("Running (%)")),
         "final_accuracy": Quantity("final_accuracy", Column("Accuracy (%)")),
         "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),

@@ -13,7 +13,7 @@ from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.frames.metrics import TOGETHER
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import INTERVAL, TableBuilder, cell_of_repeats, plain_cell, rows_where
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, interval_over, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -86,7 +86,7 @@ def table6_backbones(
     table.require_rows("metrics", "have no accuracy", "run its explainers first")
     table.compare_down(["accuracy"])
     shown = table.cells[0, "accuracy"]
-    rival = f"To {BACKBONES.get(first, '')}"
+    rival = f"To {BACKBONES.get(first, first)}"
     encoder = f"encoder that goes on from one pretrained on {pretrained_on}" if pretrained_on else "encoder"
     other = " without reduction" if reductions[0] == "none" else f" with {REDUCTIONS[reductions[0]]}"
     return table.build(
@@ -102,8 +102,8 @@ def table6_backbones(
         },
         footnotes=(
             f"Mean over {plural(shown.seeds, 'seed')}, {shown.test_samples // shown.seeds} test samples each, in "
-            f"scenes that training does not see; {INTERVAL}. Each seed has its own split of the scenes, "
-            f"perturbations, {encoder}, and GPC.",
+            f"scenes that training does not see; {interval_over(shown.seeds)}. Each seed has its own split of the "
+            f"scenes, perturbations, {encoder}, and GPC.",
             "Std. dev.: as the paper says, of classifiers on one encoder's embeddings, the first seed's. Of all: of "
             "the seeds of the mean.",
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "

@@ -6,10 +6,12 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import nan
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gpca.attribution.metrics import mean_interval
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause
-from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
 from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
@@ -84,6 +86,10 @@ class TableBuilder:
         """Return over how many seeds the cell with the most of them is a mean."""
         return max(cell.seeds for cell in self.cells.values())
 
+    def span_of_seeds(self) -> str:
+        """Return over how many seeds its cells are means, such as ``5`` or ``1 to 3``."""
+        return span(cell.seeds for cell in self.cells.values())
+
     def build(self, caption: str, column_head: str, columns: Mapping[str, Column], footnotes: Iterable[str]) -> Table:
         """Return the table with its columns, which may depend on the cells that were found."""
         return Table(
@@ -102,6 +108,8 @@ class TableBuilder:
 def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bool = False) -> Cell | None:
     """Return the mean over R repeats with the half-width of its t-interval, or None without any repeat.
 
+    Fewer than `LEAST_SEEDS` repeats have no interval.
+
     Args:
         values_R: One value per seed, in the column's unit.
         test_samples: The number of test samples of all seeds together.
@@ -110,7 +118,25 @@ def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bo
     if len(values_R) == 0:
         return None
     mean, low, _ = mean_interval(values_R)
-    return Cell(mean, mean - low, len(values_R), test_samples, at_least)
+    half_width = mean - low if len(values_R) >= LEAST_SEEDS else nan
+    return Cell(mean, half_width, len(values_R), test_samples, at_least)
+
+
+def cell_of_all_samples(values_R: Sequence[float], samples_R: Sequence[float]) -> Cell | None:
+    """Return the mean over the samples of R seeds, which have unequally many, or None without any seed.
+
+    The interval is that of a ratio of two means over the seeds (by its linearisation), which for equally many samples
+    is the t-interval of the seeds' means.
+
+    Args:
+        values_R: The mean over the samples of each seed, in the column's unit.
+        samples_R: How many these are.
+    """
+    value_R, sample_R = np.asarray(values_R, float), np.asarray(samples_R, float)
+    if not len(value_R):
+        return None
+    mean = np.average(value_R, weights=sample_R)
+    return cell_of_repeats(mean + sample_R / sample_R.mean() * (value_R - mean), int(sample_R.sum()))
 
 
 def cell_over_sources(
@@ -148,7 +174,21 @@ def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
 
 def mean_over(seeds: int | str, samples: int | str) -> str:
     """Return the start of the footnote that most tables begin with; it ends with what ± means, without a full stop."""
-    return f"Mean over {plural(seeds, 'seed')}, {samples} test samples each; {INTERVAL}"
+    return f"Mean over {plural(seeds, 'seed')}, {samples} test samples each; {interval_over(seeds)}"
+
+
+def interval_over(seeds: int | str) -> str:
+    """Return what ± means in a table of means over so many seeds, such as ``5`` or ``1 to 3``, without a full stop."""
+    fewest, most = (int(number) for number in (str(seeds).split()[0], str(seeds).split()[-1]))
+    if most < LEAST_SEEDS:
+        return f"with fewer than {LEAST_SEEDS} there is no interval and no bold"
+    return INTERVAL if fewest >= LEAST_SEEDS else f"{INTERVAL} (none for fewer than {LEAST_SEEDS})"
+
+
+def span(numbers: Iterable[float]) -> str:
+    """Return the least and the largest of some whole numbers, such as ``15 to 200``, or the one that all are."""
+    distinct = sorted({int(number) for number in numbers})
+    return str(distinct[0]) if len(distinct) == 1 else f"{distinct[0]} to {distinct[-1]}"
 
 
 def missing_packages(left_out: Mapping[str, str]) -> list[str]:

@@ -14,7 +14,7 @@ from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import title_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, rows_where
+from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -30,7 +30,7 @@ SHOWN = {
     "average_precision": Column("mAP (%)", interval=False),
     "spearman_attribution": Column("Spearman", decimals=2, interval=False, limits=(-1.0, 1.0)),
     "deletion_gain": Column("Deletion (%)", interval=False),
-    "nominal_calibration": Column("ECE (%)", interval=False, least_is_best=True),
+    "nominal_calibration": Column("ECE (share)", 3, False, (0.0, 1.0), least_is_best=True),
     "samples": Column("n", decimals=0, interval=False, limits=(0.0, inf)),
 }
 SHOWN_OF_FRAMES = {
@@ -40,8 +40,7 @@ SHOWN_OF_FRAMES = {
 }
 _SHARES = (  # These are printed in %.
     STATE,
-    *("balanced_accuracy", "dominant_accuracy", "false_alarm_rate"),
-    *("average_precision", "deletion_gain", "nominal_calibration"),
+    *("balanced_accuracy", "dominant_accuracy", "false_alarm_rate", "average_precision", "deletion_gain"),
 )
 
 
@@ -71,15 +70,16 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
         column_head="metric",
         columns=SHOWN,
         footnotes=(
-            f"n: test samples over {plural(table.most_seeds(), 'seed')}. ± is half the width of the 95 % interval of a "
-            f"bootstrap over objects and seeds ({REPEATS} draws), whose bounds the CSV holds.",
+            f"n: test samples that are judged, over {plural(table.most_seeds(), 'seed')}; borderline ones are left "
+            f"out. Of them, {_parts(intervals, titles)}. In brackets: the 95 % interval of a bootstrap over objects "
+            f"and seeds ({REPEATS} draws). Bold: best explainer on a dataset.",
             "Balanced: mean share named rightly of nominal and of the three dominant causes. Lead: balanced accuracy "
             "minus that of the best other explainer, on the same draws: it wins where the interval is above 0. "
             "Dominant: of the failed, the share whose main cause has the highest score among the causes.",
             "False alarms: share of the nominal above the alarm that finds 90 % of the failed. AUROC: of failed "
             "against nominal. mAP: mean average precision of the sets of causes. Spearman: of scores and measured "
-            "attributions. Deletion: share of a failed sample's error that goes with the cause named first. "
-            "ECE: expected calibration error of the score of nominal.",
+            "attributions of the failed. Deletion: share of a failed sample's error that goes with the cause named "
+            "first. ECE: expected calibration error of the score of nominal.",
             "Gates only say whether something is wrong. The ceiling is the truth measured again from other starts.",
         ),
     )
@@ -117,11 +117,26 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
             f"Of {counted['samples'].iloc[0]:.0f} registrations {of[NOMINAL]} are nominal, {of[BORDERLINE]} "
             f"borderline, and {total} failed: {_list_of(failed)}. {of[GEOMETRY]} more are off without a cause. Always "
             f"naming {most} would be right for {100 * failed[most] / max(1, total):.0f} % of the failed.",
-            f"± is half of the 95 % interval of {REPEATS} bootstrap draws over {plural(of['scenes'], 'scene')}, "
-            f"{plural(of['objects'], 'object')} and {plural(table.most_seeds(), 'seed')}.",
+            "n: the nominal and the failed together, which are judged. False alarms are a share of the "
+            f"{of[NOMINAL]} nominal; Dominant, Spearman and Deletion are over the {total} failed.",
+            f"In brackets: the 95 % interval of {REPEATS} bootstrap draws over {plural(of['scenes'], 'scene')}, "
+            f"{plural(of['objects'], 'object')} and {plural(table.most_seeds(), 'seed')}. Bold: best of a column.",
             "State: mean share of the nominal and of the failed that is called so. The others as in Table IX.",
         ),
     )
+
+
+def _parts(intervals: pd.DataFrame, titles: Mapping[str, str]) -> str:
+    """Return how many samples of each source are nominal and how many failed, in words."""
+    told = {}
+    for source, title in titles.items():
+        samples = rows_where(intervals, source=source).groupby("metric")["samples"].max()
+        nominal, judged = samples.get("false_alarm_rate"), samples.max()
+        if source != POOLED and nominal is not None:
+            told[title] = f"{nominal:.0f} are nominal and {judged - nominal:.0f} failed"
+    if len(told) > 1 and len(set(told.values())) == 1:
+        return f"{next(iter(told.values()))} on each dataset"
+    return "; ".join(f"{words} on {title}" for title, words in told.items())
 
 
 def _list_of(failed: Mapping[str, int]) -> str:
@@ -137,8 +152,8 @@ def _cells(rows: pd.DataFrame, shown: Mapping[str, Column]) -> dict[str, Cell | 
         if metric == "balanced_accuracy" and row["rival"] and "lead" in shown:
             cells["lead"] = _cell(row, "difference", "difference_low", "difference_high", scale)
     if len(rows):
-        row = rows.iloc[0]
-        cells["samples"] = Cell(row["samples"], float("nan"), int(row["seeds"]), int(row["samples"]))
+        judged = rows["samples"].max()
+        cells["samples"] = plain_cell(judged, int(rows["seeds"].iloc[0]), int(judged))
     return cells
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -10,14 +10,16 @@ from gpca.controls.settings import PAPER, SEEN, TRAININGS, TRANSFER, UNSEEN, tra
 from gpca.diagnosis.judged import POOLED
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, rows_where
-from gpca.reporting.tables.controls import ALL_TOGETHER, CHANGE, INTERVAL, TITLES, cell_of
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, plain_cell, rows_where, span
+from gpca.reporting.tables.controls import ALL_TOGETHER, BOOTSTRAP, CHANGE, TITLES, cell_of
 from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TRAINED = {"random_draws": "draws of random size", "two_layer_head": "head of two layers"}
+SAME_SEEDS = "paper_same_seeds"  # the paper's training, over the seeds that have an encoder trained otherwise
 KNOWN = {PAPER: TITLES[PAPER], SEEN: "Objects that it learned from (%)", UNSEEN: "Unseen objects (%)"}
 
 
@@ -36,14 +38,20 @@ def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
             if explainer not in GPCA_FORMS:
                 continue
             ways = {way: trained_otherwise(explainer, way) for way in TRAININGS}
-            for way, name in {PAPER: explainer, **ways}.items():
-                of_name = rows_where(intervals, source=source, method=name, metric="accuracy").set_index("control")
-                found = {control: of_name.loc[control] for control in KNOWN if control in of_name.index}
+            of_ways = {
+                way: rows_where(intervals, source=source, method=name, metric="accuracy").set_index("control")
+                for way, name in {PAPER: explainer, **ways}.items()
+            }
+            for way, rows in of_ways.items():
+                found = {control: rows.loc[control] for control in KNOWN if control in rows.index}
                 cells = {control: cell_of(row) for control, row in found.items()}
                 if way != PAPER:
                     cells |= {control + CHANGE: cell_of(row, "change") for control, row in found.items()}
                 label = words if way == PAPER else f"{words}, {TRAINED[way]}"
-                table.add_row([(source, title), (way, label)], cells)
+                table.add_row([(source, title), (way, _with_seeds(label, found.values()))], cells)
+                if way == PAPER:
+                    of_same, same = _on_same_seeds(found, [of_ways[other] for other in TRAININGS])
+                    table.add_row([(source, title), (SAME_SEEDS, _with_seeds(words, of_same))], same)
     table.require_rows("intervals", "have no GP-CA", "run the controls first")
     return table.build(
         caption="Accuracy (%) on encoders that are trained otherwise" + stand_in_clause(sources.values()),
@@ -57,9 +65,37 @@ def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
         footnotes=(
             "Except under the paper's protocol, all learn from the same training samples of some of the objects, and "
             "are asked about new samples of these objects and about the others. In brackets: points gained or lost by "
-            "the training, on the same test samples, for the seeds that have such an encoder. " + INTERVAL,
+            "the training, on the same seeds and test samples, and " + BOOTSTRAP + ".",
         ),
     )
+
+
+def _on_same_seeds(
+    own: Mapping[str, pd.Series], others: Iterable[pd.DataFrame]
+) -> tuple[list[pd.Series], dict[str, Cell | None]]:
+    """Return what the paper's training has over the seeds of the other trainings, where these are fewer.
+
+    It is their own value without their change, which is against it. All trainings have the same seeds.
+
+    Returns:
+        the rows that it follows from; the cell of each control.
+    """
+    found = {
+        control: rows.loc[control]
+        for rows in others
+        for control in own
+        if control in rows.index and rows.loc[control]["seeds"] < own[control]["seeds"]
+    }
+    cells: dict[str, Cell | None] = {
+        control: plain_cell(100 * (row["value"] - row["change"]), int(row["seeds"]), int(row["samples"]))
+        for control, row in found.items()
+    }
+    return list(found.values()), cells
+
+
+def _with_seeds(words: str, rows: Iterable[pd.Series]) -> str:
+    seeds = [row["seeds"] for row in rows]
+    return f"{words}, {plural(span(seeds), 'seed')}" if seeds else words
 
 
 def table10_costs(
@@ -100,6 +136,6 @@ def table10_costs(
             "Learning: classifier, and encoder if it has its own, from the measured training samples of a source. One "
             "registration: to measure, embed and explain it. Times are means over sources and seeds, on one core; "
             "they differ from run to run.",
-            INTERVAL,
+            f"In brackets: {BOOTSTRAP}.",
         ),
     )

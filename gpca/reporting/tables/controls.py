@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from dataclasses import dataclass
+from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 from gpca.attribution.bootstrap import REPEATS
 from gpca.controls.settings import PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.diagnosis.judged import POOLED
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import TableBuilder, rows_where
+from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where, span
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -27,10 +28,8 @@ TITLES = {
     "shuffled": "Shuffled labels",
 }
 CHANGE = "_change"  # behind a control's name: the key of the column of its differences
-INTERVAL = (
-    f"± is half the width of the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws), whose bounds "
-    "the CSV holds."
-)
+WRONG = "_wrong"  # behind the key of an AUROC: the column of the answers that it has to find
+BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
 ALL_TOGETHER = (POOLED, "All together")
 
 
@@ -60,22 +59,27 @@ def table10_controls(
     columns |= {
         name + CHANGE: Column(f"{TITLES[name]}: change", limits=(-100.0, 100.0), beside=name) for name in names[1:]
     }
-    if UNSEEN in names:
-        columns |= {f"{name}_auroc": Column(words, 2, False, (0.0, 1.0)) for name, words in _AUROCS.items()}
+    for name, words in _AUROCS.items() if UNSEEN in names else ():
+        key = f"{name}_auroc"
+        columns[key] = Column(words, 2, False, (0.0, 1.0))
+        columns[key + WRONG] = OfSamples(f"{words}: wrong", 0, False, (0.0, inf), beside=key)
     return table.build(
         caption="Accuracy (%) of single-concept attribution with a shortcut closed (change in brackets)"
         + stand_in_clause(sources.values()),
         column_head="control",
         columns=columns,
         footnotes=(
-            f"In brackets: points gained or lost against the paper's protocol, over "
-            f"{plural(table.most_seeds(), 'seed')}. {INTERVAL}",
+            f"{_seeds_of(table, names)} In brackets: points gained or lost against the paper's protocol, and "
+            f"{BOOTSTRAP}. The change is paired: it is taken over the seeds and objects that the control has, so that "
+            "it differs from the difference of the two levels where the control has fewer seeds. Bold: best of a "
+            "dataset under a control.",
             "Matched density: every cloud has a random number of points, in training and test. Unseen objects: encoder "
             "and explainer learned from other objects. Other sources: they learned from one other source. Wrong "
             "labels: among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
             "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
-            "AUROC: how well the entropy of the scores separates wrong from right answers. A dash marks a head that is "
-            "trained with the encoder and learns no labels, and a source that does not admit a control.",
+            "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
+            "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "
+            "encoder and learns no labels, and a source that does not admit a control.",
         ),
     )
 
@@ -83,17 +87,38 @@ def table10_controls(
 _AUROCS = {PAPER: "AUROC, paper's", UNSEEN: "AUROC, unseen"}
 
 
+@dataclass(frozen=True)
+class OfSamples(Column):
+    """Shows a number of test samples, and of how many."""
+
+    def text(self, cell: Cell) -> str:
+        """Return e.g. ``24 of 1800``."""
+        return f"{cell.mean:.0f} of {cell.test_samples}"
+
+
+def _seeds_of(table: TableBuilder, names: Sequence[str]) -> str:
+    """Return over how many seeds the paper's protocol is, and which controls are over others."""
+    of = {name: [cell.seeds for (_, key), cell in table.cells.items() if key == name] for name in names}
+    seeds = {name: span(numbers) for name, numbers in of.items() if numbers}
+    usual = seeds.pop(PAPER, str(table.most_seeds()))
+    others = [f"{TITLES[name]}: {plural(number, 'seed')}" for name, number in seeds.items() if number != usual]
+    return f"Over {plural(usual, 'seed')}" + (f" ({', '.join(others)})." if others else ".")
+
+
 def _cells(rows: pd.DataFrame, source: str, names: Sequence[str]) -> dict[str, Cell | None]:
     cells: dict[str, Cell | None] = {}
     for name in names:
         trained_on = POOLED if name == TRANSFER else source
         of_control = rows_where(rows, control=name, trained_on=trained_on).set_index("metric")
-        if "accuracy" in of_control.index:
-            accuracy = of_control.loc["accuracy"]
-            cells[name] = cell_of(accuracy)
-            cells[name + CHANGE] = cell_of(accuracy, "change") if name != PAPER else None
+        if "accuracy" not in of_control.index:
+            continue
+        accuracy = of_control.loc["accuracy"]
+        cells[name] = cell_of(accuracy)
+        cells[name + CHANGE] = cell_of(accuracy, "change") if name != PAPER else None
         if name in _AUROCS and "auroc_error" in of_control.index:
-            cells[f"{name}_auroc"] = cell_of(of_control.loc["auroc_error"], scale=1)
+            key, samples = f"{name}_auroc", int(accuracy["samples"])
+            cells[key] = cell_of(of_control.loc["auroc_error"], scale=1)
+            cells[key + WRONG] = plain_cell(round((1 - accuracy["value"]) * samples), int(accuracy["seeds"]), samples)
     return cells
 
 
@@ -128,7 +153,8 @@ def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
         columns={**{name: Column(f"on {title}") for name, title in titles.items()}, POOLED: Column("mean")},
         footnotes=(
             "Encoder and explainer learned from one source and are asked about the test samples of another; what they "
-            f"learned from is the paper's protocol. Over {plural(table.most_seeds(), 'seed')}; " + INTERVAL,
+            f"learned from is the paper's protocol. Over {plural(table.most_seeds(), 'seed')}; in brackets "
+            f"{BOOTSTRAP}.",
         ),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from gpca.reporting.tables.builder import INTERVAL, TableBuilder, rows_where
+from gpca.reporting.tables.builder import TableBuilder, interval_over, rows_where
 from gpca.reporting.words import in_words, plural
 from gpca.shift.metrics import TABLE
 from gpca.shift.sets import DISTANCES, TRAINED_ON
@@ -20,6 +20,8 @@ OF_DISTANCE = (
     "ρ: Spearman's correlation of 1 - largest score with the distance to the training samples, the mean over the "
     "nearest ones in the space of the analytical features; diagnostics.csv has the other scores and distances."
 )
+AREA = "AURC: the area under the curve of risk over coverage, which is the mean risk; the paper's AUC."
+CALIBRATION = "ECE: expected calibration error over 15 equally wide bins."
 
 
 def only(metrics: pd.DataFrame, names: Iterable[str]) -> pd.DataFrame:
@@ -49,13 +51,13 @@ def samples_of_seed(metrics: pd.DataFrame, source: str, of_set: str) -> int:
 
 def repeats_note(table: TableBuilder, metrics: pd.DataFrame) -> str:
     """Return the footnote on the repeats, with the test samples of every set that there is."""
-    source = table.first_labels()[0]
+    source, seeds = table.first_labels()[0], table.most_seeds()
     counts = [
         f"{samples_of_seed(metrics, source, name)} {in_words(name)}"
         for name in TRAINED_ON
         if (metrics["table"] == TABLE + name).any()
     ]
     return (
-        f"Mean over {plural(table.most_seeds(), 'seed')}; {INTERVAL}. Test samples of a seed (of the first dataset): "
-        f"{', '.join(counts)}."
+        f"Mean over {plural(seeds, 'seed')}; {interval_over(seeds)}. Test samples of a seed (of the first dataset): "
+        f"{', '.join(counts)}. Bold: best of a dataset."
     )

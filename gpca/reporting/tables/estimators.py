@@ -7,16 +7,17 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.objects.title import stand_in_clause
-from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over
+from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, interval_over
 from gpca.reporting.tables.table import Column, Table
+from gpca.reporting.words import plural
 from gpca.trials.covariances import REFERENCE
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _SHOWN = {  # Each of these metrics has a column, and a factor to the column's unit.
-    "kl_rotation": (Column("KL, rotation (nats)", 2, limits=(0, inf), least_is_best=True), 1),
-    "kl_translation": (Column("KL, translation (nats)", 2, limits=(0, inf), least_is_best=True), 1),
+    "kl_rotation": (Column("KL, rotation (nats)", 2, limits=(0, inf), least_is_best=True, heavy_tail=True), 1),
+    "kl_translation": (Column("KL, translation (nats)", 2, limits=(0, inf), least_is_best=True, heavy_tail=True), 1),
     "nne": (Column("NNE", 2, interval=False, limits=(0, inf)), 1),
     "nees": (Column("NEES / 6", 1, interval=False, limits=(0, inf)), 1),
     "coverage": (Column("Coverage (%)"), 100),
@@ -49,6 +50,7 @@ def table12_uncertainty(
         InputError: The metrics hold none of these sources and estimators.
     """
     table = TableBuilder("table12_uncertainty", {"method": "Registered by", "estimator": "Estimator"})
+    without: list[str] = []
     rows = {REFERENCE: f"Reference, {pairs['starts']} starts", **estimators}
     for method, method_title in methods.items():
         for name, title in rows.items():
@@ -57,6 +59,10 @@ def table12_uncertainty(
                 for key, (_, factor) in _SHOWN.items()
                 if not (name == REFERENCE and key.startswith("kl_"))  # of itself from itself
             }
+            refused = cells["no_estimate"] and not any(cell for key, cell in cells.items() if key != "no_estimate")
+            if refused:
+                without.append(f"{title}, of {method_title}")
+                continue
             cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", method, 1e3)
             table.add_row([(method, method_title), (name, title)], cells, rival=name != REFERENCE)
     table.require_rows("metrics", "have no estimator", "run the step estimate first")
@@ -64,21 +70,23 @@ def table12_uncertainty(
     numbers = {
         method: cell_over_sources(metrics, metrics, sources, REFERENCE, "no_estimate", method, 1) for method in methods
     }
-    counted = ", ".join(
+    counted = "; ".join(
         f"{cell.test_samples // cell.seeds} by {methods[name]}" for name, cell in numbers.items() if cell is not None
     )
+    seeds = table.most_seeds()
     return table.build(
         caption="What estimators say of the covariance of a pose" + stand_in_clause(sources.values()),
         column_head="metric",
         columns={key: column for key, (column, _) in _SHOWN.items()} | {"milliseconds": _MILLISECONDS},
         footnotes=(
-            f"{mean_over(table.most_seeds(), counted).replace(' test samples each', ' registrations each')}. KL: from "
-            f"the reference, Monte-Carlo with {pairs['starts']} starts; trimmed means (10 to 90 %), as NNE, NEES. "
-            "NNE and NEES / 6 are near 1 and the coverage is 95 % if the covariance is that of the errors; above 1, or "
-            "below 95 %, an estimator is overconfident. Spread and error are those of the object's points. Bold: best "
-            "of a method, the reference apart.",
-            "None: refused, or failed for a reason that the files name; Bonnabel's rule refuses point-to-point, "
-            "Censi's form here is that of point-to-point. ms: of one estimate, with descriptors and normals, without "
-            "learning; the one column that differs from run to run.",
+            f"Mean over {plural(seeds, 'seed')}; {interval_over(seeds)}. ± is left out where it exceeds the value, as "
+            f"single seeds dominate such a mean; the CSV holds it. Registrations of each seed: {counted}.",
+            f"KL: from the reference, Monte-Carlo with {pairs['starts']} starts; trimmed means (10 to 90 %), as NNE, "
+            "NEES. NNE and NEES / 6 are near 1 and the coverage is 95 % if the covariance is that of the errors; above "
+            "1, or below 95 %, an estimator is overconfident. Spread and error are those of the object's points. Bold: "
+            "best of a method, the reference apart.",
+            "None: refused, or failed for a reason that the files name. ms: of one estimate, with descriptors and "
+            "normals, without learning; the one column that differs from run to run.",
+            *([f"Left out, as they refuse every registration: {'; '.join(without)}."] if without else []),
         ),
     )

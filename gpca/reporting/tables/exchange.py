@@ -14,15 +14,18 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL
-from gpca.exchange.metrics import ANOTHER
+from gpca.exchange.metrics import ANOTHER, MONTE_CARLO
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, missing_packages, rows_where
+from gpca.reporting.tables.builder import TableBuilder, missing_packages, rows_where, span
+from gpca.reporting.tables.shares import WILSON, share_over_sources
 from gpca.reporting.tables.table import Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
 
+_INTERVAL = f"{WILSON}, as if all samples were independent; where seeds or objects differ, it is too narrow."
 _NOTHING = ("metrics", "have no explanation", "run the step exchange first")
 _OF_ESTIMATORS = {
     "agreement": Column("As with Monte-Carlo"),
@@ -48,8 +51,10 @@ def table14_estimator_explanations(
     for explainer, words in explainers.items():
         rows = rows_where(metrics, table=explainer)
         for name, title in estimators.items():
-            cells = {key: cell_over_sources(rows, rows, sources, name, "accuracy", key, 100) for key in causes}
-            cells |= {key: cell_over_sources(rows, rows, sources, name, key, ALL, 100) for key in _OF_ESTIMATORS}
+            cells = {key: share_over_sources(rows, sources, name, "accuracy", key) for key in causes}
+            cells |= {key: share_over_sources(rows, sources, name, key, ALL) for key in _OF_ESTIMATORS}
+            if name == MONTE_CARLO:
+                cells["agreement"] = None  # with itself
             table.add_row([(explainer, words), (name, title)], cells)
     table.require_rows(*_NOTHING)
     table.compare_down([ALL], same=1)
@@ -58,9 +63,10 @@ def table14_estimator_explanations(
         column_head="metric",
         columns={key: Column(key.capitalize()) for key in causes} | _OF_ESTIMATORS,
         footnotes=(
-            f"{mean_over(table.most_seeds(), _samples(table, ALL))}. The uncertainty is how far the covariance "
-            "diverges from that of the untouched pair, as in Table I. As with Monte-Carlo: share of the samples "
-            "with the same answer. Bold: best of an explainer.",
+            f"Shares of {_samples(table, ALL)}, {_of_concepts(table)} of each concept. {_INTERVAL} Bold: best of an "
+            "explainer.",
+            "The uncertainty is how far the covariance diverges from that of the untouched pair, as in Table I. As "
+            "with Monte-Carlo: share of the samples with the same answer.",
             "Abstained: all concepts have the same value. No estimate: the estimator failed or refused under at least "
             "one condition, and the sample counts as wrong.",
         ),
@@ -86,30 +92,36 @@ def table14_method_matrix(
     for explainer, words in explainers.items():
         rows = rows_where(metrics, table=explainer)
         for learnt_from, title in methods.items():
-            cells = {name: cell_over_sources(rows, rows, sources, name, "accuracy", learnt_from, 100) for name in names}
+            cells = {name: share_over_sources(rows, sources, name, "accuracy", learnt_from) for name in names}
             table.add_row([(explainer, words), (learnt_from, title)], cells)
     table.require_rows(*_NOTHING)
     table.compare_down(methods, same=1)
-    columns = {name: Column(f"on {title}") for name, title in methods.items()} | {ANOTHER: Column("on another (mean)")}
+    columns = {name: Column(f"on {title}") for name, title in methods.items()} | {
+        ANOTHER: Column("on another (mean)", interval=False)  # the same samples several times
+    }
     shown = {key for _, key in table.cells}
     return table.build(
         caption="Accuracy (%) from each registration method to each other" + stand_in_clause(sources.values()),
         column_head="asked_of",
         columns={name: column for name, column in columns.items() if name in shown},
         footnotes=(
-            f"{mean_over(table.most_seeds(), _samples(table, next(iter(methods))))}. The explainer learns from "
-            "registrations by one method and explains the same test pairs as registered by another; the encoder is the "
-            "run's own, which has seen point-to-point alone. Bold: best on a method.",
+            f"Shares of {_samples(table, next(iter(methods)))}. {_INTERVAL} Bold: best on a method.",
+            "The explainer learns from registrations by one method and explains the same test pairs as registered by "
+            "another; the encoder is the run's own, which has seen point-to-point alone.",
             *_failed(metrics, table, sources, methods),
             *missing_packages(left_out),
         ),
     )
 
 
-def _samples(table: TableBuilder, column: str) -> int:
-    """Return how many test samples of a seed the first row's cell in a column has."""
+def _samples(table: TableBuilder, column: str) -> str:
+    """Return how many test samples the first row's cell in a column has, in words."""
     cell = table.cells[0, column]
-    return cell.test_samples // cell.seeds
+    return f"{cell.test_samples} test samples, of {plural(cell.seeds, 'seed')} and all datasets together"
+
+
+def _of_concepts(table: TableBuilder) -> str:
+    return span(cell.test_samples for (row, key), cell in table.cells.items() if row == 0 and key in CONCEPTS)
 
 
 def _failed(
@@ -117,9 +129,6 @@ def _failed(
 ) -> list[str]:
     explainer, learnt_from = (key for key, _ in table.rows[0])
     rows = rows_where(metrics, table=explainer)
-    shares = {
-        title: cell_over_sources(rows, rows, sources, name, "failed", learnt_from, 100)
-        for name, title in methods.items()
-    }
+    shares = {title: share_over_sources(rows, sources, name, "failed", learnt_from) for name, title in methods.items()}
     told = ", ".join(f"{title} {cell.mean:.1f} %" for title, cell in shares.items() if cell)
     return [f"Registrations that failed by the method's own account, which are explained like any other: {told}."]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from gpca.attribution.metrics import ALL
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.objects.title import title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where, span
 from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -146,10 +146,8 @@ def _cell(
 def _repeats(table: TableBuilder, metrics: pd.DataFrame, explainers: Iterable[str]) -> str:
     """Return the footnote on the repeats; seeds and test samples may differ from cell to cell."""
     of_test = _test_samples(metrics, explainers)
-    samples = _span(of_test.loc[of_test["source"].isin(table.first_labels()), "value"])
-    seeds = _span(cell.seeds for cell in table.cells.values())
-    no_interval = f" ({EMPTY}: one seed)" if seeds == "1" else ""
-    return f"{mean_over(seeds, samples)}{no_interval}."
+    samples = span(of_test.loc[of_test["source"].isin(table.first_labels()), "value"])
+    return f"{mean_over(table.span_of_seeds(), samples)}."
 
 
 def _different_samples(metrics: pd.DataFrame, explainers: Mapping[str, Mapping], shown: Iterable[str]) -> list[str]:
@@ -157,15 +155,10 @@ def _different_samples(metrics: pd.DataFrame, explainers: Mapping[str, Mapping],
     of_test = _test_samples(metrics, shown)
     names: dict[str, list[str]] = {}
     for explainer, values in of_test.groupby("method", sort=False)["value"]:
-        names.setdefault(_span(values), []).append(explainers[explainer]["title"])
+        names.setdefault(span(values), []).append(explainers[explainer]["title"])
     told = "; ".join(f"{samples} by {', '.join(titles)}" for samples, titles in names.items())
     return [f"Test samples explained: {told}."] if len(names) > 1 else []
 
 
 def _test_samples(metrics: pd.DataFrame, explainers: Iterable[str]) -> pd.DataFrame:
     return rows_where(metrics[metrics["method"].isin(list(explainers))], metric="test_samples", concept=ALL)
-
-
-def _span(numbers: Iterable[float]) -> str:
-    distinct = sorted({int(number) for number in numbers})
-    return str(distinct[0]) if len(distinct) == 1 else f"{distinct[0]} to {distinct[-1]}"

@@ -10,7 +10,7 @@ from gpca.attribution.metrics import ALL
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.readings.registry import FRAME_INPUT
 from gpca.reporting.tables.backbones import encoder_title
-from gpca.reporting.tables.builder import INTERVAL, TableBuilder, cell_of_repeats, rows_where
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, interval_over, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -53,14 +53,18 @@ def table6_inputs(metrics: pd.DataFrame, title: str) -> Table:
         f"{one}_as_{other}": Column(f"{one.capitalize()} taken for {other} (%)", interval=False)
         for one, other in CONFUSED.items()
     }
+    of_first = {name: table.cells[0, name].test_samples for name in OBJECTS if (0, name) in table.cells}
+    counts = ", ".join(f"{name} {count}" for name, count in of_first.items())
+    seeds = table.most_seeds()
     return table.build(
         caption=f"Accuracy (%) on {title} by the cloud that the encoder sees",
         column_head="samples",
         columns=columns,
         footnotes=(
-            f"Mean over {plural(table.most_seeds(), 'seed')}, the first of the run; {INTERVAL}. Each cloud has an "
-            "encoder of its own, pretrained and trained as that of the first row, which is Table VI's, on the same "
-            "samples.",
+            f"Mean over {plural(seeds, 'seed')}, the first of the run; {interval_over(seeds)}. Test samples: {counts}. "
+            "The share of seen objects differs from seed to seed, so that All need not lie between Seen and Unseen.",
+            "Each cloud has an encoder of its own, pretrained and trained as that of the first row, which is Table "
+            "VI's, on the same samples.",
         ),
     )
 

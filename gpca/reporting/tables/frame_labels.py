@@ -18,7 +18,7 @@ from gpca.reporting.tables.table import Cell, Column, Table
 if TYPE_CHECKING:
     import pandas as pd
 
-STRATEGIES = {"bald_kmeans": "BALD to {} %", "random": "random"}
+STRATEGIES = {"bald_kmeans": "BALD, to {} % (labels)", "random": "Random, to {} % (labels)"}
 
 
 def table6_labels(metrics: pd.DataFrame, title: str, encoders: Mapping[str, str], conditions: Mapping) -> Table:
@@ -74,7 +74,8 @@ def table6_labels(metrics: pd.DataFrame, title: str, encoders: Mapping[str, str]
         column_head="quantity",
         columns=columns,
         footnotes=(
-            f"{mean_over(seeds, conditions['test'])}.",
+            f"{mean_over(seeds, conditions['test'])}. Bold: the fewer labels of the two to a target, whether or not "
+            "their intervals overlap; neither where they are equal.",
             f"Start: {conditions['initial']} labeled samples of the two known concepts; the pool is the rest of "
             f"{conditions['train']} training samples. {conditions['batch']} labels a round, {conditions['labels']} in "
             "all; '>': some runs did not reach the target and count with all labels. Encoders saw every concept.",

@@ -11,9 +11,9 @@ import numpy as np
 from gpca.attribution.metrics import ALL
 from gpca.frames.metrics import DATASET, SEEN, TOGETHER, UNSEEN
 from gpca.reporting.tables.backbones import CLASSIC, encoder_title
-from gpca.reporting.tables.builder import INTERVAL, TableBuilder, cell_of_repeats, rows_where
+from gpca.reporting.tables.builder import TableBuilder, cell_of_all_samples, cell_of_repeats, interval_over, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
-from gpca.reporting.words import plural
+from gpca.reporting.words import dataset_in_words, plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,9 +52,11 @@ def table6_seen_unseen(
     table.require_rows("metrics", "have no accuracy", "run its explainers first")
     table.compare_down(EVERYTHING_SEEN, same=1)
     columns = {name: Column(head) for name, head in EVERYTHING_SEEN.items()}
-    columns |= {name: Column(f"{name.removeprefix(DATASET)} (%)", interval=False) for name in datasets}
-    columns |= {"ece": Column("ECE, all", decimals=2, interval=False, limits=(0.0, 1.0))}
-    columns |= {"nll": Column("NLL, all", decimals=2, interval=False, limits=(0.0, inf))}
+    titles_of = {name: dataset_in_words(name.removeprefix(DATASET)) for name in datasets}
+    columns |= {name: Column(f"{words} (%)", interval=False) for name, words in titles_of.items()}
+    columns |= {"ece": Column("ECE, all (share)", decimals=2, interval=False, limits=(0.0, 1.0))}
+    columns |= {"nll": Column("NLL, all (nats)", decimals=2, interval=False, limits=(0.0, inf))}
+    seeds = table.most_seeds()
     pretrained = "The pretraining renders the models of both. " if rendered else ""
     first = rows_where(metrics, source=next(iter(conditions)), metric="test_samples", concept=ALL)
     shares = [_share(first, name) for name in (SEEN, UNSEEN)]
@@ -63,12 +65,13 @@ def table6_seen_unseen(
         column_head="samples",
         columns=columns,
         footnotes=(
-            f"Mean over {plural(table.most_seeds(), 'seed')}; {INTERVAL}. No scene is in both training and test. Seen "
-            f"objects ({shares[0]} of the test samples) are shown in a scene of the training too, unseen ones "
-            f"({shares[1]}) are not. {pretrained}Instances take turns, so that objects and datasets are as unequally "
-            "frequent as in the frames.",
-            "A dataset has a value where at least one seed tests its frames. ECE: expected calibration error of all. "
-            "NLL: their mean negative log likelihood, in nats.",
+            f"Mean over the test samples of {plural(seeds, 'seed')} together, as some seeds have more of a column than "
+            f"others; {interval_over(seeds)}. Bold: best for one kind of initial poses.",
+            *_counts(table, columns, conditions),
+            f"No scene is in both training and test. Seen objects ({shares[0]} of the test samples) are shown in a "
+            f"scene of the training too, unseen ones ({shares[1]}) are not. {pretrained}Instances take turns, so that "
+            "objects and datasets are as unequally frequent as in the frames.",
+            "ECE: expected calibration error, NLL: mean negative log likelihood, both of all; means over the seeds.",
         ),
     )
 
@@ -80,9 +83,30 @@ def _cells(of_method: pd.DataFrame, datasets: Sequence[str]) -> dict[str, Cell |
 
 
 def _cell(rows: pd.DataFrame, metric: str, scale: float = 100) -> Cell | None:
-    value_R = rows_where(rows, metric=metric, concept=ALL).sort_values("seed")["value"].to_numpy() * scale
-    samples = int(rows_where(rows, metric="test_samples", concept=ALL)["value"].sum())
-    return cell_of_repeats(value_R, samples) if len(value_R) else None
+    value_R, samples_R = (
+        rows_where(rows, metric=name, concept=ALL).sort_values("seed")["value"].to_numpy(float)
+        for name in (metric, "test_samples")
+    )
+    if metric == "accuracy":
+        return cell_of_all_samples(scale * value_R, samples_R)
+    return cell_of_repeats(scale * value_R, int(samples_R.sum()))  # no mean over samples
+
+
+def _counts(table: TableBuilder, columns: Mapping[str, Column], conditions: Mapping[str, str]) -> list[str]:
+    """Return how many samples of how many seeds the accuracies are over, by initial poses where these differ."""
+    told: dict[str, list[str]] = {}
+    for source, words in conditions.items():
+        cells = {key: cell for (row, key), cell in table.cells.items() if table.rows[row][0][0] == source}
+        counts = [
+            f"{columns[key].title.removesuffix(' (%)')} {cells[key].test_samples} ({plural(cells[key].seeds, 'seed')})"
+            for key in columns
+            if key in cells and key not in ("ece", "nll")
+        ]
+        if counts:
+            told.setdefault(", ".join(counts), []).append(words)
+    if len(told) < 2:
+        return [f"Test samples: {counts}." for counts in told]
+    return [f"Test samples, {' and '.join(words)}: {counts}." for counts, words in told.items()]
 
 
 def _share(samples: pd.DataFrame, name: str) -> str:

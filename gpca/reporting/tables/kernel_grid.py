@@ -34,7 +34,7 @@ _NOTHING = ("kernels", "have no results", "run its sources and iterations first"
 _MEASURES = {  # Each measure of the grid has a column, and a factor to the column's unit.
     "accuracy": (Column("Accuracy (%)"), 100),
     "confidence": (Column("Confidence (%)"), 100),
-    "ece": (Column("ECE (%)", least_is_best=True), 100),
+    "ece": (Column("ECE (share)", decimals=3, limits=(0, 1), least_is_best=True), 1),
     "nll": (Column("NLL (nats)", decimals=3, limits=(0, inf), least_is_best=True), 1),
     "elbo": (Column("ELBO (nats)", decimals=3, limits=(-inf, inf)), 1),
 }
@@ -75,7 +75,7 @@ def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -
         column_head="measure",
         columns={measure: column for measure, (column, _) in _MEASURES.items()},
         footnotes=(
-            f"{mean_over(table.most_seeds(), test)}.",
+            f"{mean_over(table.most_seeds(), test)}. Bold: best accuracy and NLL of a dataset.",
             "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins. ELBO: per "
             "training sample. If the ELBO still rises from row to row and the confidence lies far below the "
             "accuracy, the fit was stopped before it had converged.",

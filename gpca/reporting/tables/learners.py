@@ -15,8 +15,10 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import INTERVAL, TableBuilder, cell_of_repeats
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, span
 from gpca.reporting.tables.diagnostics import (
+    AREA,
+    CALIBRATION,
     NOTHING,
     OF_DISTANCE,
     RHO,
@@ -28,7 +30,6 @@ from gpca.reporting.tables.diagnostics import (
     values_by_seed,
 )
 from gpca.reporting.tables.table import Cell, Column, Table
-from gpca.reporting.words import plural
 from gpca.shift.metrics import with_training_like
 
 if TYPE_CHECKING:
@@ -45,11 +46,11 @@ def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learn
     quantities = {
         "accuracy": ("accuracy", Column("Accuracy (%)")),
         "rho": (RHO, Column("ρ", **_RHO)),
-        "aurc": ("aurc_max_score", Column("AUC", **_AREA)),
-        "excess_aurc": ("excess_aurc_max_score", Column("E-AUC", **_AREA)),
+        "aurc": ("aurc_max_score", Column("AURC", **_AREA)),
+        "excess_aurc": ("excess_aurc_max_score", Column("E-AURC", **_AREA)),
         "augrc": ("augrc_max_score", Column("AUGRC", **_AREA)),
-        "ece": ("ece", Column("ECE", **_ERROR)),
-        "nll": ("nll", Column("NLL", decimals=3, limits=(0, inf), least_is_best=True)),
+        "ece": ("ece", Column("ECE (share)", **_ERROR)),
+        "nll": ("nll", Column("NLL (nats)", decimals=3, limits=(0, inf), least_is_best=True)),
         "brier": ("brier", Column("Brier", decimals=3, limits=(0, 2), least_is_best=True)),
     }
     picks = {key: ("in_distribution", metric) for key, (metric, _) in quantities.items()}
@@ -62,8 +63,8 @@ def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learn
         footnotes=(
             repeats_note(table, metrics),
             OF_DISTANCE,
-            "AUC: area under risk and coverage, the mean risk; E-AUC: AUC minus the least possible with as many "
-            "errors; AUGRC: mean share of undetected failures. ECE over 15 equally wide bins; NLL in nats.",
+            f"{AREA} E-AURC: AURC minus the least possible with as many errors; AUGRC: mean share of undetected "
+            f"failures. {CALIBRATION}",
         ),
     )
 
@@ -79,15 +80,18 @@ def table5_compact(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learne
         cells |= {key: _cell(metrics, one, learner, "in_distribution", name) for key, name in diagnostics.items()}
         table.add_row([(learner, title)], cells)
     table.require_rows(*NOTHING)
+    found = [source for source in sources if any(key == source for _, key in table.cells)]
     columns = {source: Column(f"{title_of(entry)} (%)") for source, entry in sources.items()}
-    columns |= {"rho": Column("ρ", **_RHO), "aurc": Column("AUC", **_AREA), "ece": Column("ECE", **_ERROR)}
+    columns |= {"rho": Column("ρ", **_RHO), "aurc": Column("AURC", **_AREA), "ece": Column("ECE (share)", **_ERROR)}
     table.compare_down(columns)
+    seeds = table.most_seeds()
+    samples = span(samples_of_seed(metrics, source, "in_distribution") for source in found)
     return table.build(
         caption=f"Accuracy of learners by dataset, and what their uncertainty is worth on {sources[one]['title']}"
         + stand_in_clause(sources.values()),
         column_head="quantity",
         columns=columns,
-        footnotes=(f"Mean over {plural(table.most_seeds(), 'seed')}; {INTERVAL}.", OF_DISTANCE),
+        footnotes=(f"{mean_over(seeds, samples)}. Bold: best of a column.", OF_DISTANCE, f"{AREA} {CALIBRATION}"),
     )
 
 
@@ -98,8 +102,8 @@ def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners
     for name, title in SHIFTED.items():
         columns |= {
             f"accuracy_{name}": Column(f"Acc., {title} (%)"),
-            f"ece_{name}": Column("ECE", **_ERROR),
-            f"rho_{name}": Column("ρ", **_RHO),
+            f"ece_{name}": Column(f"ECE, {title} (share)", **_ERROR),
+            f"rho_{name}": Column(f"ρ, {title}", **_RHO),
         }
         picks |= {
             f"accuracy_{name}": (name, "accuracy"),
@@ -115,7 +119,7 @@ def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners
         footnotes=(
             repeats_note(table, metrics),
             f"{OF_DISTANCE} It is taken over the shifted samples and those like the training's together.",
-            "Unseen objects: another encoder and other learners, which never saw some of the objects.",
+            f"Unseen objects: another encoder and other learners, which never saw some of the objects. {CALIBRATION}",
         ),
     )
 

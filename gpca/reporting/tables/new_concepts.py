@@ -5,7 +5,7 @@ Both read the tidy metrics of active learning, of which `pretrained` and `unseen
     metrics: The tidy metrics of ``active_learning.csv`` and ``new_concepts.csv``.
     sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
     conditions: The config's sections ``active_learning`` and ``new_concepts``, with the ``seeds`` that the latter was
-        run for, and ``test`` of its ``registrations``.
+        run for, ``test`` of its ``registrations``, and its section ``causes`` as ``of_causes``.
     InputError: The metrics hold none of these sources.
 """
 
@@ -16,11 +16,14 @@ from typing import TYPE_CHECKING
 
 from gpca.active_learning.metrics import TABLE
 from gpca.active_learning.settings import ALL_LABELS
+from gpca.causes.quotas import apportion
+from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.objects.title import title_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.active_learning import COUNT, Quantity, cell_of
 from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +36,7 @@ SEEN = {
     "self_supervised": "same samples, no labels",
     "pair": "nothing: measurements of the pair",
 }
-NEW_CAUSES = ("nominal", "geometry")
+NEW_CAUSES = (NOMINAL, GEOMETRY)
 PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
 _NOTHING = ("metrics", "have no results", "run new_concepts first")
 
@@ -42,14 +45,15 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
     """Return the labels that each new concept costs by what the samples are seen by, and what labels can give."""
     metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
     labels = {f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), PAPERS, c) for c in CONCEPTS}
-    random = {"labels_random": Quantity("labels_to_target", Column("random", **COUNT), "random")}
-    accuracies = {"all_labels": Quantity("final_accuracy", Column("All labels (%)"), ALL_LABELS)}
-    within = Column(f"Within {WITHIN} (%)", decimals=0, interval=False)
+    random = {"labels_random": Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")}
+    accuracies = {"all_labels": Quantity("final_accuracy", Column("Acc., pool labeled (%)"), ALL_LABELS)}
+    within = Column(f"Within {WITHIN} labels (%)", decimals=0, interval=False)
+    tests = tests_of_causes(conditions)
     of_causes = {}
     for cause in NEW_CAUSES:
-        of_causes[cause] = Quantity("final_accuracy", Column(f"{cause.capitalize()} (%)"), PAPERS, cause)
+        of_causes[cause] = Quantity("final_accuracy", Column(f"{cause.capitalize()}, BALD (%)"), PAPERS, cause)
         of_causes[f"{cause}_all"] = Quantity(
-            "final_accuracy", Column("all labels (%)", interval=False), ALL_LABELS, cause
+            "final_accuracy", Column(f"{cause.capitalize()}, pool labeled (%)", interval=False), ALL_LABELS, cause
         )
     table = TableBuilder("table15_new_concepts", {"source": "Dataset", "seen": "Encoder learned from"})
     for source, entry in sources.items():
@@ -60,7 +64,9 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
             cells = {key: cell_of(of_concepts, quantity, test) for key, quantity in (labels | random).items()}
             cells["within"] = _within(of_concepts, test)
             cells |= {key: cell_of(of_concepts, quantity, test) for key, quantity in accuracies.items()}
-            cells |= {key: cell_of(of_row, quantity, test) for key, quantity in of_causes.items()}
+            cells |= {
+                key: cell_of(of_row, quantity, tests[str(quantity.concept)]) for key, quantity in of_causes.items()
+            }
             table.add_row([(source, title_of(entry)), (setting, title)], cells, rival=setting != "pretrained")
     table.require_rows(*_NOTHING)
     table.compare_down([*labels, *random, "within", *NEW_CAUSES], same=1)
@@ -72,13 +78,16 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
         column_head="quantity",
         columns={key: column for key, column in columns.items() if any(found == key for _, found in table.cells)},
         footnotes=(
-            f"{mean_over(table.most_seeds(), conditions['test'])}.",
+            f"{mean_over(table.span_of_seeds(), conditions['test'])}; a dash stands for what was not run. Bold: best "
+            "of a dataset, the first row apart.",
             _protocol(conditions),
-            f"Labels: by BALD with k-means, for each concept as the new one; random: mean over the three. Within "
-            f"{WITHIN}: share of the runs that reached the target within {WITHIN} labels. All labels: accuracy when "
-            "the whole pool is labeled, mean over the three.",
-            "Nominal, Geometry: registrations with measured causes of objects that no method saw; accuracy over all "
-            "causes after all queries, and with the whole pool labeled. No encoder saw Geometry.",
+            "Labels: by BALD with k-means, for each concept as the new one, and by random choice, mean over the three. "
+            f"Within {WITHIN} labels: share of the runs that reached the target with so few. Pool labeled: accuracy "
+            "when the whole pool is labeled, mean over the three.",
+            "Nominal, Geometry: the new concept in registrations with measured causes, of objects that no method saw; "
+            "accuracy over all causes after all queries by BALD, and with the whole pool labeled. No encoder saw "
+            f"Geometry. Test samples of a seed: {tests[NOMINAL]}, with Geometry up to {tests[GEOMETRY]}, if any of its "
+            f"registrations fails by that{_fewer(table)}.",
         ),
     )
 
@@ -118,6 +127,25 @@ def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], condit
             "the start are right.",
         ),
     )
+
+
+def tests_of_causes(conditions: Mapping) -> dict[str, int]:
+    """Return how many test samples a seed has where a cause is the new concept: those with a label, and its own."""
+    causes = conditions["of_causes"]
+    labeled = apportion(causes["test"], causes["shares"])
+    judged = causes["test"] - labeled[BORDERLINE] - labeled[GEOMETRY]
+    return {NOMINAL: judged, GEOMETRY: judged + conditions["geometry_test"]}
+
+
+def _fewer(table: TableBuilder) -> str:
+    """Return the words on the datasets with fewer seeds of Geometry than of the rest, if there are any."""
+    most = table.most_seeds()
+    told = {
+        table.rows[row][0][1]: plural(cell.seeds, "seed")
+        for (row, key), cell in table.cells.items()
+        if key == GEOMETRY and cell.seeds < most
+    }
+    return f" ({', '.join(f'{title}: {seeds}' for title, seeds in told.items())})" if told else ""
 
 
 def _within(metrics: pd.DataFrame, test: int) -> Cell | None:

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 from gpca.comparison.readings import summarise
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where
+from gpca.reporting.tables.reading_words import reading_in_words
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = {"published": "Paper", "reproduced": "Here", "least": "Least", "most": "Most", "value": "Nearest"}
-_BEST = "Reading that is close to most of the group's numbers"
+_BEST = "Reading that is close to the most numbers"
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,9 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
     Raises:
         InputError: no missed number that a reading touches.
     """
-    heads = {"number": "Number", "group": "What is open", "where": "Printed number", "nearest": "Nearest reading"}
-    table = TableBuilder("table13_readings", {**heads, "close": "Close", "joint": _BEST})
+    heads = {"number": "Number", "unit": "Unit", "group": "What is open", "where": "Printed number"}
+    heads |= {"nearest": "Nearest reading", "close": "Readings that are close", "joint": _BEST}
+    table = TableBuilder("table13_readings", heads)
     for key, of_groups in summarise(judged).items():
         rows = rows_where(judged, **dict(zip(("table", "row", "column"), key, strict=True)))
         first = rows.iloc[0]
@@ -48,11 +50,12 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
             seeds = int(rows.loc[rows["group"] == group, "n"].max())
             labels = (
                 (" / ".join(key), ", ".join(key)),
+                (first["unit"], first["unit"]),
                 (group, groups.get(group, group)),
                 (of.where, of.where),
-                (of.nearest, of.nearest.replace("/", ", ")),
+                (of.nearest, reading_in_words(group, of.nearest)),
                 (f"{of.close}/{of.readings}", f"{of.close} of {of.readings}"),
-                (of.joint, f"{of.joint.replace('/', ', ')}: {of.fitted} of {of.touched}"),
+                (of.joint, f"{reading_in_words(group, of.joint)} ({of.fitted} of {of.touched})"),
             )
             numbers = {"published": first["published"], "reproduced": first["reproduced"]}
             numbers |= {"least": of.least, "most": of.most, "value": of.value}
@@ -61,12 +64,13 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
     table.require_rows("reading_verdicts.csv", "has no missed number", "nothing is missed")
     return table.build(
         "The numbers that are not reproduced, under other readings of what the paper leaves unstated"
-        + stand_in_clause(sources.values())
-        + ".",
+        + stand_in_clause(sources.values()),
         "value",
         {name: Plain(title, interval=False, limits=(-math.inf, math.inf)) for name, title in COLUMNS.items()},
         (
-            "Least, Most and Nearest are means over the seeds of single readings. Of a range, Paper is the lower end. "
-            "No reading is the reproduction.",
+            "Paper to Nearest are in the row's unit; Least, Most and Nearest are means over the seeds of single "
+            "readings. Of a range, Paper is the lower end. No reading is the reproduction.",
+            f"{_BEST}: of all printed numbers that the same choices touch, also those that are reproduced; in brackets "
+            "to how many of how many it is close.",
         ),
     )

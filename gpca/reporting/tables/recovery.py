@@ -7,9 +7,10 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.metrics import pool_share, wilson_interval
+from gpca.recovery.metrics import pool_share
 from gpca.reporting.tables.builder import TableBuilder, plain_cell
-from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.tables.shares import WILSON, share_cell
+from gpca.reporting.tables.table import Column, Table
 from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
@@ -69,21 +70,18 @@ def table8_recovery(
         },
         footnotes=(
             f"{failures} failures over {plural(seeds, 'seed')}: {failure_counts(metrics)}. A failure is a pose off by "
-            "more than 10 % of the diameter (ADD; ADD-S for symmetric objects) that is not off without its cause. ± is "
-            "half the width of the Wilson interval (95 %), whose bounds the CSV holds.",
+            "more than 10 % of the diameter (ADD; ADD-S for symmetric objects) that is not off without its cause. "
+            f"{WILSON}, as if all failures were independent; those on one rendered table are alike, so that it is "
+            "somewhat too narrow. Bold: best of a column.",
             f"Noise, Pose, Overlap: by cause, within {budget} actions. Wrong first: of the first actions, those that "
-            "are not the cause's own. Queued: left to a person instead. Taken for fine: failures that the policy "
-            "leaves as they are. Acts on fine: of registrations on the same tables whose pose is right, those that it "
-            "would change. Cost: of the actions on a failure, in right poses, as the config declares it. Seconds: of "
-            "explaining, acting and registering, per failure; the camera's and the robot's own times are not in them.",
+            "are not the cause's own; fixed by design where the action is always the same one. Queued: left to a "
+            "person instead. Taken for fine: failures that the policy leaves as they are. Acts on fine: of "
+            "registrations on the same tables whose pose is right, those that it would change. Cost: of all actions on "
+            "a failure, mean; the config sets that of each action, and a repaired pose is worth 1. Actions: their "
+            "number, mean. Seconds: of explaining, acting and registering, per failure; the camera's and the robot's "
+            "own times are not in them.",
         ),
     )
-
-
-def share_cell(share: float, trials: int, seeds: int) -> Cell:
-    """Return a share of pooled trials as a cell in %, with its Wilson interval."""
-    low, high = (100 * bound for bound in wilson_interval(share * trials, trials))
-    return Cell(100 * share, (high - low) / 2, seeds, trials, bounds=(low, high))
 
 
 def failure_counts(metrics: pd.DataFrame) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from gpca.files import whole_file
 
 EMPTY = "–"  # A dash stands where there is no number.
+LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.
 _COLUMN_CHARACTERS = 50  # So many fill one column of a two-column paper.
 _TEXT_CHARACTERS = 100  # So many fill both columns.
 _SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"
@@ -19,10 +20,11 @@ _SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{
 
 @dataclass(frozen=True)
 class Cell:
-    """Holds a mean over `seeds` repeats, the half-width of its 95 % t-interval (NaN for one seed), all test samples.
+    """Holds a mean over `seeds` repeats, the half-width of its 95 % t-interval, all test samples.
 
-    A mean that is `at_least` so large has no interval, since some repeats were stopped before they were done.
-    An interval that is not symmetric has `bounds` too.
+    The half-width is NaN where there is no interval, as over fewer than `LEAST_SEEDS`. A mean that is `at_least` so
+    large has none either, since some repeats were stopped before they were done. Another interval than that over the
+    seeds (a bootstrap's, Wilson's) has `bounds`, and is printed by these.
     """
 
     mean: float
@@ -35,11 +37,12 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """Says how one quantity is shown: its title, the digits after the point, with ± or without.
+    """Says how one quantity is shown: its title, the digits after the point, with an interval or without.
 
     `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them. Of some
     quantities, as the labels that were needed, the least is best. A column `beside` another has none of its own: its
-    cells stand with their sign in brackets behind the other's; the CSV holds both.
+    cells stand with their sign in brackets behind the other's; the CSV holds both. Of a quantity with a `heavy_tail`,
+    an interval wider than the mean is not printed, as it would reach below zero.
     """
 
     title: str
@@ -48,16 +51,19 @@ class Column:
     limits: tuple[float, float] = (0.0, 100.0)
     least_is_best: bool = False
     beside: str = ""
+    heavy_tail: bool = False
 
     def text(self, cell: Cell) -> str:
-        """Return e.g. ``97.7 ± 0.4``, or ``> 52.0``."""
-        mean = f"{cell.mean:{'+' if self.beside else ''}.{self.decimals}f}"
+        """Return e.g. ``97.7 ± 0.4``, ``97.7 (96.9 to 98.2)`` or ``> 52.0``; beside another ``+1.2; 0.4 to 1.9``."""
+        mean = f"{cell.mean:{'+' if self.beside else ''}z.{self.decimals}f}"
         if cell.at_least:
             return f"> {mean}"
-        if not self.interval:
+        if not self.interval or math.isnan(cell.half_width) or (self.heavy_tail and cell.half_width > cell.mean):
             return mean
-        half_width = EMPTY if math.isnan(cell.half_width) else f"{cell.half_width:.{self.decimals}f}"
-        return f"{mean} ± {half_width}"
+        if cell.bounds:
+            bounds = " to ".join(f"{bound:z.{self.decimals}f}" for bound in cell.bounds)
+            return f"{mean}; {bounds}" if self.beside else f"{mean} ({bounds})"
+        return f"{mean} ± {cell.half_width:.{self.decimals}f}"
 
 
 @dataclass(frozen=True)
@@ -89,18 +95,22 @@ class Table:
     def best(self) -> set[tuple[int, str]]:
         """Return the keys of the cells with the best printed mean of their group.
 
-        None are of a group of one, nor where more than half of a large group share the best: that tells nothing apart.
+        None are of a group of one, nor where all share the best, or more than half of a large group: that tells nothing
+        apart. A mean over fewer seeds than an interval takes is never the best.
         """
         best: set[tuple[int, str]] = set()
         for group in self.compared:
             cells = {key: self.cells[key] for key in group if key in self.cells}
             printed = {
-                key: round(cell.mean, self.columns[key[1]].decimals) for key, cell in cells.items() if not cell.at_least
+                key: round(cell.mean, self.columns[key[1]].decimals)
+                for key, cell in cells.items()
+                if not cell.at_least and (cell.seeds >= LEAST_SEEDS or cell.bounds)
             }
             if printed and len(cells) > 1:
                 choose = min if self.columns[next(iter(printed))[1]].least_is_best else max
                 chosen = {key for key, mean in printed.items() if mean == choose(printed.values())}
-                best |= chosen if len(chosen) <= 5 or 2 * len(chosen) <= len(cells) else set()
+                tells_apart = len(chosen) < len(cells) and (len(chosen) <= 5 or 2 * len(chosen) <= len(cells))
+                best |= chosen if tells_apart else set()
         return best
 
     def write(self, csv_path: str | Path, md_path: str | Path, tex_path: str | Path) -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.errors import InputError
-from gpca.reporting.figures.active_learning import draw_learning_curves, mean_curves
+from gpca.reporting.figures.active_learning import STYLES, draw_learning_curves, mean_curves
 from gpca.reporting.figures.query import draw_query
 
 TITLES = {"random": "Random", "bald_kmeans": "BALD + k-means", "mine": "Mine"}
@@ -43,6 +43,19 @@ def test_curves_are_means_over_concepts_and_intervals_over_seeds(files):
     assert curve["mean"].tolist() == pytest.approx([56, 66, 76, 86])
     # Two seeds 2 points apart: s = √2, t_1 = 12.706.
     assert (curve["high"] - curve["mean"]).tolist() == pytest.approx([12.706] * 4, abs=1e-3)
+    assert curve["seeds"].tolist() == [2] * 4
+
+
+def test_the_target_is_named_and_the_seeds_are_counted(files, tmp_path, figures):
+    draw_learning_curves(files, SOURCES, TITLES, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
+    [figure] = figures
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [*TITLES.values(), "target (90 %)"]
+    assert [text.get_text() for text in figure.texts] == ["Means over 2 seeds"]
+
+
+def test_no_two_strategies_look_alike():
+    looks = [(colour, line) for colour, line, _ in STYLES.values()]
+    assert len(set(looks)) == len(looks)
 
 
 def test_the_figure_is_the_same_bytes_each_time(files, tmp_path):

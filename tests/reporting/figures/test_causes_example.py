@@ -8,7 +8,7 @@ from gpca.causes.truth import FAILED
 from gpca.errors import InputError
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
-from gpca.reporting.figures.causes_example import choose_sample, draw_causes_example
+from gpca.reporting.figures.causes_example import GAP, TRUTH, _draw_scores, choose_sample, draw_causes_example
 
 from ...conftest import FEW_CAUSES, FOUR
 from ...diagnosis.files import write_run
@@ -32,6 +32,17 @@ def test_the_sample_shown_failed_by_as_many_causes_as_any(causes):
     assert causes.truth.causes[row].sum() == causes.truth.causes[failed].sum(axis=1).max()
     with pytest.raises(InputError, match="has no failed test sample"):
         choose_sample(causes.subset(causes.rows("train")), "causes.npz")
+
+
+def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row_is_bold():
+    import matplotlib.pyplot as plt
+
+    figure, panel = plt.subplots()
+    numbers = np.array([[0.0, 0.5, 0.3, 0.2], [0.1, 0.2, 0.9, 0.8], [0.7, 0.1, 0.1, 0.1]])
+    _draw_scores(panel, [TRUTH, "Multi-label", "Right"], numbers)
+    assert panel.get_yticks().tolist() == [0, 1 + GAP, 2 + GAP]
+    assert [text.get_text() for text in panel.texts if text.get_fontweight() == "bold"] == ["0.50", "0.90", "0.70"]
+    plt.close(figure)
 
 
 def test_the_figure_is_the_same_bytes_each_time(causes, tmp_path):

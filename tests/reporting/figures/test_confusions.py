@@ -76,6 +76,17 @@ def test_bars_are_the_shares_of_all_samples_and_dashes_the_truth():
     assert [label.get_text() for label in axes.get_xticklabels()] == ["N", "P", "O", "–"]
 
 
+def test_where_none_abstains_there_is_no_bar_and_no_word_for_it(tmp_path, figures):
+    rows = records("ycb", "explainer_0", COUNTS * [1, 1, 1, 0])
+    rows_of_others = records("cup", "other", COUNTS)
+    for name, part in (("none", rows), ("others", rows + rows_of_others)):
+        write_metrics(tidy(part), tmp_path / f"{name}.csv")
+        draw_confusions_figure(tmp_path / f"{name}.csv", SOURCES, EXPLAINERS, tmp_path / "a.pdf", tmp_path / "a.png")
+        figure = figures.pop()
+        assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["N", "P", "O"]
+        assert not [text for text in figure.texts if "abstained" in text.get_text()]
+
+
 def test_letters_tell_concepts_apart():
     assert letters(["noise", "pose", "overlap"]) == ["N", "P", "O"]
     assert letters(["pose", "position", "noise"]) == ["Pose", "Posi", "Nois"]

@@ -8,7 +8,7 @@ from gpca.controls.intervals import COLUMNS as INTERVALS
 from gpca.controls.severity import COLUMNS as SEVERITIES
 from gpca.controls.severity import REGISTRATION
 from gpca.errors import InputError
-from gpca.reporting.figures.severity_curves import draw_severity_curves
+from gpca.reporting.figures.severity_curves import SUCCEEDS, draw_severity_curves
 from gpca.reporting.figures.transfer import draw_transfer
 
 EXPLAINERS = {"good": "Good", "poor": "Poor (forest)"}
@@ -49,6 +49,30 @@ def test_a_figure_is_the_same_bytes_each_time(draw, numbers, tmp_path):
         written.append([file.read_bytes() for file in files])
     assert written[0] == written[1]
     assert all(len(data) > 2000 for data in written[0])
+
+
+def test_severities_have_scales_of_their_values_and_success_lies_on_top(tmp_path, figures):
+    frame = severities()
+    draw_severity_curves(frame, EXPLAINERS, "Title", tmp_path / "a.pdf", tmp_path / "a.png")
+    [figure] = figures
+    noise, _, *maps = figure.axes
+    assert noise.get_ylim()[0] == 30  # the least value is 40 %
+    assert noise.get_lines()[-1].get_label() == SUCCEEDS
+    looks = {(line.get_color(), str(line.get_linestyle()), line.get_marker()) for line in noise.get_lines()}
+    assert len(looks) == len(noise.get_lines()) == 3
+    [mesh] = maps[0].collections
+    assert mesh.get_clim() == (30, 100)
+
+
+def test_a_map_with_none_below_it_has_numbers_on_its_axis(tmp_path, figures):
+    names = [f"explainer_{i}" for i in range(5)]
+    parts = [severities()] + [severities().query("method == 'good'").assign(method=name) for name in names]
+    draw_severity_curves(
+        pd.concat(parts), dict(zip(names, names, strict=True)), "Title", tmp_path / "a", tmp_path / "b"
+    )
+    maps = [axes for axes in figures[0].axes[2:] if axes.get_visible()][:6]
+    shown = [axes.xaxis.get_tick_params()["labelbottom"] for axes in maps]
+    assert shown == [False, False, True, True, True, True]
 
 
 @pytest.mark.parametrize(("draw", "numbers"), DRAWN)

@@ -1,12 +1,15 @@
 """The figure of estimators."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import chi2
 
 from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.reporting.figures.estimators import LEVELS, coverages, draw_estimators, ellipse
+from gpca.reporting.figures.estimator_ellipses import STYLES, WIDEST, draw_ellipses, ellipse
+from gpca.reporting.figures.estimators import LEVELS, coverages, draw_estimators
+from gpca.reporting.figures.style import GREY
 from gpca.trials.covariances import ReferenceSamples, covariance_columns, read_estimate_files
 
 ESTIMATORS, METHODS = {"censi": "Censi", "own": "Own"}, {"point_to_point": "ICP"}
@@ -14,8 +17,6 @@ ESTIMATORS, METHODS = {"censi": "Censi", "own": "Own"}, {"point_to_point": "ICP"
 
 @pytest.fixture
 def files(tmp_path):
-    import pandas as pd
-
     random = np.random.default_rng(0)
     frame = pd.DataFrame(
         {
@@ -57,6 +58,47 @@ def test_samples_without_their_estimates_are_refused(files, tmp_path):
     paths, samples = files
     with pytest.raises(InputError, match="has no estimates of cups, seed 0"):
         drawn((paths[1:], samples), tmp_path)
+
+
+def test_the_reference_is_seen_above_and_the_axes_are_named(files, tmp_path, figures):
+    paths, samples = files
+    outputs = tmp_path / "a.pdf", tmp_path / "a.png"
+    draw_estimators(read_estimate_files(paths), samples, ESTIMATORS, METHODS, "Cups", *outputs)
+    [figure] = figures
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["Reference", "Censi", "Own", "the reference's results", "true pose", "succeeded", "failed"]
+    upper = figure.axes[:4]
+    assert [panel.get_ylabel() for panel in upper] == [
+        f"second axis ({unit})" for unit in ("degrees", "% of the diameter") * 2
+    ]
+    assert all(GREY in [line.get_color() for line in panel.get_lines()] for panel in upper)
+    sides = {panel.get_title(): [text.get_text() for text in panel.texts] for panel in figure.axes[4:]}
+    assert sides["Reference"] == ["too confident", "too cautious"]  # above the diagonal, and below
+    assert sides["Coverage"] == ["too cautious"]  # above it
+
+
+def test_estimators_of_one_color_differ_in_their_line():
+    looks = [(colour, str(line)) for colour, line in STYLES.values()]
+    assert len(set(looks)) == len(looks)
+    assert STYLES["bayesian_icp"][0] != STYLES["stein_icp"][0]
+
+
+@pytest.mark.parametrize(("times", "whole"), [(1.5, True), (10.0, False)])
+def test_a_panel_holds_whole_ellipses_unless_they_are_far_wider(times, whole):
+    import matplotlib.pyplot as plt
+
+    random = np.random.default_rng(0)
+    twists = random.normal(size=(400, 6))
+    samples = ReferenceSamples(np.array([0]), np.array(["icp"]), twists, np.array([0, 400]), np.zeros((1, 6)))
+    deviation = times * 2.6 / np.sqrt(-2 * np.log(0.05))  # of an ellipse that is so many times as wide as the dots
+    row = pd.Series(covariance_columns(deviation**2 * np.eye(6)))
+    figure, panel = plt.subplots()
+    draw_ellipses(panel, samples, 0, {"own": row, "censi": None}, slice(0, 3), 1.0)
+    [outline, _] = panel.get_lines()
+    widest, edge = np.abs(outline.get_xydata()).max(), panel.get_xlim()[1]
+    assert (widest < edge) == whole
+    assert edge < 1.1 * WIDEST * 3.0
+    plt.close(figure)
 
 
 def test_an_ellipse_holds_what_it_says():

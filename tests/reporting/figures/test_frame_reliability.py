@@ -31,7 +31,7 @@ def test_a_panel_is_a_method_with_all_seeds_and_its_calibration_error(tmp_path, 
     methods = {"dgcnn-none": "DGCNN", "lost-none": "Lost", "gpca_pair": "Pair"}
     out = tmp_path / "out.pdf", tmp_path / "out.png"
     frame_reliability.draw_frame_reliability(files, methods, "Frames", *out)
-    assert [title for title in titles if title] == ["DGCNN\nECE 0.000", "Pair\nECE 0.100"]
+    assert [title for title in titles if title] == ["DGCNN\npooled ECE 0.000", "Pair\npooled ECE 0.100"]
     assert all(path.stat().st_size > 0 for path in out)
     with pytest.raises(InputError, match="cover none of these methods"):
         frame_reliability.draw_frame_reliability(files, {"lost-none": "Lost"}, "Frames", *out)

@@ -60,15 +60,9 @@ def test_without_predictions_nothing_is_drawn(learned, draw, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def drawn_by(draw, learned, tmp_path, monkeypatch):
-    figures = []
-    monkeypatch.setattr(style, "save_png", lambda figure, path: figures.append(figure))
-    draw(learned, SOURCES, LEARNERS, tmp_path / "a.pdf", tmp_path / "a.png")
-    return figures[0]
-
-
-def test_rho_is_the_tables_alone_and_with_each_shift(learned, tmp_path, monkeypatch):
-    figure = drawn_by(draw_uncertainty_vs_distance, learned, tmp_path, monkeypatch)
+def test_rho_is_the_tables_alone_and_with_each_shift(learned, tmp_path, figures):
+    draw_uncertainty_vs_distance(learned, SOURCES, LEARNERS, tmp_path / "a.pdf", tmp_path / "a.png")
+    [figure] = figures
     written = [[text.get_text() for text in panel.texts] for panel in figure.axes]
     names = ("in_distribution", "in_distribution+severity", "seen_objects+objects")  # There is no other source.
     assert len(figure.axes) == len(names) * len(SOURCES)
@@ -76,15 +70,36 @@ def test_rho_is_the_tables_alone_and_with_each_shift(learned, tmp_path, monkeypa
     for row, name in enumerate(names):
         for column, source in enumerate(SOURCES):
             expected = uncertainty_metrics(sets_of(learned[source, "gpca", 0])[name])[rho]
-            assert f"{expected:.3f}" in written[2 * row + column], (name, source)
+            assert f"a {expected:.3f}" in written[2 * row + column], (name, source)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["a: GPC", "2 others"]
 
 
 @pytest.mark.parametrize("draw", [draw_coverage_risk, draw_uncertainty_vs_distance])
-def test_the_papers_learners_have_a_colour_and_the_others_are_grey(learned, draw, tmp_path, monkeypatch):
-    figure = drawn_by(draw, learned, tmp_path, monkeypatch)
+def test_the_papers_learners_have_a_colour_and_the_others_are_grey(learned, draw, tmp_path, figures):
+    draw(learned, SOURCES, LEARNERS, tmp_path / "a.pdf", tmp_path / "a.png")
+    [figure] = figures
     colours = [line.get_color() for line in figure.axes[0].get_lines()]
     assert colours == [style.LIGHT_GREY, style.LIGHT_GREY, style.BLUE]  # in the order of drawing
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["GPC", "2 others"]
+    assert [text.get_text()[-8:] for text in figure.legends[0].get_texts()] == [
+        "GPC" if draw is draw_coverage_risk else "a: GPC",
+        "2 others",
+    ]
+
+
+def test_curves_of_risk_start_where_a_tenth_is_covered_and_a_panel_without_errors_says_so(learned, tmp_path, figures):
+    right = {
+        key: rows.assign(concept_predicted=rows["concept_true"], abstained=False) if key[0] == "cups" else rows
+        for key, rows in learned.items()
+    }
+    wrong = {
+        key: rows.assign(concept_predicted="none", abstained=False) if key[0] == "parts" else rows
+        for key, rows in right.items()
+    }
+    draw_coverage_risk(wrong, SOURCES, LEARNERS, tmp_path / "a.pdf", tmp_path / "a.png")
+    cups, parts = figures[0].axes
+    assert [text.get_text() for text in cups.texts] == ["no errors"]
+    assert not parts.texts
+    assert all(line.get_xdata()[0] == 10 for line in parts.get_lines())
 
 
 def test_bins_of_distance_hold_equally_many_samples():

@@ -51,6 +51,7 @@ def test_a_line_is_drawn_for_each_embedding_and_a_row_for_each_kind_of_concept(f
     rows = [text for text in written if "new: " in text]
     assert len(rows) == 2
     assert any("nominal" in text for text in rows)
+    assert {"Means over 1 seed", "target (90 %)"} <= set(written)
 
 
 def test_without_a_curve_nothing_is_drawn(files, tmp_path):

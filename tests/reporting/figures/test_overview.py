@@ -4,7 +4,7 @@ from gpca.errors import InputError
 from gpca.reporting.figures.overview import draw_overview
 from gpca.reporting.figures.shown_sample import Stages
 
-TREATMENTS = {"noise": "denoise", "pose": "reinitialise", "overlap": "new_view"}
+TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}
 
 
 def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_files, tmp_path, written):
@@ -24,7 +24,7 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
     assert f"aligned: {stages.words(row, 'icp')}" in written
     assert any(f"{100 * of.severity_translation[row]:.0f} % $d$" in words for words in written)
     assert f"Solids (procedural stand-in): {of.object_name[row]}" in written
-    assert "Act on pose:\nReinitialise ICP" in written
+    assert "Act on pose:\nReinitialize ICP" in written
     assert r"$\mathbf{h} \in \mathbb{R}^{12}$" in written
 
 

@@ -15,7 +15,12 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.reporting.figures.frame_views import draw_scores, read_samples
 from gpca.reporting.figures.real_world_confusions import draw_real_world_confusions
-from gpca.reporting.figures.real_world_example import choose_sample, covered, draw_real_world_example
+from gpca.reporting.figures.real_world_example import (
+    choose_sample,
+    covered,
+    draw_real_world_example,
+    title_of_frame,
+)
 from gpca.reporting.figures.real_world_failures import _mistakes, draw_real_world_failures
 
 
@@ -79,6 +84,19 @@ def test_fig5_shows_an_object_that_is_large_in_its_image():
         {**rows, "instance": range(5), "sample": range(5), "score_overlap": [0.9, 0.8, 0.7, 0.6, 0.5]}
     )
     assert choose_sample(samples, "predictions", np.array([100, 3, 200, 1, 300])) == 2  # the median of 0, 2 and 4
+
+
+@pytest.mark.parametrize(
+    ("name", "title"),
+    [
+        ("ycbv obj_000002", "YCB-Video frame"),
+        ("lmo obj_000001", "YCB-Video and LINEMOD frames"),
+        ("mine obj_000001", "YCB-Video and LINEMOD frames"),
+        ("mug", "YCB-Video and LINEMOD frames"),
+    ],
+)
+def test_fig5_names_the_dataset_of_its_frame_where_it_is_known(name, title):
+    assert title_of_frame(name, "YCB-Video and LINEMOD frames") == title
 
 
 def test_what_is_covered_is_what_lies_not_between_the_points_that_were_kept():

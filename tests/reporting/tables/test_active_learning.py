@@ -73,6 +73,11 @@ def test_table3_states_its_conditions(metrics):
     assert "Mean over 3 seeds, 200 test samples each" in markdown
 
 
+def test_without_a_rare_share_nothing_is_said_of_it(metrics):
+    table = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS | {"rare_share": None})
+    assert not [note for note in table.footnotes if note.startswith("Rare")]
+
+
 def test_the_csv_marks_lower_bounds(metrics):
     records = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).records()
     assert ("ycb", "pretrained", "labels_random", 48.0, "", "", 3, 600, True) in records

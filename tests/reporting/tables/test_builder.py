@@ -7,12 +7,14 @@ from gpca.errors import InputError
 from gpca.reporting.tables.builder import (
     INTERVAL,
     TableBuilder,
+    cell_of_all_samples,
     cell_of_repeats,
     mean_over,
     plain_cell,
     rows_where,
+    span,
 )
-from gpca.reporting.tables.table import Column
+from gpca.reporting.tables.table import Cell, Column
 
 HEADS = {"source": "Dataset", "explainer": "Explainer"}
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}, "linemod": {"title": "LINEMOD", "stand_in": False}}
@@ -51,7 +53,7 @@ def test_a_table_has_the_rows_and_cells_that_were_added_in_their_order(builder):
     assert table.cells[1, "b"].mean == 95
     assert (2, "b") not in table.cells
     assert table.footnotes == ("n",)
-    assert "| YCB | Shap | 80.0 ± – | – |" in table.markdown()
+    assert "| YCB | Shap | 80.0 | – |" in table.markdown()
 
 
 def test_a_row_without_any_cell_is_left_out(builder):
@@ -111,10 +113,62 @@ def test_a_cell_of_repeats_has_their_mean_and_t_interval():
     assert cell_of_repeats(pd.Series([1.0, 2.0]), 2, at_least=True).at_least
 
 
-def test_one_repeat_has_no_interval_and_none_makes_no_cell():
+def test_fewer_than_three_repeats_have_no_interval_and_none_makes_no_cell():
     assert math.isnan(cell_of_repeats([5.0], 200).half_width)
+    assert math.isnan(cell_of_repeats([5.0, 6.0], 400).half_width)
+    assert cell_of_repeats([5.0, 6.0], 400).mean == 5.5
     assert cell_of_repeats([], 200) is None
     assert math.isnan(plain_cell(0.25, 3, 600).half_width)
+
+
+def test_a_mean_over_all_samples_lies_between_those_of_its_parts():
+    seen, unseen = cell_of_all_samples([80, 90, 70], [10, 30, 20]), cell_of_all_samples([60, 50, 65], [20, 10, 30])
+    every = cell_of_all_samples([200 / 3, 80, 67], [30, 40, 50])
+    assert (seen.mean, seen.seeds, seen.test_samples) == (pytest.approx(4900 / 60), 3, 60)
+    assert unseen.mean < every.mean < seen.mean
+    assert every.mean == pytest.approx((seen.mean + unseen.mean) / 2)
+    assert cell_of_all_samples([], []) is None
+
+
+def test_with_equally_many_samples_it_is_the_mean_of_the_seeds_with_its_interval():
+    alike, usual = cell_of_all_samples([97.0, 98.0, 99.5], [200] * 3), cell_of_repeats([97.0, 98.0, 99.5], 600)
+    assert (alike.mean, alike.half_width) == (pytest.approx(usual.mean), pytest.approx(usual.half_width))
+    few = cell_of_all_samples([0.0, 98.0, 99.0], [1, 300, 300])  # a seed with hardly a sample says hardly anything
+    assert few.half_width < 3
+
+
+def test_an_interval_has_its_bounds_where_it_is_not_that_over_the_seeds():
+    cell = Cell(76.9, 10.8, 1, 200, bounds=(64.9, 86.3))
+    assert Column("A").text(cell) == "76.9 (64.9 to 86.3)"
+    assert Column("A", interval=False).text(cell) == "76.9"
+    change = Column("A", limits=(-100, 100), beside="b")
+    assert change.text(Cell(-21.7, 10.8, 1, 200, bounds=(-34.2, -12.5))) == "-21.7; -34.2 to -12.5"
+    assert change.text(Cell(1.25, 0.5, 3, 600)) == "+1.2 ± 0.5"
+    assert change.text(Cell(-0.01, 0.02, 1, 200, bounds=(-0.03, 0.01))) == "+0.0; 0.0 to 0.0"  # and no -0.0
+
+
+def test_an_interval_wider_than_a_mean_with_a_heavy_tail_is_not_printed():
+    heavy = Column("KL", 2, limits=(0, math.inf), heavy_tail=True)
+    assert heavy.text(Cell(7.56, 7.02, 5, 100)) == "7.56 ± 7.02"
+    assert heavy.text(Cell(658.3, 1239.3, 5, 100)) == "658.30"
+    assert Column("A").text(Cell(1.0, 2.0, 5, 100)) == "1.0 ± 2.0"
+
+
+def test_means_over_few_seeds_are_not_bold_but_those_with_an_interval_of_their_own():
+    builder = TableBuilder("table9", HEADS)
+    for name, bounds in (("gpca", None), ("shap", None), ("forest", (1.0, 9.0)), ("svm", (0.0, 5.0))):
+        labels_of = labels("ycb" if bounds is None else "linemod", name)
+        builder.add_row(labels_of, {"a": Cell(len(name), 1.0, 2, 400, bounds=bounds)})
+    builder.compare_down(["a"], same=1)
+    assert built(builder).best() == {(2, "a")}
+
+
+def test_what_all_of_a_group_share_is_not_bold():
+    builder = TableBuilder("table9", HEADS)
+    builder.add_row(labels("ycb", "gpca"), cells(a=4, b=4))
+    builder.add_row(labels("ycb", "shap"), cells(a=4, b=5))
+    builder.compare_across("ab")
+    assert built(builder).best() == {(1, "b")}
 
 
 def test_rows_are_found_by_all_that_is_wanted():
@@ -125,14 +179,28 @@ def test_rows_are_found_by_all_that_is_wanted():
     assert len(rows_where(frame)) == 3
 
 
+NONE = "with fewer than 3 there is no interval and no bold"
+
+
 @pytest.mark.parametrize(
     ("seeds", "samples", "words"),
     [
-        (1, 200, "Mean over 1 seed, 200 test samples each"),
-        ("1", "200", "Mean over 1 seed, 200 test samples each"),
-        (5, 200, "Mean over 5 seeds, 200 test samples each"),
-        ("2 to 3", "60 to 200", "Mean over 2 to 3 seeds, 60 to 200 test samples each"),
+        (1, 200, f"Mean over 1 seed, 200 test samples each; {NONE}"),
+        ("2", "200", f"Mean over 2 seeds, 200 test samples each; {NONE}"),
+        (5, 200, f"Mean over 5 seeds, 200 test samples each; {INTERVAL}"),
+        (
+            "2 to 3",
+            "60 to 200",
+            f"Mean over 2 to 3 seeds, 60 to 200 test samples each; {INTERVAL} (none for fewer than 3)",
+        ),
     ],
 )
 def test_the_footnote_counts_seeds_and_samples(seeds, samples, words):
-    assert mean_over(seeds, samples) == f"{words}; {INTERVAL}"
+    assert mean_over(seeds, samples) == words
+
+
+def test_the_seeds_and_samples_of_cells_are_told_as_a_span(builder):
+    assert builder.span_of_seeds() == "3"
+    builder.add_row(labels("cups", "gpca"), {"a": plain_cell(1, 5, 10), "b": plain_cell(1, 2, 10)})
+    assert builder.span_of_seeds() == "2 to 5"
+    assert (span([7.0, 7.0]), span([60, 15, 30])) == ("7", "15 to 60")

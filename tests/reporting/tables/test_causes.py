@@ -13,8 +13,9 @@ EXPLAINERS = {"good": "Good", "poor": "Poor", "gate": "Gate"}
 
 
 def rows(source, method, rival, **values):
+    samples = {"false_alarm_rate": 90, "dominant_accuracy": 160}
     return [
-        (source, method, metric, 300, 5, value, value - 0.1, value + 0.05, rival, 0.2, 0.15, 0.3)
+        (source, method, metric, samples.get(metric, 250), 5, value, value - 0.1, value + 0.05, rival, 0.2, 0.15, 0.3)
         for metric, value in values.items()
     ]
 
@@ -36,10 +37,28 @@ def intervals():
 def test_the_best_rival_is_bold_and_the_ceiling_is_none(intervals):
     table = table9_causes(intervals, SOURCES, EXPLAINERS)
     text = table.markdown()
-    assert "| YCB (procedural stand-in) | Good | **80.0 ± 7.5** | 20.0 ± 7.5 |" in text
-    assert "| All together | Truth from other starts (ceiling) | 95.0 ± 7.5 | – |" in text
-    assert "**10.0 ± 7.5**" in text and "**40.0 ± 7.5**" not in text  # the fewest false alarms
-    assert "Gate | – | – | – | 30.0 ± 7.5 | 0.750 ± 0.075 |" in text
+    assert "| YCB (procedural stand-in) | Good | **80.0 (70.0 to 85.0)** | 20.0 (15.0 to 30.0) |" in text
+    assert "| All together | Truth from other starts (ceiling) | 95.0 (85.0 to 100.0) | – |" in text
+    assert "**10.0 (0.0 to 15.0)**" in text and "**40.0 (30.0 to 45.0)**" not in text  # the fewest false alarms
+    assert "Gate | – | – | – | 30.0 (20.0 to 35.0) | 0.750 (0.650 to 0.800) |" in text
+
+
+def test_what_is_judged_is_counted_by_measure(intervals):
+    table = table9_causes(intervals, SOURCES, EXPLAINERS)
+    assert table.cells[0, "samples"].mean == 250
+    assert table.cells[0, "false_alarm_rate"].test_samples == 90
+    assert table.footnotes[0].startswith("n: test samples that are judged, over 5 seeds; borderline ones are left out.")
+    assert "Of them, 90 are nominal and 160 failed on YCB (procedural stand-in)." in table.footnotes[0]
+    twice = pd.concat([intervals, intervals[intervals["source"] == "ycb"].assign(source="cups")])
+    of_both = table9_causes(twice, SOURCES | {"cups": {"title": "Cups", "stand_in": False}}, EXPLAINERS)
+    assert "90 are nominal and 160 failed on each dataset." in of_both.footnotes[0]
+
+
+def test_the_calibration_error_is_a_share(intervals):
+    found = rows("ycb", "good", "poor", nominal_calibration=0.0284)
+    both = pd.concat([intervals, pd.DataFrame(found, columns=list(COLUMNS))])
+    text = table9_causes(both, SOURCES, EXPLAINERS).markdown()
+    assert "| ECE (share) | n |" in text and "| 0.028 | 250 |" in text
 
 
 def test_the_bounds_in_the_csv_are_those_of_the_bootstrap(intervals):
@@ -65,7 +84,8 @@ def test_frames_are_counted_below_the_table(intervals):
     of_frames = pd.concat([intervals, pd.DataFrame(found, columns=list(COLUMNS))])
     table = table9_frames(of_frames, {"title": "Frames", "stand_in": False}, EXPLAINERS)
     text = table.markdown()
-    assert "| Good | **80.0 ± 7.5** | **60.0 ± 7.5** |" in text
+    assert "| Good | **80.0 (70.0 to 85.0)** | **60.0 (50.0 to 65.0)** |" in text
+    assert "a share of the 120 nominal; Dominant, Spearman and Deletion are over the 50 failed." in text
     assert "Of 300 registrations 120 are nominal, 130 borderline, and 50 failed: 6 mostly by noise, 30" in text
     assert "naming pose would be right for 60 % of the failed" in text
     assert "over 13 scenes, 32 objects and" in text

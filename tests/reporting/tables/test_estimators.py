@@ -17,7 +17,7 @@ def records(metric, value, step=0.01):
         for source in SOURCES
         for name in ("reference", *ESTIMATORS)
         for method in METHODS
-        for seed in range(2)
+        for seed in range(3)
     ]
 
 
@@ -48,9 +48,9 @@ def test_methods_stand_apart_and_the_reference_comes_first(metrics, seconds):
 
 def test_sources_count_by_their_registrations(metrics, seconds):
     cell = made(metrics, seconds).cells[2, "kl_rotation"]  # Brossard's: 2 and, of a quarter, 4
-    assert cell.mean == pytest.approx(2.5 + 0.005)
-    assert (cell.seeds, cell.test_samples) == (2, 80)
-    assert made(metrics, seconds).cells[2, "milliseconds"].mean == pytest.approx(25)
+    assert cell.mean == pytest.approx(2.5 + 0.01)
+    assert (cell.seeds, cell.test_samples) == (3, 120)
+    assert made(metrics, seconds).cells[2, "milliseconds"].mean == pytest.approx(30)
 
 
 def test_the_reference_has_no_divergence_and_competes_with_none(metrics, seconds):
@@ -59,16 +59,28 @@ def test_the_reference_has_no_divergence_and_competes_with_none(metrics, seconds
     assert table.best() == {(2, "kl_rotation"), (5, "kl_rotation"), (1, "auroc_failed"), (4, "auroc_failed")}
 
 
-def test_what_an_estimator_refuses_is_a_dash_and_counted(metrics, seconds):
+def test_an_estimator_that_refuses_all_has_no_row_and_is_named(metrics, seconds):
     refused = (metrics["method"] == "censi") & ~metrics["metric"].isin(["no_estimate", "test_samples"])
-    table = made(metrics[~refused], seconds)
-    assert (1, "nees") not in table.cells
-    assert (1, "no_estimate") in table.cells
+    table = made(metrics[~(refused & (metrics["concept"] == "point_to_plane"))], seconds)
+    assert [labels[1][0] for labels in table.rows] == ["reference", "censi", "brossard", "reference", "brossard"]
+    assert "Left out, as they refuse every registration: Censi, of Plane." in table.markdown()
+    assert "Left out" not in made(metrics, seconds).markdown()
+
+
+def test_an_interval_beyond_the_value_of_a_divergence_is_left_out(metrics, seconds):
+    wide = (metrics["metric"] == "kl_rotation") & (metrics["seed"] == 2) & (metrics["method"] == "brossard")
+    metrics.loc[wide, "value"] *= 100
+    table = made(metrics, seconds)
+    assert table.cells[2, "kl_rotation"].half_width > table.cells[2, "kl_rotation"].mean
+    assert "| Brossard | 85.67 | – |" in table.markdown()
+    [record] = [r for r in table.records() if r[:3] == ("point_to_point", "brossard", "kl_rotation")]
+    assert record[4] == 0 and record[5] > 2 * record[3]  # the CSV has it
 
 
 def test_the_notes_say_what_was_counted(metrics, seconds):
     text = made(metrics, seconds).markdown()
-    assert "Mean over 2 seeds, 40 by ICP, 40 by Plane registrations each" in text
+    assert "Mean over 3 seeds; ±" in text
+    assert "Registrations of each seed: 40 by ICP; 40 by Plane." in text
     assert "Monte-Carlo with 1000 starts" in text
     assert "stand-in" in text
 

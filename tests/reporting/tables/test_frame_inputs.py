@@ -26,7 +26,11 @@ def test_a_row_is_a_cloud_and_confusions_are_shares_of_the_concept():
     assert table.cells[0, "seen"].mean == pytest.approx(90)
     assert table.cells[1, "pose_as_overlap"].mean == pytest.approx(25)
     assert (0, "pose_as_overlap") not in table.cells
-    assert "| DGCNN | observed cloud before ICP |" in table.markdown()
+    text = table.markdown()
+    assert "| DGCNN | observed cloud before ICP |" in text
+    assert "Mean over 2 seeds, the first of the run; with fewer than 3 there is no interval and no bold." in text
+    assert "Test samples: all 600, seen 300." in text
+    assert "±" not in text and table.best() == set()
 
 
 def test_nothing_to_show_is_refused():

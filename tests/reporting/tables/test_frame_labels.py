@@ -41,6 +41,8 @@ def test_a_row_is_what_the_samples_are_seen_by_and_the_chosen_backbone_is_named(
     markdown = table.markdown()
     assert "| > 50 |" in markdown
     assert "Mean over 2 seeds, 300 test samples each" in markdown
+    assert "| BALD, to 65 % (labels) | Random, to 65 % (labels) |" in markdown
+    assert "Bold: the fewer labels" in markdown
 
 
 def test_metrics_without_learning_curves_are_refused():

@@ -10,7 +10,7 @@ LEARNERS = {"gpca": "GPC", "learner_forest": "Forest", "learner_linear_svm": "SV
 
 def test_table5_shows_accuracy_and_diagnostics_and_marks_the_best(diagnostics):
     markdown = table5_learners(diagnostics, REAL, LEARNERS).markdown()
-    assert "| Dataset | Learner | Accuracy (%) | ρ | AUC | E-AUC | AUGRC | ECE |" in markdown
+    assert "| Dataset | Learner | Accuracy (%) | ρ | AURC | E-AURC | AUGRC | ECE (share) |" in markdown
     assert "| YCB | GPC | 96.0 ± 2.5 | **0.520 ± 0.050** | **0.0040 ± 0.0000** |" in markdown
     assert "**99.0 ± 2.5**" in markdown
     assert "**0.020 ± 0.000**" in markdown
@@ -20,13 +20,17 @@ def test_table5_shows_accuracy_and_diagnostics_and_marks_the_best(diagnostics):
 
 def test_table5_has_the_papers_form_too(diagnostics):
     markdown = table5_compact(diagnostics, REAL, LEARNERS).markdown()
-    assert "| Learner | YCB (%) | LINEMOD (%) | ρ | AUC | ECE |" in markdown
+    assert "| Learner | YCB (%) | LINEMOD (%) | ρ | AURC | ECE (share) |" in markdown
+    assert "Mean over 3 seeds, 40 test samples each" in markdown
+    assert "the paper's AUC" in markdown
     assert "| GPC | 96.0 ± 2.5 | – | **0.520 ± 0.050** | **0.0040 ± 0.0000** |" in markdown
 
 
 def test_table5_shift_has_every_kind_of_shift(diagnostics):
     table = table5_shift(diagnostics, REAL, LEARNERS)
     assert [key for key in table.columns if key.startswith("rho")] == ["rho_severity", "rho_source", "rho_objects"]
+    titles = [column.title for column in table.columns.values()]
+    assert len(set(titles)) == len(titles)
     assert table.cells[0, "rho_objects"].test_samples == 3 * (40 + 40)
     assert table.cells[0, "accuracy_objects"].test_samples == 3 * 40
 

@@ -26,9 +26,9 @@ def test_a_row_says_where_the_number_lies_and_which_reading_is_nearest():
     text = table13_readings(rows(), GROUPS, REAL).markdown()
     [line] = [line for line in text.splitlines() if "LINEMOD" in line]
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[:5] == ["IV, RBF, LINEMOD", "How it starts", "produced", "random, default", "1 of 2"]
-    assert cells[5] == "random, default: 1 of 2"
-    assert cells[6:] == ["50.6", "95", "51", "95", "51"]
+    assert cells[:6] == ["IV, RBF, LINEMOD", "%", "How it starts", "produced", "random, default", "1 of 2"]
+    assert cells[6] == "random, default (1 of 2)"
+    assert cells[7:] == ["50.6", "95", "51", "95", "51"]
     assert "between" in text
 
 
@@ -37,6 +37,19 @@ def test_numbers_on_stand_ins_are_shown_as_such_and_reproduced_ones_are_not():
     assert "procedural stand-in" in table13_readings(rows("not comparable"), GROUPS, stand_in).markdown()
     with pytest.raises(InputError, match="no missed number"):
         table13_readings(rows("reproduced"), GROUPS, REAL)
+
+
+def test_each_curve_of_the_figure_is_named_below_its_panel(tmp_path, figures):
+    many = pd.concat([rows().assign(row=f"kernel {i}") for i in range(8)], ignore_index=True)
+    draw_readings(many, GROUPS, REAL, tmp_path / "a.pdf", tmp_path / "a.png")
+    panel = figures[0].axes[0]
+    named = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert len(named) == 16
+    assert {"IV: kernel 0, YCB", "IV: kernel 7, LINEMOD"} < set(named)
+    looks = {(line.get_color(), line.get_linestyle()) for line in panel.get_lines()}
+    assert len(looks) == 16
+    renderer = figures[0].canvas.get_renderer()
+    assert panel.get_legend().get_window_extent(renderer).y1 < panel.get_window_extent(renderer).y0
 
 
 def test_the_figure_has_a_panel_for_each_group_with_readings(tmp_path):
