@@ -74,3 +74,9 @@ def test_the_note_says_what_encoders_were_pretrained_on():
     of = metrics(VALUES), "frames", BACKBONES, ("none", "pca")
     assert "pretrained on whole objects, and GPC" in " ".join(table6_backbones(*of, "whole objects").footnotes)
     assert "perturbations, encoder, and GPC" in " ".join(table6_backbones(*of).footnotes)
+
+
+def test_a_backbone_without_a_title_has_its_name():
+    values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
+    table = table6_backbones(metrics(values), "frames", {"mine": 1000, "pointnet": 150_000}, ("none",))
+    assert "| To mine (points) |" in table.markdown()
