@@ -18,7 +18,7 @@ class LastLayerLaplace(HeadLearner):
     The last layer is fitted anew to the hidden units under a Gaussian prior: an approximation about weights that are no
     maximum of the posterior would not be Laplace's. The prior's precision is the one that predicts a fifth of the
     training samples best (least NLL) after training on the others; that of the largest evidence, as the hidden units
-    were learnt from the same labels, leaves the scores far too timid.
+    were learned from the same labels, leaves the scores far too timid.
     """
 
     PRECISIONS = tuple(10.0 ** (exponent / 2) for exponent in range(6, -5, -1))

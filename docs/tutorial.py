@@ -21,10 +21,10 @@ print(f"{cat.name}: {len(target)} points, diameter {diameter_m:.3f} m")
 
 # %% 2. The explainer. It loads the model once; after that, an explanation takes some tenths of a second.
 explainer = Explainer.load()
-print(f"GP-CA learnt from: {explainer.model.title}")
+print(f"GP-CA learned from: {explainer.model.title}")
 
 # %% 3. A registration that should be fine: the source starts a little off. `text` is what the command line prints. A
-# model whose GP-CA learnt partial views warns that this source shows all sides: then the diagnosis counts, and the
+# model whose GP-CA learned partial views warns that this source shows all sides: then the diagnosis counts, and the
 # scores of GP-CA below it do not.
 step = np.eye(4)
 step[:3, 3] = 0.03 * diameter_m

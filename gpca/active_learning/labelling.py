@@ -90,7 +90,7 @@ class Session:
         h_S_d: embeddings of all samples.
         keys: split and number of each.
         start: labels that were known before anybody was asked.
-        labels: the file of answers; those that it holds are learnt at once.
+        labels: the file of answers; those that it holds are learned at once.
         settings: how the classifier is fitted.
         strategy: which one of :mod:`gpca.active_learning.acquisition` asks.
 

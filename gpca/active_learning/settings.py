@@ -67,12 +67,12 @@ NewCause = Literal["nominal", "geometry"]
 
 @dataclass(frozen=True)
 class NewConceptSettings:
-    """What a concept is learnt from where no encoder has seen the samples, or the concept, before.
+    """What a concept is learned from where no encoder has seen the samples, or the concept, before.
 
     Attributes:
         seeds: the first so many of the run's.
-        embeddings: of the samples: by an encoder that learnt from other samples of the same source, or from another
-            source; what one predicts that learnt without labels; or what was measured of the pair.
+        embeddings: of the samples: by an encoder that learned from other samples of the same source, or from another
+            source; what one predicts that learned without labels; or what was measured of the pair.
         errors: shares of the oracle's answers that are wrong.
         erring: embeddings with which such an oracle is asked.
         points: drawn from each cloud to describe a pair.

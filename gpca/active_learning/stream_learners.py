@@ -69,8 +69,8 @@ class MondrianLearner:
 class LayerLearner:
     """A Bayesian layer on the frozen encoder, after CLEVER (Lee et al. 2025); worth asking is a lack of confidence.
 
-    CLEVER's network has Laplace's approximation, its prior is what it learnt before, and it asks for a demonstration of
-    what it is not confident of. Here one linear layer stands for its progressive columns, the known concepts for
+    CLEVER's network has Laplace's approximation, its prior is what it learned before, and it asks for a demonstration
+    of what it is not confident of. Here one linear layer stands for its progressive columns, the known concepts for
     the data of its prior, one label for a demonstration, and the budget manager for its thresholds.
     """
 

@@ -14,7 +14,7 @@ from torch import Tensor
 
 
 class ScaledPolynomial(gpytorch.kernels.PolynomialKernel):
-    """The covariance (xᵀx' / d + c)², since nothing is learnt from plain inner products of some hundred dimensions."""
+    """The covariance (xᵀx' / d + c)², since nothing is learned from plain inner products of some hundred dimensions."""
 
     def __init__(self, **options) -> None:
         super().__init__(power=2, **options)

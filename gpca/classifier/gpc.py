@@ -143,7 +143,7 @@ class GPC:
 
     @property
     def learnt_N_d(self) -> np.ndarray:
-        """The standardised inputs of the labels that it learnt, (N, d)."""
+        """The standardised inputs of the labels that it learned, (N, d)."""
         return self._labelled.inputs_N_d
 
     def posterior(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray]:
@@ -171,7 +171,7 @@ class GPC:
         return generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
 
     def state(self) -> dict[str, object]:
-        """Return all that was learnt as tensors, numbers and names, for :meth:`from_state`."""
+        """Return all that was learned as tensors, numbers and names, for :meth:`from_state`."""
         return {
             "classes": list(self.classes),
             "settings": asdict(self.settings),

@@ -101,7 +101,7 @@ def refine(
 
     Args:
         projection, targets_N: the N labelled inputs and the numbers of their classes.
-        sites: where to start; those of an earlier call, extended, continue from what was learnt.
+        sites: where to start; those of an earlier call, extended, continue from what was learned.
         iterations, tolerance: the most steps, and the largest change of a probability at which they end.
 
     Returns:

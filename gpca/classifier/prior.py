@@ -69,7 +69,7 @@ class Prior:
     def level(self, known_C: np.ndarray) -> Prior:
         """Return the prior in which the covariances of unknown classes have the geometric means of the known ones'.
 
-        Without a label, a class's covariance has learnt only how best to be wrong.
+        Without a label, a class's covariance has learned only how best to be wrong.
         """
         is_known_C = torch.from_numpy(known_C)
 

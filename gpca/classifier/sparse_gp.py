@@ -27,7 +27,7 @@ class SparseGPs(nn.Module):
 
     Args:
         covariance: a ``ScaleKernel`` of batch shape (C,).
-        inducing_M_d: where the inducing inputs start; they are learnt too.
+        inducing_M_d: where the inducing inputs start; they are learned too.
         random: it draws the start of the mean and the samples of the likelihood.
     """
 

@@ -122,7 +122,7 @@ class Experiment:
         return _attached(self._learnt(control, changed), changed) if control in RETRAINED else changed
 
     def _learnt(self, control: str, registrations: Registrations) -> dict[str, Attach]:
-        """Return what attaches the embeddings by the rivals' own encoders, learnt from the training samples."""
+        """Return what attaches the embeddings by the rivals' own encoders, learned from the training samples."""
         train = registrations.subset(registrations.rows("train"))
         embeds = {}
         for name, rival in self.rivals.items():
@@ -197,10 +197,10 @@ class Experiment:
     def _lessons(
         self, control: str, train: Registrations, tests: Mapping[tuple[str, str], Registrations]
     ) -> Iterator[tuple[Registrations, Mapping[tuple[str, str], Registrations]]]:
-        """Yield training samples, and the test samples that are asked of what has learnt from them.
+        """Yield training samples, and the test samples that are asked of what has learned from them.
 
         Labels that say nothing make an explainer name a whole cluster of samples by chance. So they are shuffled in
-        parts, of which each is learnt from alone and asked about a part of the test samples.
+        parts, of which each is learned from alone and asked about a part of the test samples.
         """
         if control not in RELABELLED:
             yield train, tests

@@ -22,7 +22,7 @@ Control = Literal[
 ]
 CONTROLS: tuple[str, ...] = get_args(Control)
 UNSEEN = "unseen_objects"
-SEEN = "seen_objects"  # tests of what was learnt for unseen objects, on new samples of the objects that it learnt from
+SEEN = "seen_objects"  # tests of what was learned for unseen objects, on new samples of the objects learned from
 RETRAINED = ("density", UNSEEN)  # need an encoder of their own
 Training = Literal["random_draws", "two_layer_head"]
 TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects

@@ -95,8 +95,8 @@ def relabelled(control: str, train: Registrations, *axes: object) -> Registratio
     """Return training samples with labels that a control changes.
 
     Of label noise, that share of the labels names one of the other concepts. Where they are shuffled, each concept's
-    samples get every label equally often, so that labels tell nothing at all: what is learnt from them is chance, while
-    of labels shuffled freely a cluster of samples would keep a most frequent one.
+    samples get every label equally often, so that labels tell nothing at all: what is learned from them is chance,
+    while of labels shuffled freely a cluster of samples would keep a most frequent one.
     """
     random = generator(*axes, "labels", control)
     concept = train.concept.copy()

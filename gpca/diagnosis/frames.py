@@ -35,7 +35,7 @@ KINDS = (*LABELS, GEOMETRY, BORDERLINE, "scenes", "objects")
 def collect(
     causes_files: Iterable[str | Path], sample_files: Iterable[str | Path], prediction_files: Iterable[str | Path]
 ) -> pd.DataFrame:
-    """Return rows as :func:`gpca.diagnosis.intervals.collect` does, for explainers that have learnt from no frame.
+    """Return rows as :func:`gpca.diagnosis.intervals.collect` does, for explainers that have learned from no frame.
 
     Beside its measures stand `STATE`, the mean of the shares of the nominal and of the failed that are called so, and
     the number of `SAMPLES`; what has no value, as there are no samples for it, has no row.

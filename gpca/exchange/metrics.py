@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MONTE_CARLO = "monte_carlo"  # whose explanations the others are compared with
-ANOTHER = "another"  # all methods but the one that was learnt from
+ANOTHER = "another"  # all methods but the one that was learned from
 
 
 def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
@@ -28,7 +28,7 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     - abstained: share of which no concept is named although there is one.
     - agreement: share of which the same is said as with Monte-Carlo, where that is among the estimators.
 
-    Of another, ``method`` is that of the test registrations, or `ANOTHER`, and ``concept`` that which it learnt from:
+    Of another, ``method`` is that of the test registrations, or `ANOTHER`, and ``concept`` that which it learned from:
 
     - accuracy.
     - failed: share of registrations that failed; they are explained as the others are.

@@ -19,7 +19,7 @@ class ExchangeSettings:
 
     Attributes:
         seeds: the first so many of the run's.
-        methods: registration methods, each learnt from and asked about in its turn.
+        methods: registration methods, each learned from and asked about in its turn.
         train, test: registrations of each source and seed, by each of them, at most.
         points: of source and of target that are registered, at most.
         estimators: of the covariance, each in the place of Monte-Carlo.

@@ -38,7 +38,7 @@ class Describing(Protocol):
 
 @runtime_checkable
 class Encoding(Protocol):
-    """An explainer with an encoder of its own, learnt once for all labels on its embeddings."""
+    """An explainer with an encoder of its own, learned once for all labels on its embeddings."""
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
         """Train the encoder on labelled registrations, and return what attaches its embeddings.

@@ -133,13 +133,13 @@ class PairClassifier:
 
     @property
     def samples(self) -> int:
-        """How many it learnt."""
+        """How many it learned."""
         return len(self._failure.learnt_N_d)
 
     def state(self) -> dict[str, object]:
-        """Return all that was learnt, for :meth:`from_state`.
+        """Return all that was learned, for :meth:`from_state`.
 
-        All four learnt the same inputs, two thirds of all numbers here: as one tensor, a file holds them once.
+        All four learned the same inputs, two thirds of all numbers here: as one tensor, a file holds them once.
         """
         failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
         for gpc, state in zip(self._causes, causes, strict=True):

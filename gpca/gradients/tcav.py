@@ -42,7 +42,7 @@ def tcav(
     """Return the scores of every concept for every class.
 
     Args:
-        gpc: has learnt from the training samples.
+        gpc: has learned from the training samples.
         train, test: with their embeddings.
         axes: name the random numbers.
 

@@ -82,7 +82,7 @@ class Explainer:
             diagnose: whether the registration is diagnosed, if the model can do it: GP-CA alone takes a fifth of the
                 time, cannot say that nothing is wrong, and then decides about the action.
             method: the registration method (docs/registration.md) that aligns the clouds, with its default settings; by
-                default the model's own ICP, with which the classifier has learnt.
+                default the model's own ICP, on whose results the classifier was trained.
             estimator: of the uncertainty, where it is measured (docs/estimators.md): one that needs no training
                 registrations. Where it cannot tell, a note says why.
 

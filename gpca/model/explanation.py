@@ -54,7 +54,7 @@ class Explanation:
         T_target_source: the pose (4, 4) that was found, in the unit of the points.
         fitness, inlier_rmse: share of source points with a correspondence; RMSE over those, in the unit of the points.
         method: that found it: the model's kind of ICP, or a registration method by its name.
-        diagnosis: of the pair, learnt from measured causes, its expected error in the unit of the points; None where
+        diagnosis: of the pair, learned from measured causes, its expected error in the unit of the points; None where
             it was not asked for.
         scores, variances: of GP-CA as in the paper, which sees the aligned source alone and always names a concept:
             mean and variance over the posterior draws (Eqs. 4, 5).
@@ -66,7 +66,7 @@ class Explanation:
         unit: that of all lengths.
         seconds: those of each stage, and ``total``.
         notes: what was done to the clouds, such as points that were left out.
-        warnings: why this explanation is not to be relied on: what is unlike all that the model learnt.
+        warnings: why this explanation is not to be relied on: what is unlike all that the model learned.
     """
 
     T_target_source: np.ndarray

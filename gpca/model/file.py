@@ -33,18 +33,18 @@ REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results
 
 @dataclass(frozen=True)
 class Model:
-    """What says whether a registration is right and why it is not; and the paper's GP-CA, which it learnt besides.
+    """What says whether a registration is right and why it is not; and the paper's GP-CA, which it learned besides.
 
     Attributes:
-        diagnoser: of the pair after ICP, learnt from measured causes of all sources; None where there is GP-CA alone.
+        diagnoser: of the pair after ICP, learned from measured causes of all sources; None where there is GP-CA alone.
         encoder: from clouds (B, N, 3) to embeddings (B, d), ready for inference.
         encoder_settings: also how many points it sees and how many draws make an embedding.
         gpc: the classifier; its classes are the concepts.
         icp: how ICP ran.
         cloud_points: of source and of target, at most.
         policy: what to do about which causes.
-        title, stand_in: of the objects that GP-CA learnt, and whether they were drawn by the package.
-        familiar: what the clouds that GP-CA learnt are like; None in older files, which say nothing of it.
+        title, stand_in: of the objects that GP-CA learned, and whether they were drawn by the package.
+        familiar: what the clouds that GP-CA learned are like; None in older files, which say nothing of it.
     """
 
     diagnoser: Diagnoser | None

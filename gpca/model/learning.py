@@ -70,7 +70,7 @@ def learn(
     false_alarms: float,
     *axes: object,
 ) -> tuple[Diagnoser, np.ndarray]:
-    """Return what learnt all lessons, and the BALD (nats) of failures of unseen objects.
+    """Return what learned all lessons, and the BALD (nats) of failures of unseen objects.
 
     A first classifier learns without the unseen objects. Its threshold is the one that at most the share
     `false_alarms` of their nominal registrations reaches, and its BALD tells how uncertain a failure may be.

@@ -34,11 +34,11 @@ class License:
 
 @dataclass(frozen=True)
 class Source:
-    """Objects that a model learnt.
+    """Objects that a model learned.
 
     Attributes:
         name, title: in the run.
-        diagnosed: whether the diagnosis learnt from them, or else GP-CA.
+        diagnosed: whether the diagnosis learned from them, or else GP-CA.
         objects: how many there are.
         licenses: of all datasets that they were read from.
     """
@@ -56,7 +56,7 @@ class Origin:
 
     Attributes:
         record: its provenance, as :func:`gpca.provenance.record_provenance` wrote it.
-        sources: what it learnt, in the order of the record.
+        sources: what it learned, in the order of the record.
     """
 
     record: Mapping

@@ -79,7 +79,7 @@ class ExpectedUtility:
     alike.
 
     Attributes:
-        chances: learnt on the training tables.
+        chances: learned on the training tables.
         costs: action -> c_a, in right poses.
         needless: b, in right poses.
     """

@@ -97,7 +97,7 @@ def never_queue(means: Means) -> Decide:
 
 
 def weigh_chances(means: Means) -> Decide:
-    """Take what is worth most by its learnt chance and its cost (:class:`gpca.recovery.chances.ExpectedUtility`)."""
+    """Take what is worth most by its learned chance and its cost (:class:`gpca.recovery.chances.ExpectedUtility`)."""
     return _weigh(means, alarmed=False)
 
 

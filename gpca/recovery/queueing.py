@@ -26,7 +26,7 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
-BATCH = 4  # cases that are labelled before anything is learnt from them
+BATCH = 4  # cases that are labelled before anything is learned from them
 DRAWS = 5  # random orders
 
 

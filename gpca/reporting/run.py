@@ -226,7 +226,7 @@ def controlled_seeds(config: Mapping) -> list[int]:
 
 
 def new_concept_seeds(config: Mapping) -> list[int]:
-    """Return the seeds for which new concepts are learnt where no encoder has seen them."""
+    """Return the seeds for which new concepts are learned where no encoder has seen them."""
     return list(config["seeds"])[: config["new_concepts"]["seeds"]]
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import torch
 
+from gpca.alignment.methods.registry import make_method
 from gpca.errors import InputError
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model, model_path
 from gpca.model.point_file import read_points, read_pose
-from gpca.model.pose_spread import MONTE_CARLO
+from gpca.model.pose_spread import MONTE_CARLO, spread_estimator
 from gpca.objects.mesh_folder import METRES_PER_UNIT
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -44,13 +45,14 @@ def run(options: Namespace) -> None:
         raise InputError("--settings", "is not used by explain", "make another model to change its settings")
     if len(options.source) > 1 and not options.json_lines:
         raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
+    uncertainty = UncertaintySettings() if options.uncertainty is not None else None
+    estimator = MONTE_CARLO if options.uncertainty is None else options.uncertainty
+    _require_known(options.method, estimator)
     path = model_path(options.model)
     model = Model.load(path)
     T_init = read_pose(options.init) if options.init else None
     sources = [read_points(source, options.unit)[0] for source in options.source]
     target, frame = read_points(options.target, options.unit)
-    uncertainty = UncertaintySettings() if options.uncertainty is not None else None
-    estimator = MONTE_CARLO if options.uncertainty is None else options.uncertainty
     asked = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator}
     explainer = Explainer(model)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
@@ -70,3 +72,10 @@ def run(options: Namespace) -> None:
         else:
             print(explanation.text(), end="")
     print(f"model {path}, trained on {trained_on}", file=sys.stderr)
+
+
+def _require_known(method: str | None, estimator: str) -> None:
+    """Refuse an option before any file is read, so that the line does not blame a file for it."""
+    if method is not None:
+        make_method(method)
+    spread_estimator(estimator, UncertaintySettings())

@@ -142,7 +142,7 @@ class _Asked:
     def attribution(self, name: str, settings: dict) -> Attribution:
         """Return the mean of the scores over all that the explainer learns from.
 
-        Descriptors of all sources are learnt together; embeddings are by an encoder for each source.
+        Descriptors of all sources are learned together; embeddings are by an encoder for each source.
         """
         entry = explainer_entry(name, CAUSES)
         said = []

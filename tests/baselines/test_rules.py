@@ -9,7 +9,7 @@ from gpca.settings import check_settings
 
 @pytest.fixture(scope="module")
 def fitted():
-    """A tree that learnt three concepts which two thresholds tell apart."""
+    """A tree that learned three concepts which two thresholds tell apart."""
     random = np.random.default_rng(0)
     forward_N = np.repeat([0.03, 0.01, 0.01], 40) * random.uniform(0.9, 1.1, 120)
     backward_N = np.repeat([0.01, 0.01, 0.2], 40) * random.uniform(0.9, 1.1, 120)

@@ -96,7 +96,7 @@ def test_half_of_a_sphere_is_hidden_and_little_of_one_side_of_it():
 
 def test_good_input_of_shapes_that_were_not_learnt_raises_no_warning(learnt, unseen):
     assert warned(learnt["wholes"], wholes(unseen)) == []
-    assert len(warned(learnt["views"], views(unseen))) <= 1  # of twelve, by as few as were learnt
+    assert len(warned(learnt["views"], views(unseen))) <= 1  # of twelve, by as few as were learned
 
 
 def test_whole_clouds_are_unlike_partial_views_and_the_other_way_round(learnt, clouds, unseen):

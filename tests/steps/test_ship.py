@@ -38,7 +38,7 @@ def record(path, inputs, settings):
 
 @pytest.fixture(scope="module")
 def run(model, objects, tmp_path_factory):
-    """The files of a run that ``ship`` reads, of a model that says that it learnt real objects."""
+    """The files of a run that ``ship`` reads, of a model that says that it learned real objects."""
     folder = tmp_path_factory.mktemp("run") / "real"
     (folder / "objects").mkdir(parents=True)
     replace(model, stand_in=False, title="Frames").save(folder / "model.pt")

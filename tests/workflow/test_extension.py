@@ -67,7 +67,7 @@ def test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows(finished, me
     finished.append("config/sources.yaml", block("config/sources.yaml", "my_parts").removeprefix("sources:\n"))
     data_dir = ("--config", f"data_dir={meshes.parent}")
     planned = finished.dry_run("all", *SMOKE, *data_dir)
-    # What was learnt from the two other sources is asked about the new one too, and the one before it is seen by it.
+    # What was learned from the two other sources is asked about the new one too, and the one before it is seen by it.
     of_row = {"objects_my_parts": 1, "explain_controls": 3, "learn_new_concepts": 2}
     assert without_ends(planned.jobs) == Counter(ROW | SHARED | of_row) + OF_FRAMES
     assert "results/smoke/predictions/my_parts/gpca/seed1.csv" in planned.outputs

@@ -43,7 +43,7 @@ def read_policy(path: str | Path) -> dict:
 def draw_mitigation(title: str, policy_json: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
     """Draw the mapping of one policy: what it reads, its branches in the order of asking, and the ways back.
 
-    An action leads to new scores; what is queued leads to a label and to a classifier that has learnt it.
+    An action leads to new scores; what is queued leads to a label and to a classifier that has learned it.
     """
     policy = read_policy(policy_json)
     limits = policy["thresholds"]

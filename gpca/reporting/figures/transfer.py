@@ -27,7 +27,7 @@ def draw_transfer(
     pdf_path: str | Path,
     png_path: str | Path,
 ) -> None:
-    """Draw a matrix for each explainer: rows the source that it learnt from, columns the one that it is asked about.
+    """Draw a matrix for each explainer: rows the source that it learned from, columns the one that it is asked about.
 
     Args:
         intervals: What :func:`gpca.controls.intervals.collect` returned.

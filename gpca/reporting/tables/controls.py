@@ -123,7 +123,7 @@ def _cells(rows: pd.DataFrame, source: str, names: Sequence[str]) -> dict[str, C
 
 
 def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
-    """Return the accuracy of every explainer (rows, by the source that it learnt from) on each source (columns).
+    """Return the accuracy of every explainer (rows, by the source that it learned from) on each source (columns).
 
     Args:
         intervals, sources, explainers: As of :func:`table10_controls`.

@@ -80,7 +80,7 @@ def table14_method_matrix(
     methods: Mapping[str, str],
     left_out: Mapping[str, str],
 ) -> Table:
-    """Return the accuracy of explainers × the method learnt from, by that of the test registrations.
+    """Return the accuracy of explainers × the method learned from, by that of the test registrations.
 
     Args:
         metrics, sources, explainers: See above.

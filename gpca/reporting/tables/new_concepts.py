@@ -93,7 +93,7 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
 
 
 def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:
-    """Return what is learnt from an oracle that errs: labels to the target and accuracy after all, by its errors."""
+    """Return what is learned from an oracle that errs: labels to the target and accuracy after all, by its errors."""
     metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
     shares = [0, *(round(100 * share) for share in conditions["errors"])]
     labels = {f"labels_{share}": Column(f"Labels, {share} % wrong", **COUNT) for share in shares}

@@ -29,7 +29,7 @@ LEAST_SINGULAR = 1e-6  # of the largest: what is below is rounding
 def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, learning_rate: float = 0.05) -> Estimator:
     """Learn the metric.
 
-    Axes of a pair have no common sign, over which the covariance between two of them averages out: what is learnt are
+    Axes of a pair have no common sign, over which the covariance between two of them averages out: what is learned are
     the six variances along the principal axes of the target (:func:`intrinsic_frame`).
 
     Args:

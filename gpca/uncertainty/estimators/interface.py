@@ -78,7 +78,7 @@ class RegisteredPair:
         outcome: what the method found.
         method: its name in the registry of methods.
         deviation_6: standard deviations of the initial pose's twist.
-        describe: returns the pair's descriptors (F,), for estimators that have learnt from others.
+        describe: returns the pair's descriptors (F,), for estimators that have learned from others.
     """
 
     pair: Pair
