@@ -54,12 +54,12 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
         raise InputError("provenance of the model", f"is incomplete ({fault})", "regenerate the model") from fault
     paragraphs = [
         f"# Model card of {name}",
-        "The model that `gpca explain` takes where no other is named or found. It says whether a registration of two "
+        "The model that `gpca explain` uses unless another is named or found. It says whether a registration of two "
         f"point clouds is right and, if it is not, which of the causes {', '.join(CONCEPTS)} made it fail. "
         "`python -m gpca ship` wrote this page; docs/explain.md says how to use the model.",
         "## File",
         _file(name, content, origin),
-        *("## What it learned", *_learnt(model, diagnoser, origin)),
+        *("## Training data", *_training(model, diagnoser, origin)),
         *("## Data and licenses", *_licenses(origin)),
         *("## Scores", *_scores(origin, scores)),
         *("## Limits", "\n".join(_wrapped(f"- {line}", "  ") for line in limits)),
@@ -80,14 +80,14 @@ def _file(name: str, content: bytes, origin: Origin) -> str:
     return _table(["", ""], rows.items())
 
 
-def _learnt(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
+def _training(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
     rows = [(source.title, source.objects, "diagnosis" if source.diagnosed else "GP-CA") for source in origin.sources]
     return [
-        f"The diagnosis learned {diagnoser.classifier.samples} registrations whose causes were measured by "
-        "counterfactuals (docs/causes.md). What is observed in them was drawn from the objects' surfaces and "
-        f"perturbed. GP-CA as in the paper, which is printed beside it, learned {len(model.gpc.learnt_N_d)} "
-        "registrations, perturbed in one way each.",
-        _table(["objects", "number", "learned by"], rows),
+        f"The diagnosis was trained on {diagnoser.classifier.samples} registrations whose causes were measured by "
+        "counterfactuals (docs/causes.md). Their source clouds were sampled from the objects' surfaces and perturbed. "
+        f"GP-CA as in the paper, which is printed beside it, was trained on {len(model.gpc.learnt_N_d)} registrations, "
+        "each perturbed in one way.",
+        _table(["objects", "number", "train"], rows),
     ]
 
 
@@ -99,9 +99,9 @@ def _licenses(origin: Origin) -> list[str]:
     rows = [(of.dataset, of.license, of.known, "; ".join(dict.fromkeys(titles))) for of, titles in used.items()]
     return [
         "The file holds weights, descriptors and embeddings that were computed from these data, but none of their "
-        "points or images. The data stay under their own licenses; whether these reach a trained model is not for this "
-        'page to say. "Seen" means read in the stated place, "from memory" means not confirmed.',
-        _table(["dataset", "license", "how that is known", "part of"], rows),
+        "points or images. The data stay under their own licenses; this page takes no position on whether these extend "
+        'to a trained model. "Seen" means read in the stated place, "from memory" means not confirmed.',
+        _table(["dataset", "license", "source of this information", "part of"], rows),
     ]
 
 
@@ -119,16 +119,16 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
         raise InputError("cause_intervals.csv", f"has no scores of {OWN}", "switch it on in diagnosis.explainers")
     changes = origin.record["settings"].get("model", {}).get("causes", {})
     return [
-        "Of classifiers of these kinds in the run that made this model, on objects that they had not learned, with "
-        "95\u00a0% intervals over objects and seeds. The model itself then learned all objects, so nothing is left to "
-        "test it on. The registrations of these scores were drawn as the section `causes` of the config says; those "
-        "that the model learned were drawn with these changes:",
+        "These are the scores of the same kinds of classifier in the run that made this model, on objects held out of "
+        "their training, with 95\u00a0% intervals over objects and seeds. The model itself was trained on all objects, "
+        "so none is left to test it on. The scored registrations were drawn as the section `causes` of the config "
+        "says; the training registrations of the model were drawn with these changes:",
         "\n".join(f"- `{name}: {json.dumps(value, sort_keys=True)}`" for name, value in sorted(changes.items()))
         or "- none",
         _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows),
-        f"False alarms: share of the nominal above the alarm that finds {100 * RECALL:g}\u00a0% of the failed. The "
-        "truth, measured again from other starts, is the most that can be expected. docs/causes.md defines every "
-        "measure.",
+        "False alarms: the share of nominal registrations that are called failed at the threshold that finds "
+        f"{100 * RECALL:g}\u00a0% of the failed ones. The truth, measured again from other starts, is the most that "
+        "can be expected. docs/causes.md defines every measure.",
     ]
 
 
@@ -146,17 +146,21 @@ def _limits(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
     ranges = model.familiar.ranges.items() if model.familiar else ()
     familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in ranges)
     return [
-        f"Failed means an error above {causes['limits']['failed']:g} of the diameter. A task may need another limit.",
-        f"The diagnosis learned {severities} (lengths in diameters; crop and outliers in shares of the points), clouds "
-        "of {} to {} points, and ICP `{}`. What lies outside is a guess.".format(*causes["points"], model.icp.method),
-        f"The threshold of {diagnoser.threshold:.3f} was chosen so that at most {settings['model']['false_alarms']:g} "
-        "of the nominal registrations of objects that a first classifier had not learned are called failed.",
-        f"It knows the causes {', '.join(CONCEPTS)}. Whatever else is wrong, such as the wrong object or a sensor's "
-        "bias, it calls one of them.",
-        f"It warns of clouds outside the geometry of GP-CA's training: {familiar} (docs/explain.md)."
+        f"Failed means an error above {causes['limits']['failed']:g} of the diameter. Your task may need "
+        "another limit.",
+        f"The diagnosis was trained on {severities} (lengths in diameters; crop and outliers in shares of the points), "
+        "on clouds of {} to {} points, and on results of ICP `{}`. Outside these ranges it extrapolates.".format(
+            *causes["points"], model.icp.method
+        ),
+        f"The threshold of {diagnoser.threshold:.3f} was chosen on objects held out of a first classifier's training, "
+        f"so that at most {100 * settings['model']['false_alarms']:g}\u00a0% of their nominal registrations are called "
+        "failed.",
+        f"It knows only the causes {', '.join(CONCEPTS)}. It attributes whatever else is wrong, such as the wrong "
+        "object or a sensor's bias, to one of them.",
+        f"It warns of clouds outside the geometry that GP-CA was trained on: {familiar} (docs/explain.md)."
         if familiar
-        else "It keeps no ranges of its training's geometry, so it notices fewer clouds that are unlike it.",
-        f"It explains rigid objects of {SMALLEST_DIAMETER_M:g} to {LARGEST_DIAMETER_M:g} m. It is no safety device.",
+        else "It keeps no ranges of its training geometry, so it notices fewer unfamiliar clouds.",
+        f"It explains rigid objects of {SMALLEST_DIAMETER_M:g} to {LARGEST_DIAMETER_M:g} m. It is not a safety device.",
     ]
 
 
