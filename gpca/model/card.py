@@ -113,7 +113,9 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
             of = scores[(scores["source"] == source) & (scores["method"] == explainer)].set_index("metric")
             if len(of):
                 own += explainer == OWN
-                counts = f"{of['samples'].iloc[0]:.0f} ({of['seeds'].iloc[0]:.0f})"
+                samples, seeds = of["samples"].reindex(list(MEASURES)).dropna(), of["seeds"].iloc[0]
+                counts = " to ".join(f"{count:.0f}" for count in sorted({samples.min(), samples.max()}))
+                counts = f"{counts} ({seeds:.0f})"
                 rows.append((title, words, *(_interval(of, metric) for metric in MEASURES), counts))
     if not own:
         raise InputError("cause_intervals.csv", f"has no scores of {OWN}", "switch it on in diagnosis.explainers")

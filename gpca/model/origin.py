@@ -92,7 +92,7 @@ def _source(run: Path, name: str, diagnosed: bool, title: str) -> Source:
     if entry.get("stand_in"):
         raise InputError(objects, "contains objects that the package drew", "ship a model of real objects")
     places = list(record["inputs_sha256"]) or _addresses(settings)
-    licenses = {license: None for place in places for license in _licenses_of(place, objects)}
+    licenses = {license: None for place in places for license in licenses_of(place, objects)}
     return Source(name, entry["title"], diagnosed, len(ObjectClouds.load(objects)), tuple(licenses))
 
 
@@ -102,7 +102,12 @@ def _addresses(settings: Mapping) -> list[str]:
     return [url for entry in entries for url in (entry.get("urls") or [entry["url"]])]
 
 
-def _licenses_of(place: str, objects: Path) -> list[License]:
+def licenses_of(place: str, objects: Path) -> list[License]:
+    """Return the licenses of the datasets that a file or an address is of.
+
+    Raises:
+        InputError: none is known; the line names `objects`, which were made from it.
+    """
     known = [license for words, license in _licenses() if any(word in place for word in words)]
     if not known:
         fault = f"was made from '{Path(place).name}', which is from a dataset without a known license"

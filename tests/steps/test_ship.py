@@ -8,11 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from gpca.__main__ import main
+from gpca.code_files import ROOT
 from gpca.diagnosis.intervals import COLUMNS
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
+from gpca.model.origin import licenses_of
 from gpca.steps import ship
 
 from .command_lines import content, removed, written
@@ -90,6 +93,25 @@ def test_the_card_has_the_numbers_of_the_run_and_the_same_run_gives_the_same_byt
     assert "/data/" not in text
     assert main(SHIP) == 0
     assert content(folder) == first
+
+
+def places(entry):
+    """Return a file that an entry of the full protocol reads in each of the places that its config names."""
+    named = [f"/data/{entry['location']}/file"]
+    for key in ("results", "errors", "url", "urls"):
+        given = entry.get(key, [])
+        named += [given] if isinstance(given, str) else given
+    return named
+
+
+REAL = yaml.safe_load((ROOT / "config/real.yaml").read_text())
+ENTRIES = REAL["sources"] | REAL["real_world"]["datasets"]
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_every_dataset_of_the_full_protocol_has_a_license(name):
+    for place in places(ENTRIES[name]):
+        assert licenses_of(place, ROOT), place
 
 
 def provenance(name, inputs=(MESH,), **settings):
