@@ -59,10 +59,9 @@ def pretrained(given: Given, cloud: str, frames: str) -> dict[str, torch.Tensor]
     parts = [path for (source, _), path in given.registrations.items() if source != frames]
     if not parts or not given.sections["pretraining"]:
         return None
-    whole = joined([Registrations.load(path) for path in parts])
     seed = min(seed for source, seed in given.registrations if source != frames)
     settings = _settings(given, cloud, "pretraining")
-    seen = read_as(cloud, whole.subset(whole.rows("train")), _icp(given))
+    seen = read_as(cloud, joined([_train_samples(path) for path in parts]), _icp(given))
     return train_encoder(seen, "pretraining", seed, settings)[0].state_dict()
 
 
@@ -79,6 +78,11 @@ def named(
     gpc = GPC(CONCEPTS, GPCSettings(**given.sections["gpca"]), source, seed)
     scores_S_C, _, _ = gpc.fit(train.embedding, train.concept).attribute(test.embedding)
     return np.array(CONCEPTS)[scores_S_C.argmax(axis=1)]
+
+
+def _train_samples(path: Path) -> Registrations:
+    whole = Registrations.load(path)
+    return whole.subset(whole.rows("train"))
 
 
 def _settings(given: Given, cloud: str, part: str) -> EncoderSettings:

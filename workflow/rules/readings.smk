@@ -42,7 +42,7 @@ rule reading:
         "../envs/gpca.yaml"
     threads: 1
     resources:
-        mem_mb=3000,
+        mem_mb=4000,
         runtime=120,
     params:
         settings=lambda wildcards: as_json(

@@ -79,7 +79,7 @@ def draw_severity_curves(
         panel.set(xlabel=label, title=concept, ylim=(lowest, 101), xlim=limits if len(of_concept) else None)
     panels[0].set_ylabel("accuracy, success (%)")
     handles, labels = panels[0].get_legend_handles_labels()
-    upper.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL_PT, columnspacing=1.2)
+    upper.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=SMALL_PT, columnspacing=1.2)
     of_pose = drawn[drawn["concept"] == "pose"]
     palest = _below(of_pose["value"])
     axes = lower.subplots(lines, WIDEST, sharex=True, sharey=True, squeeze=False)
