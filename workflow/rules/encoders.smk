@@ -140,7 +140,7 @@ rule embed:
         "<logs>/embeddings/{source}/{backbone}/seed{seed}.log",
     benchmark:
         "<benchmarks>/embeddings/{source}/{backbone}/seed{seed}.tsv"
-    priority: 5
+    priority: 11  # the longest reading waits for those of the frames
     conda:
         "../envs/gpca.yaml"
     threads: 1

@@ -41,6 +41,7 @@ rule attribute:
         "<logs>/predictions/{source}/{explainer}.log",
     benchmark:
         "<benchmarks>/predictions/{source}/{explainer}.tsv"
+    priority: 11  # as `embed`
     conda:
         "../envs/gpca.yaml"
     threads: 1

@@ -37,7 +37,7 @@ rule reading:
         "<benchmarks>/readings/{reading_group}.tsv"
     wildcard_constraints:
         reading_group="|".join(GROUPS),
-    priority: 3
+    priority: 12  # that of the frames' clouds trains encoders: the longest job, with many cores to be started early
     conda:
         "../envs/gpca.yaml"
     threads: 1
