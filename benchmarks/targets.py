@@ -7,7 +7,7 @@ Snakemake's plan of the whole run (a dry run, nothing is made) says which jobs a
 say how long each took and how much memory it held. Core time is the sum over those jobs. Wall time is that of a
 schedule which starts the next job as soon as a core is free, the higher priority first: without Snakemake's own start,
 some ten seconds. A job that was killed and continued counts with its last part alone. --write puts the rows of the
-tables, the model and the whole run between the two comments that the page has for the run; all rows are printed. The
+tables, the model, `paper` and `all` between the two comments that the page has for the run; all rows are printed. The
 last line is a JSON object of the target `all`.
 """
 
@@ -32,7 +32,9 @@ from gpca.errors import InputError  # noqa: E402
 
 TARGETS = re.compile(r"(tables/\w+\.md|figures/\w+\.png|[\w.]+)$")  # and what lies in the run's folder itself
 # A figure takes about what the table of the same results takes, and so does another form of a table.
-ON_PAGE = re.compile(r"tables/(?!\w+_(?:compact|grid|oracle|seen_unseen|severity|shift|stream)\.md)|model\.pt$|all$")
+ON_PAGE = re.compile(
+    r"tables/(?!\w+_(?:compact|grid|oracle|seen_unseen|severity|shift|stream)\.md)|(?:model\.pt|paper|all)$"
+)
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the rows")
     options = parser.parse_args(arguments)
     try:
-        run = name_of_run(options.folder)
-        jobs = read_plan(plan(run, options.configfile, options.config), run)
-        costs = {target: cost(needed, options.folder, options.cores) for target, needed in targets(jobs).items()}
+        run, configured = name_of_run(options.folder), (options.configfile, options.config)
+        named = {target: read_plan(plan(run, *configured, target), run) for target in ("paper", "all")}
+        needed_by = targets(named["all"]) | named
+        costs = {target: cost(needed, options.folder, options.cores) for target, needed in needed_by.items()}
         if options.write:
             shown = {target: of_target for target, of_target in costs.items() if ON_PAGE.match(target)}
             markdown.write_between(options.write, f"results/{run}", table(shown, options.cores))
@@ -85,11 +88,11 @@ def name_of_run(folder: Path) -> str:
     return folder.resolve().name
 
 
-def plan(run: str, configfile: Path | None, config: list[str]) -> str:
-    """Return what Snakemake prints of a dry run of everything, done or not."""
+def plan(run: str, configfile: Path | None, config: list[str], target: str = "all") -> str:
+    """Return what Snakemake prints of a dry run of a target and all that it needs, done or not."""
     named = ROOT / f"config/{run}.yaml"
     configfile = configfile or (named if named.is_file() else None)
-    command = [sys.executable, "-m", "snakemake", "--dry-run", "--forceall", "--nolock", "all"]
+    command = [sys.executable, "-m", "snakemake", "--dry-run", "--forceall", "--nolock", target]
     command += ["--config", *config, f"run={run}", *(["--configfile", str(configfile)] if configfile else [])]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("SNAKEMAKE")}
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
@@ -116,7 +119,7 @@ def read_plan(text: str, run: str) -> list[Job]:
 
 
 def targets(jobs: list[Job]) -> dict[str, list[Job]]:
-    """Return the jobs that each target needs, by its path, and those of `all`."""
+    """Return the jobs that each target needs, by its path."""
     maker = {path: job for job in jobs for path in job.outputs}
 
     def needed(target: str) -> list[Job]:
@@ -130,7 +133,7 @@ def targets(jobs: list[Job]) -> dict[str, list[Job]]:
         return list(found.values())
 
     shown = sorted(path for path in maker if TARGETS.match(path))
-    return {path: needed(path) for path in shown} | {"all": jobs}
+    return {path: needed(path) for path in shown}
 
 
 def cost(jobs: list[Job], folder: Path, cores: int) -> Cost | None:

@@ -1,6 +1,7 @@
 """What a target takes, summed over the jobs of Snakemake's own plan, on made-up benchmark files."""
 
 import json
+import re
 
 import pytest
 
@@ -52,7 +53,8 @@ def test_the_critical_path_is_the_longest_chain_in_seconds():
 
 
 def test_a_target_counts_its_own_jobs_once_each(smoke_plan, run_folder):
-    by_target = targets.targets(read_plan(smoke_plan, "smoke"))
+    jobs = read_plan(smoke_plan, "smoke")
+    by_target = targets.targets(jobs)
     table2 = cost(by_target["tables/table2_per_concept.md"], run_folder, cores=2)
     assert table2.jobs == TABLE2
     assert table2.core_s == pytest.approx(30 * TABLE2 + 270)
@@ -61,7 +63,7 @@ def test_a_target_counts_its_own_jobs_once_each(smoke_plan, run_folder):
     objects = cost(by_target["figures/objects_ycb.png"], run_folder, cores=2)
     assert (objects.jobs, objects.wall_s, objects.peak_mb) == (2, 60, 100)
     assert {"tables/table6_backbones.md", "figures/fig3_concepts.png", "metrics.csv"} < set(by_target)
-    assert cost(by_target["all"], run_folder, cores=2).jobs == len(list(run_folder.rglob("*.tsv")))
+    assert cost(jobs, run_folder, cores=2).jobs == len(list(run_folder.rglob("*.tsv")))
 
 
 def test_a_target_with_a_job_that_was_not_recorded_is_not_measured(smoke_plan, run_folder):
@@ -82,7 +84,8 @@ def test_memory_that_was_not_sampled_is_left_out(run_folder, smoke_plan):
 def test_the_command_prints_the_table_and_writes_it_into_its_page(
     smoke_plan, run_folder, tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.setattr(targets, "plan", lambda run, configfile, config: smoke_plan)
+    plans = {"all": smoke_plan, "paper": smoke_plan[: len(smoke_plan) // 2]}
+    monkeypatch.setattr(targets, "plan", lambda run, configfile, config, target: plans[target])
     page = tmp_path / "page.md"
     page.write_text("Before.\n\n<!-- times of results/smoke -->\nold\n<!-- end of results/smoke -->\n\nAfter.\n")
     for _ in range(2):  # the second writing replaces the first
@@ -94,6 +97,8 @@ def test_the_command_prints_the_table_and_writes_it_into_its_page(
     assert text.endswith("<!-- end of results/smoke -->\n\nAfter.\n")
     assert "old" not in text
     assert text.count("| `tables/table7_runtime.md` |") == text.count("| `model.pt` |") == text.count("| `all` |") == 1
+    jobs_of = {name: int(re.search(rf"^\| `{name}` \| (\d+) \|", text, re.MULTILINE)[1]) for name in plans}
+    assert 0 < jobs_of["paper"] < jobs_of["all"]
     row = "| `figures/objects_ycb.png` | 2 | 1.0 | 1.0 | 100 |\n"
     assert (out.count(row), text.count(row)) == (2, 0)  # printed each time, but not on the page
 
@@ -101,7 +106,7 @@ def test_the_command_prints_the_table_and_writes_it_into_its_page(
 def test_faults_are_one_line_and_status_2(smoke_plan, run_folder, tmp_path, monkeypatch, capsys):
     assert targets.main([str(tmp_path / "nowhere")]) == 2
     assert "nowhere: has no benchmark files; name the folder of a finished run" in capsys.readouterr().err
-    monkeypatch.setattr(targets, "plan", lambda run, configfile, config: smoke_plan)
+    monkeypatch.setattr(targets, "plan", lambda run, configfile, config, target: smoke_plan)
     (tmp_path / "page.md").write_text("No place.\n")
     assert targets.main([str(run_folder), "--write", str(tmp_path / "page.md")]) == 2
     err = capsys.readouterr().err
