@@ -10,7 +10,7 @@ from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.structured_text import read_mapping
 
-DEFAULTS = tuple(ROOT / "config" / name for name in ("sources.yaml", "config.yaml", "readings.yaml"))
+DEFAULTS = tuple(ROOT / "config" / name for name in ("sources.yaml", "readings.yaml", "config.yaml"))
 TEMPLATE = "__use_yte__"  # lets Snakemake run code that stands in a config
 
 

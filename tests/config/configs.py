@@ -21,7 +21,7 @@ def merged(*parts):
 
 
 def load(*names):
-    names = ("sources", "config", "readings", *names)
+    names = ("sources", "readings", "config", *names)
     return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in names))
 
 

@@ -1,5 +1,6 @@
 """The other groups: the protocol's own reading is what the protocol gives, and each choice does what it says."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pandas as pd
 import pytest
 
 from baselines.learners import linear_svm
+from gpca.__main__ import main
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.training import train_encoder
@@ -179,3 +181,15 @@ def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(given, e
     ]
     with pytest.raises(InputError, match="lack registrations or poses of tiny, seed 0, beside its predictions"):
         rows_of(frame_input.run, replace(shown, poses={}), choices)
+
+
+def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(given, tmp_path, capsys):
+    choices = {"new_share": [0.33], "batch": [1], "initial": [400]}
+    settings = {"choices": choices, "active_learning": given.sections["active_learning"]}
+    [path] = given.sets.values()
+    command = ["readings", "--group", "pool", "--settings", json.dumps(settings), "--sets", str(path)]
+    assert main([*command, "--out", str(tmp_path / "pool.csv")]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "readings of pool: need more training samples than the run has; raise registrations.train, or" in said
+    assert "(readings.groups.pool: false)" in said
+    assert not (tmp_path / "pool.csv").exists()
