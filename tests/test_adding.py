@@ -20,7 +20,7 @@ from .documents import ROOT, block
 def config():
     """The embedded default, as Snakemake puts it together."""
     merged = {}
-    for name in ("sources", "config", "readings"):
+    for name in ("sources", "readings", "config"):
         update_config(merged, yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()))
     return merged
 
