@@ -18,21 +18,6 @@ def test_the_shipped_configs_are_sound(name):
         assert entry["origin"] == ("download" if name == "real" else "procedural")
 
 
-@pytest.mark.parametrize("name", ["config", "smoke", "real"])
-def test_the_shipped_configs_have_training_samples_for_every_start(name):
-    config = load(name)
-    train, active = config["registrations"]["train"], config["active_learning"]
-    pool = config["readings"]["groups"]["pool"]
-    for initial in (active["initial"], *([min(pool["initial"])] if pool else [])):
-        assert initial // 2 < train // 3
-    stream, known = active["stream"], 2 * (train // 3 - active["initial"] // 2)
-    new = round((stream["arrivals"] - stream["quiet"]) / 3)
-    assert 0 < new <= train // 3
-    assert stream["arrivals"] - new <= known
-    for cause in ("noise", "pose", "overlap"):
-        assert active["initial"] // 3 <= round(config["causes"]["shares"][cause] * config["causes"]["train"])
-
-
 def test_local_data_comes_before_the_download(tmp_path):
     (tmp_path / "bop/lm").mkdir(parents=True)
     sources = run_config.check(load("real") | {"data_dir": str(tmp_path)})
