@@ -13,16 +13,14 @@ from snakemake.utils import update_config
 from gpca.active_learning import acquisition
 from gpca.config.check import check
 
-from .documents import ROOT, block
+from .config.configs import load
+from .documents import block
 
 
 @pytest.fixture
 def config():
     """The embedded default, as Snakemake puts it together."""
-    merged = {}
-    for name in ("sources", "readings", "config"):
-        update_config(merged, yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()))
-    return merged
+    return load()
 
 
 @pytest.fixture

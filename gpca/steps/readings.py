@@ -63,6 +63,6 @@ def run(options: Namespace) -> None:
         rows = group.function()(given, readings, ReadingSizes(**sizes))
         records = [(name_of(options.group, reading), *value) for reading, *value in rows]
         if not records:
-            remedy = f"raise registrations.train, or leave them out (readings.groups.{options.group}: false)"
+            remedy = f"raise registrations.train, or real_world.train, or set readings.groups.{options.group} to false"
             raise InputError(f"readings of {options.group}", "need more training samples than the run has", remedy)
         write_metrics(pd.DataFrame(records, columns=list(TIDY_COLUMNS)), options.out)

@@ -4,6 +4,7 @@ import copy
 
 import yaml
 
+from gpca.config.layers import DEFAULTS
 from gpca.settings import SCHEMA
 
 CONFIG = SCHEMA.parents[2] / "config"
@@ -21,8 +22,8 @@ def merged(*parts):
 
 
 def load(*names):
-    names = ("sources", "readings", "config", *names)
-    return merged(*(yaml.safe_load((CONFIG / f"{name}.yaml").read_text()) for name in names))
+    paths = (*DEFAULTS, *(CONFIG / f"{name}.yaml" for name in names))
+    return merged(*(yaml.safe_load(path.read_text()) for path in paths))
 
 
 def changed(key, value):

@@ -191,5 +191,5 @@ def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(given
     assert main([*command, "--out", str(tmp_path / "pool.csv")]) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert "readings of pool: need more training samples than the run has; raise registrations.train, or" in said
-    assert "(readings.groups.pool: false)" in said
+    assert "or set readings.groups.pool to false" in said
     assert not (tmp_path / "pool.csv").exists()
