@@ -10,6 +10,7 @@ import numpy as np
 
 from gpca.objects.canonical import ObjectClouds
 from gpca.reporting.figures.cloud_views import view_from
+from gpca.reporting.figures.splats import splat
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 from gpca.reporting.words import object_in_words
 
@@ -21,10 +22,6 @@ FILL = 0.9  # The larger side of an object's outline takes this share of its til
 DISC_COVER = 12.0  # This many points lie under a disc on average, so exp(-12) of the surface stays bare.
 LARGEST_DISC = 0.03  # No disc is larger than this share of the picture, so that a sparse cloud looks sparse.
 OUTLINE = 0.6  # A pixel is solid where this share around it is; above 1/2, that draws the outline in.
-AWAY = 0.7  # Discs that face away are this much smaller, lest the far wall stand out over a rim.
-BLEND = 1.5  # Discs within this many radii of the nearest are one surface: their normals are averaged.
-CROWN = 1.5  # A disc's rim lies this many radii below its middle, so that a face's own discs win at its edge.
-LEAST_TILT = 0.12  # Discs seen edge on are kept this wide.
 
 
 def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, float], pixels: int) -> np.ndarray:
@@ -54,7 +51,7 @@ def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, flo
     positions = (positions - (low + high) / 2) * scale
     positions[:, :2] += size / 2
     radius = min(_disc_radius(positions), LARGEST_DISC * size)
-    depth, normal = _splat(positions, facing, radius, size)
+    depth, normal = splat(positions, facing, radius, size)
     image = _shade(depth, normal, relief=size / 40, radius=radius)
     return image.reshape(pixels, SUPERSAMPLING, pixels, SUPERSAMPLING, 3).mean(axis=(1, 3))[::-1]
 
@@ -68,54 +65,6 @@ def _disc_radius(positions: np.ndarray) -> float:
         return 1.0
     distance, _ = cKDTree(positions).query(positions, k=[neighbours + 1])
     return max(1.0, float(np.median(distance)) * math.sqrt(DISC_COVER / neighbours))
-
-
-def _splat(positions, facing, radius, size) -> tuple[np.ndarray, np.ndarray]:
-    """Return the depth (size, size), NaN where bare, and the summed normals (size, size, 3) of what is seen."""
-    from scipy.ndimage import minimum_filter
-
-    nearest = np.full(size * size, -np.inf)
-    for pixel, height, crown, _, _ in _discs(positions, facing, radius, size):
-        np.maximum.at(nearest, pixel, height - crown)
-    # A disc that lies behind everything around it adds to no pixel and is left out.
-    behind = minimum_filter(nearest.reshape(size, size), 2 * math.ceil(radius) + 1)
-    column, row = np.floor(positions[:, :2].T).astype(np.int64)
-    kept = positions[:, 2] + (1 + BLEND) * radius > behind[row, column]
-    facing = facing[kept]
-    towards_eye = facing * np.where(facing[:, 2:] < 0, -1.0, 1.0)
-    weights = np.zeros(size * size)
-    heights = np.zeros(size * size)
-    normal = np.zeros((3, size * size))
-    for pixel, height, crown, point, weight in _discs(positions[kept], facing, radius, size):
-        seen = height - crown > nearest[pixel] - BLEND * radius
-        pixel, weight = pixel[seen], weight[seen]
-        np.add.at(weights, pixel, weight)
-        np.add.at(heights, pixel, weight * height[seen])
-        for axis in range(3):
-            np.add.at(normal[axis], pixel, weight * towards_eye[point[seen], axis])
-    depth = np.divide(heights, weights, out=np.full(size * size, np.nan), where=weights > 0)
-    return depth.reshape(size, size), normal.T.reshape(size, size, 3)
-
-
-def _discs(positions, facing, radius, size):
-    """Yield, for every pixel offset within the radius, what is hit there: pixel, depth, crown, point, weight."""
-    column, row = np.floor(positions[:, :2].T).astype(np.int64)
-    centre = row * size + column
-    height = positions[:, 2]
-    slant = np.maximum(np.abs(facing[:, 2]), LEAST_TILT) * np.where(facing[:, 2] < 0, -1.0, 1.0)
-    tilt_right, tilt_up = -facing[:, 0] / slant, -facing[:, 1] / slant
-    away = facing[:, 2] < 0
-    reach = math.floor(radius)
-    for right in range(-reach, reach + 1):
-        for up in range(-reach, reach + 1):
-            rise = tilt_right * right + tilt_up * up
-            distance2 = (right * right + up * up + rise * rise) / radius**2
-            point = np.flatnonzero(distance2 <= np.where(away, AWAY**2, 1.0))
-            distance2, behind = distance2[point], away[point]
-            pixel = centre[point] + (up * size + right)
-            crown = radius * (CROWN * distance2 + behind)
-            weight = np.exp(-3 * distance2) * np.where(behind, 0.01, 1.0)
-            yield pixel, height[point] + rise[point], crown, point, weight
 
 
 def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) -> np.ndarray:
