@@ -1,18 +1,16 @@
 """What a run scales to, by the plan of the smoke run and made-up seconds; a larger run is configured, not planned."""
 
 import json
-from pathlib import Path
 
 import pytest
-import yaml
-from snakemake.utils import update_config
 
 from benchmarks import scale
 from benchmarks.schedule import Job
 from gpca.config.check import check
-from gpca.config.layers import DEFAULTS
 from gpca.config.leave_out import without_false
 from gpca.errors import InputError
+
+from .config.configs import load, merged
 
 HEADER = "s\th:m:s\tmax_rss\n"
 
@@ -62,11 +60,7 @@ def test_a_job_grows_with_the_results_it_reads_and_writes():
 
 
 def test_a_larger_run_has_as_many_of_each_and_passes_the_check():
-    config = {}
-    for default in DEFAULTS:
-        update_config(config, yaml.safe_load(Path(default).read_text()))
-    update_config(config, scale.larger_config(7, 4, 20))
-    config = without_false(config)
+    config = without_false(merged(load(), scale.larger_config(7, 4, 20)))
     sources = check(config)
     assert (len(sources), len(config["seeds"]), len(config["explainers"])) == (7, 4, 20)
     assert "transfer" not in config["controls"]["controls"]

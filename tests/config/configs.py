@@ -3,6 +3,7 @@
 import copy
 
 import yaml
+from snakemake.utils import update_config
 
 from gpca.config.layers import DEFAULTS
 from gpca.settings import SCHEMA
@@ -12,12 +13,10 @@ MISSING = object()
 
 
 def merged(*parts):
-    """Snakemake's way of laying one config over another."""
+    """The configs laid over each other by Snakemake itself."""
     whole = {}
     for part in parts:
-        for key, value in part.items():
-            both = isinstance(value, dict) and isinstance(whole.get(key), dict)
-            whole[key] = merged(whole[key], value) if both else copy.deepcopy(value)
+        update_config(whole, copy.deepcopy(part))
     return whole
 
 

@@ -5,9 +5,9 @@ import pytest
 from .configs import load
 
 
-@pytest.mark.parametrize("name", ["config", "smoke", "real"])
-def test_the_shipped_configs_have_training_samples_for_every_start(name):
-    config = load(name)
+@pytest.mark.parametrize("names", [(), ("smoke",), ("real",)])
+def test_the_shipped_configs_have_training_samples_for_every_start(names):
+    config = load(*names)
     train, active = config["registrations"]["train"], config["active_learning"]
     pool = config["readings"]["groups"]["pool"]
     for initial in (active["initial"], *([min(pool["initial"])] if pool else [])):

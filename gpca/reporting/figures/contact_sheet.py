@@ -27,10 +27,9 @@ OUTLINE = 0.6  # A pixel is solid where this share around it is; above 1/2, that
 def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, float], pixels: int) -> np.ndarray:
     """Draw an oriented point cloud as an opaque, shaded solid in orthographic projection, filling the picture.
 
-    Every point is a disc in its tangent plane (surface splatting: Zwicker et al., SIGGRAPH 2001). A first pass keeps
-    the nearest depth of each pixel, a second averages the normals of the discs at that depth, and the shading is
-    done once per pixel: Lambert with a soft terminator, darkened where the depth buffer dips behind its
-    surroundings (Luft et al., "Image enhancement by unsharp masking the depth buffer", SIGGRAPH 2006).
+    Every point is drawn as a disc (:func:`gpca.reporting.figures.splats.splat`), and the shading is done once per
+    pixel: Lambert with a soft terminator, darkened where the depth buffer dips behind its surroundings (Luft et al.,
+    "Image enhancement by unsharp masking the depth buffer", SIGGRAPH 2006).
 
     Args:
         points: The points (P, 3), in any unit of length.
