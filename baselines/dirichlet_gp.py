@@ -1,7 +1,7 @@
 """Dirichlet-based exact GP classification on the embeddings (Milios et al. 2018; paper, Table V): a GP on all samples.
 
 A label becomes a Dirichlet distribution with α = α_ε + 1{y = c}, its log-normal approximation a regression target
-with a noise of its own (gpytorch's likelihood does this). One exact GP per concept is then fitted by its marginal
+with a noise of its own. One exact GP per concept is then fitted by its marginal
 likelihood, and the softmax of its draws are the probabilities.
 """
 
@@ -50,7 +50,6 @@ class DirichletGP:
     def fit(self, registrations: Registrations) -> None:
         """Fit to the labelled embeddings; fewer than two concepts among the labels raise an InputError."""
         import torch
-        from gpytorch.likelihoods import DirichletClassificationLikelihood
         from sklearn.preprocessing import StandardScaler
 
         from gpca.adam import Adam
@@ -60,21 +59,18 @@ class DirichletGP:
         self._scaler = StandardScaler().fit(h_N_d)
         self._inputs_N_d = self._scaler.transform(h_N_d)
         squared_N_N = _squared_distances(self._inputs_N_d, self._inputs_N_d)
-        targets_N = torch.tensor([CONCEPTS.index(concept) for concept in registrations.concept])
-        likelihood = DirichletClassificationLikelihood(
-            targets_N, alpha_epsilon=self._alpha, num_classes=len(CONCEPTS), dtype=torch.float64
-        )
-        values_C_N = likelihood.transformed_targets
-        noise_C_N = likelihood.noise_covar.noise.detach()
+        alpha_C_N = self._alpha + (np.array(CONCEPTS)[:, None] == registrations.concept)
+        noise_C_N = np.log(1 / alpha_C_N + 1)
+        values_C_N = np.log(alpha_C_N) - noise_C_N / 2
         median = float(torch.from_numpy(squared_N_N).median()) ** 0.5
         self._log_lengthscale_C = torch.full((len(CONCEPTS),), np.log(median if median > 0 else 1.0)).double()
-        self._log_scale_C = values_C_N.var(dim=1).log()
-        self._mean_C = values_C_N.mean(dim=1)
+        self._log_scale_C = torch.from_numpy(np.log(values_C_N.var(axis=1, ddof=1)))
+        self._mean_C = torch.from_numpy(values_C_N.mean(axis=1))
         parameters = [self._log_lengthscale_C, self._log_scale_C, self._mean_C]
         optimiser = Adam(parameters, self._learning_rate)
-        data = [(c, squared_N_N, values_C_N[c].numpy(), noise_C_N[c].numpy()) for c in range(len(CONCEPTS))]
+        data = [(c, squared_N_N, values_C_N[c], noise_C_N[c]) for c in range(len(CONCEPTS))]
         for _ in range(self._iterations):
-            gradient_C_3 = np.array([self._gradient(*of_concept) for of_concept in data]) / len(targets_N)
+            gradient_C_3 = np.array([self._gradient(*of_concept) for of_concept in data]) / len(h_N_d)
             for parameter, gradient_C in zip(parameters, gradient_C_3.T, strict=True):
                 parameter.grad = torch.from_numpy(gradient_C.copy())
             optimiser.step()

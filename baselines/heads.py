@@ -71,7 +71,8 @@ class Heads:
         for width, outputs in pairwise(widths):
             weight = torch.randn((self._heads, width, outputs), generator=random) * (2 / width) ** 0.5
             self._layers += [weight.requires_grad_(), torch.zeros((self._heads, 1, outputs), requires_grad=True)]
-        optimiser = torch.optim.AdamW(self._layers, self._learning_rate, weight_decay=self._weight_decay)
+        # Fused, since the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
+        optimiser = torch.optim.AdamW(self._layers, self._learning_rate, weight_decay=self._weight_decay, fused=True)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, self._steps)
         for _ in range(self._steps):
             rows_E_B = torch.rand((self._heads, len(targets_N)), generator=random).argsort(dim=1)[:, :BATCH_SIZE]

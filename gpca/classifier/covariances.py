@@ -12,6 +12,8 @@ import gpytorch
 import torch
 from torch import Tensor
 
+from gpca.elementary import square_root
+
 
 class ScaledPolynomial(gpytorch.kernels.PolynomialKernel):
     """The covariance (xᵀx' / d + c)², since nothing is learned from plain inner products of some hundred dimensions."""
@@ -51,7 +53,7 @@ def cross_covariance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_
     squared_A_B = squared_distances(a_A_d, b_B_d)
     if isinstance(base, gpytorch.kernels.MaternKernel):
         # The root of zero has an infinite derivative, so the squares stay above it.
-        scaled_C_A_B = squared_A_B.clamp_min(1e-15).sqrt() * (math.sqrt(3) / base.lengthscale)
+        scaled_C_A_B = square_root(squared_A_B.clamp_min(1e-15)) * (math.sqrt(3) / base.lengthscale)
         return scale_C_1_1 * (1 + scaled_C_A_B) * torch.exp(-scaled_C_A_B)
     if isinstance(base, gpytorch.kernels.RBFKernel):
         return scale_C_1_1 * torch.exp(squared_A_B * (-0.5 / base.lengthscale.square()))

@@ -15,6 +15,7 @@ from torch import Tensor, nn
 
 from gpca.classifier.covariances import cross_covariance, variance
 from gpca.classifier.latents import Latents
+from gpca.elementary import square_root
 
 # gpytorch's in single precision: added to variances of the prior; the least variance of a latent.
 JITTER, LEAST_VARIANCE = 1e-4, 1e-6
@@ -64,7 +65,7 @@ class SparseGPs(nn.Module):
         mean_C_N, variance_C_N = self.marginals(inputs_N_d)
         shape = (LIKELIHOOD_DRAWS, len(inputs_N_d), len(mean_C_N))
         normal_D_N_C = torch.randn(shape, generator=self._random)
-        deviation_N_C = variance_C_N.clamp_min(LEAST_VARIANCE).sqrt().T
+        deviation_N_C = square_root(variance_C_N.clamp_min(LEAST_VARIANCE)).T
         logits_D_C_N = (mean_C_N.T + deviation_N_C * normal_D_N_C).mT.contiguous()
         # Classes before samples: sums over three neighbours are several times as slow.
         log_p_D_N = logits_D_C_N[:, targets_N, torch.arange(len(targets_N))] - logits_D_C_N.logsumexp(dim=1)

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 
 from gpca.classifier.gpc import GPC
+from gpca.elementary import log_sum_exp
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import draw_points
 from gpca.gradients.settings import GradientSettings
@@ -44,7 +45,7 @@ def drawn_cloud(registrations: Registrations, row: int, source: str, seed: int, 
 def log_odds(logits_N_C: torch.Tensor, of: int) -> torch.Tensor:
     """Return the log odds (N,) of one class against all others, from logits."""
     others = [c for c in range(logits_N_C.shape[1]) if c != of]
-    return logits_N_C[:, of] - torch.logsumexp(logits_N_C[:, others], dim=1)
+    return logits_N_C[:, of] - log_sum_exp(logits_N_C[:, others])
 
 
 def point_gradient(encoder: torch.nn.Module, gpc: GPC, cloud_1_N_3: torch.Tensor, of: int) -> np.ndarray:

@@ -39,6 +39,7 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
     import torch
 
     from gpca.adam import Adam
+    from gpca.elementary import logarithm
 
     require_examples(examples, FEWEST_EXAMPLES)
     reduce = Reduction([example.descriptors for example in examples], components)
@@ -55,7 +56,7 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
         squares = lengths[:, None] + lengths - 2 * scaled @ scaled.T
         weights = torch.softmax((-squares).masked_fill(others, -torch.inf), dim=1)
         predicted = weights @ variances
-        loss = (predicted.log() + variances / predicted).sum(dim=1).mean()
+        loss = (logarithm(predicted) + variances / predicted).sum(dim=1).mean()
         loss.backward()
         optimiser.step()
     scale_K = np.exp(log_scale.detach().numpy())
