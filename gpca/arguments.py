@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import NoReturn
 
+from gpca.numerals import whole
+
 
 class OneLineParser(argparse.ArgumentParser):
     """A parser whose errors are one line, as every other refusal of the suite."""
@@ -19,11 +21,10 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
     """Return the type of an option that takes a whole number from `least` to `most`."""
 
     def read(text: str) -> int:
-        # Python reads more: digits of other scripts, underlines between them, and numbers that take it minutes.
-        digits = text.removeprefix("-")
-        if not (digits.isascii() and digits.isdigit() and len(digits) < 20 and least <= int(text) <= most):
-            raise argparse.ArgumentTypeError(f"'{text[:40]}' is not a whole number from {least} to {most}")
-        return int(text)
+        try:
+            return whole(text, least, most)
+        except ValueError as fault:  # argparse shows the words of its own error alone
+            raise argparse.ArgumentTypeError(str(fault)) from fault
 
     return read
 

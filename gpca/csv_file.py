@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.files import whole_file
 from gpca.limits import require_file
+from gpca.numerals import decimal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,12 +70,9 @@ def finite_number(subject: object, name: str, text: str, remedy: str = "regenera
         InputError: no number, NaN or infinity.
     """
     try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(subject, f"'{name}' is '{text}', not a finite number", remedy)
-    return value
+        return decimal(text.strip())
+    except ValueError as fault:
+        raise InputError(subject, f"'{name}' is '{text[:40]}', not a finite number", remedy) from fault
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, form: str | None = "%.6f") -> None:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+from pathlib import Path
 
 import numpy as np
+
+from gpca.errors import InputError
+from gpca.numerals import whole
 
 
 def seed_of(*axes: object) -> int:
@@ -20,3 +24,14 @@ def seed_of(*axes: object) -> int:
 def generator(*axes: object) -> np.random.Generator:
     """Return NumPy's PCG64 generator seeded by :func:`seed_of`."""
     return np.random.default_rng(seed_of(*axes))
+
+
+def seed_of_file(path: str | Path) -> int:
+    """Return the seed that the name of a run's file tells, ``…/seed3.npz``; InputError where it tells none."""
+    name = Path(path).stem
+    try:
+        if name.startswith("seed"):
+            return whole(name.removeprefix("seed"), most=2**32 - 1)
+    except ValueError:
+        pass
+    raise InputError(path, f"is not named …/seed{{number}}{Path(path).suffix}", "rename it")

@@ -25,6 +25,7 @@ TOP = {
         "interrupts",
         "json_file",
         "limits",
+        "numerals",
     ),
     *("processor", "progress", "provenance", "registry", "seeds", "settings", "standard_streams", "structured_text"),
 }

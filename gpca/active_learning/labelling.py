@@ -14,6 +14,7 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.csv_file import read_csv
 from gpca.errors import InputError
+from gpca.numerals import whole
 from gpca.seeds import generator
 
 LABEL_COLUMNS = ("sample", "split", "concept")
@@ -41,9 +42,12 @@ class LabelFile:
         rows = read_csv(self.path, LABEL_COLUMNS)
         for line, (sample, split, concept) in enumerate(rows[list(LABEL_COLUMNS)].itertuples(index=False), start=2):
             where = f"{self.path}, line {line}"
-            key = (split, int(sample) if sample.isdecimal() else -1)
+            try:
+                key = (split, whole(sample))
+            except ValueError:
+                key = (split, -1)
             if key not in known:
-                raise InputError(where, f"no sample '{sample}' of split '{split}'", "remove the line")
+                raise InputError(where, f"no sample '{sample[:40]}' of split '{split}'", "remove the line")
             concept = concept.strip()
             if concept != SKIPPED:
                 require_name(concept, where)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.limits import LARGEST_NUMBER
 
 
 def transform(T_b_a: np.ndarray, points_a: np.ndarray) -> np.ndarray:
@@ -73,3 +74,5 @@ def require_rigid(T_b_a: np.ndarray, subject: object) -> None:
     require_rotation(T_b_a, subject)
     if not np.allclose(T_b_a[3], (0, 0, 0, 1), atol=1e-6):
         raise InputError(subject, "the pose is not a rigid transform", "its last row must be 0 0 0 1")
+    if (farthest := np.abs(T_b_a[:3, 3]).max()) > LARGEST_NUMBER:
+        raise InputError(subject, f"the pose has a translation of {farthest:.3g}", "give it in the unit of the points")

@@ -14,6 +14,7 @@ import numpy as np
 from gpca.attribution.predictions import TIMING_COLUMNS, concepts_of, read_predictions, require_samples
 from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
+from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -224,11 +225,10 @@ def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
 
 
 def source_method_seed(path: str | Path) -> tuple[str, str, int]:
-    parts = Path(path).with_suffix("").parts
-    seed = parts[-1].removeprefix("seed") if parts else ""
-    if len(parts) < 3 or not parts[-1].startswith("seed") or not seed.isdecimal():
+    seed, parts = seed_of_file(path), Path(path).parts
+    if len(parts) < 3:
         raise InputError(path, "is not named …/{source}/{explainer}/seed{number}.csv", "rename it")
-    return parts[-3], parts[-2], int(seed)
+    return parts[-3], parts[-2], seed
 
 
 def read_all_metrics(paths: Iterable[str | Path]) -> pd.DataFrame:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gpca.csv_file import finite_number
 from gpca.errors import InputError
+from gpca.numerals import whole
 
 PUBLISHED = Path(__file__).with_name("published.csv")
 HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # on which the paper measured its times (Sec. IV-E)
@@ -253,14 +254,11 @@ def _number(where: str, fields: dict[str, str]) -> Number:
     )
 
 
-def _whole(where: str, name: str, text: str, least: float = -math.inf) -> int:
+def _whole(where: str, name: str, text: str, least: int = -9) -> int:
     try:
-        number = int(text)
-    except ValueError:
-        number = None
-    if number is None or number < least:
-        raise InputError(where, f"'{name}' is '{text}'", "give a whole number")
-    return number
+        return whole(text, least)
+    except ValueError as fault:
+        raise InputError(where, f"'{name}' is '{text}'", "give a whole number") from fault
 
 
 def _counterpart(where: str, fields: dict[str, str]) -> Counterpart | None:

@@ -20,7 +20,7 @@ from gpca.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by
 from gpca.diagnosis.measures import MEASURES, measure
 from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
-from gpca.seeds import generator
+from gpca.seeds import generator, seed_of_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +85,7 @@ def _seeds(*given: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataF
                 raise InputError(
                     path, "its samples differ from those of the causes", "regenerate both from the same config"
                 )
-        yield int(Path(causes_file).stem.removeprefix("seed")), causes, samples[list(SAMPLE_COLUMNS)], said
+        yield seed_of_file(causes_file), causes, samples[list(SAMPLE_COLUMNS)], said
 
 
 def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

@@ -17,6 +17,7 @@ from gpca.causes.truth import NOMINAL, Truth
 from gpca.errors import InputError
 from gpca.objects.views import instance_of
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,7 +73,7 @@ def read_judged(
     """
     truths, judged = {}, {}
     for path in causes_files:
-        source, seed = Path(path).parent.name, int(Path(path).stem.removeprefix("seed"))
+        source, seed = Path(path).parent.name, seed_of_file(path)
         causes = Causes.load(path)
         truths[source, seed] = causes.subset(causes.rows("test"))
         judged[source, CEILING, seed] = ceiling_of(truths[source, seed], seed)
@@ -83,7 +84,7 @@ def read_judged(
         rows = read_predictions(path)
         rows = rows[rows["split"] == "test"]
         truth = truths[source, seed]
-        if rows["sample"].astype(int).tolist() != truth.registrations.sample.tolist():
+        if rows["sample"].tolist() != [str(number) for number in truth.registrations.sample]:
             raise InputError(
                 path, "its test samples differ from those of the causes", "regenerate both from the same config"
             )

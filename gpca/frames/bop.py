@@ -6,7 +6,6 @@ files and meters here; cameras look along +z with x to the right and y down.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.files import read_image
 from gpca.frames.scene_files import REMEDY, read_camera, read_images, read_pose
+from gpca.numerals import whole
 
 FEWEST_POINTS = 64
 
@@ -173,8 +173,10 @@ class TooFewPoints(InputError):
 
 
 def _frames_of_scene(folder: Path) -> list[Frame]:
-    if not re.fullmatch("[0-9]{1,9}", folder.name):
-        raise InputError(folder, "the name of a scene's folder is not a number", "name it like 000001")
+    try:
+        scene = whole(folder.name)
+    except ValueError as fault:
+        raise InputError(folder, "the name of a scene's folder is not a number", "name it like 000001") from fault
     cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
     colours = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
     frames = []
@@ -186,7 +188,7 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
         camera_3_3, depth_scale = read_camera(cameras[image], f"{folder / 'scene_camera.json'}: image {image}")
         frames.append(
             Frame(
-                scene=int(folder.name),
+                scene=scene,
                 image=image,
                 camera_3_3=camera_3_3,
                 depth_scale=depth_scale,

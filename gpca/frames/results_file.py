@@ -5,7 +5,6 @@ Format: https://github.com/thodan/bop_toolkit, "Evaluating your method": `scene_
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 from gpca.alignment.rigid import require_rotation
 from gpca.csv_file import read_csv
 from gpca.errors import InputError
+from gpca.numerals import decimal, whole
 
 COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
 REMEDY = "export it again"
@@ -74,9 +74,10 @@ def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.n
 
 def _id(subject: str, row: dict, column: str) -> int:
     text = str(row[column]).strip()
-    if not re.fullmatch("[0-9]{1,9}", text):
-        raise InputError(subject, f"{column} is {text[:40]!r}, not a whole number", REMEDY)
-    return int(text)
+    try:
+        return whole(text)
+    except ValueError as fault:
+        raise InputError(subject, f"{column} is {text[:40]!r}, not a whole number", REMEDY) from fault
 
 
 def _pose(subject: str, row: dict) -> np.ndarray:
@@ -94,12 +95,12 @@ def _pose(subject: str, row: dict) -> np.ndarray:
 
 
 def _entries(subject: str, row: dict, column: str, count: int) -> np.ndarray:
-    texts = str(row[column]).replace(",", " ").split()
-    if not all(re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text, re.ASCII) for text in texts):
-        raise InputError(subject, f"{column} contains values that are not finite numbers", REMEDY)
-    if len(texts) != count:
-        raise InputError(subject, f"{column} has {len(texts)} entries, not {count}", "separate them by spaces")
-    numbers = np.array(texts, float)
+    try:
+        numbers = np.array([decimal(text) for text in str(row[column]).replace(",", " ").split()])
+    except ValueError as fault:
+        raise InputError(subject, f"{column} contains values that are not finite numbers: {fault}", REMEDY) from fault
+    if len(numbers) != count:
+        raise InputError(subject, f"{column} has {len(numbers)} entries, not {count}", "separate them by spaces")
     if not (abs(numbers) < 1e100).all():  # no norm of these overflows
         raise InputError(subject, f"{column} contains a number that is out of bounds", REMEDY)
     return numbers

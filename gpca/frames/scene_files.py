@@ -5,7 +5,6 @@ Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_form
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from gpca.alignment.rigid import require_rotation
 from gpca.errors import InputError
 from gpca.json_file import read_json
+from gpca.numerals import whole
 
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
 # Wide of every depth camera there is; what lies between is for the measured points to say.
@@ -30,11 +30,13 @@ def read_images(path: Path) -> dict[int, Any]:
     """
     found: dict[int, Any] = {}
     for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
-        if not re.fullmatch("[0-9]{1,9}", key):
-            raise InputError(path, f"its key {key[:40]!r} is not an image number", REMEDY)
-        if int(key) in found:
-            raise InputError(path, f"image {int(key)} occurs twice", "keep one of the two")
-        found[int(key)] = entry
+        try:
+            image = whole(key)
+        except ValueError as fault:
+            raise InputError(path, f"its key {key[:40]!r} is not an image number", REMEDY) from fault
+        if image in found:
+            raise InputError(path, f"image {image} occurs twice", "keep one of the two")
+        found[image] = entry
     return found
 
 

@@ -14,6 +14,8 @@ from gpca.errors import InputError
 from gpca.objects.canonical import normals_towards_camera
 
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
+# Diameters of the target between its center and the source: farther off, nothing can meet, and the unit may be wrong.
+FARTHEST_START = 10.0
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class Clouds:
         target = frame.coordinates(_thinned(target, cloud_points, "target", notes))
         seen = _thinned(source, cloud_points, "source", notes)
         source = frame.coordinates(transform(T_init, seen))
+        if T_target_source_init is not None:
+            _require_near(source, unit)
         _require_like_sizes(source, target)
         normals = None if settings.method == "point_to_point" else normals_towards_camera(target)
         return cls(seen, T_init, frame, source, target, BatchedICP(target, settings, normals))
@@ -79,8 +83,16 @@ def _thinned(points: np.ndarray, cloud_points: int, role: str, notes: list[str])
     return kept
 
 
+def _require_near(source: np.ndarray, unit: str) -> None:
+    """Raise an InputError where a pose that was given puts the source, in diameters of the target, far from it."""
+    if (distance := float(np.linalg.norm(source, axis=1).min())) > FARTHEST_START:
+        found = f"puts the source {distance:.3g} diameters of the target away from it"
+        raise InputError("initial pose", found, f"give T_target_source, with its translation in {unit}")
+
+
 def _require_like_sizes(source: np.ndarray, target: np.ndarray) -> None:
     extents = [float(np.linalg.norm(np.ptp(cloud, axis=0))) for cloud in (source, target)]
     ratio = extents[0] / extents[1]
     if not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
-        raise InputError("source", f"is {ratio:.3g} times as large as the target", "give both in the same unit")
+        remedy = "give both in the same unit, without points far from the object"
+        raise InputError("source", f"is {ratio:.3g} times as large as the target", remedy)

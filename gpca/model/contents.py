@@ -5,18 +5,21 @@ A model may come from anywhere. What is wrong in it has to be found when it is l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import torch
 
+from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.covariances import make_covariance
 from gpca.descriptors.dataset import WIDTHS
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import require_like
+from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.model.familiarity import MEASURES
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policy import TREATMENTS
 from gpca.settings import check_settings
 from gpca.uncertainty.settings import FEWEST_STARTS
 
@@ -28,6 +31,7 @@ MOST_CLOUD_POINTS = 10**6
 MOST_ITERATIONS = 10**5  # of ICP
 MOST_RUNS = 10**4  # of ICP, to describe a pair
 MOST_NEIGHBOURS = 10**4  # or whatever else a backbone's options count
+ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
 def require_possible(content: Mapping, settings: EncoderSettings) -> None:
@@ -50,21 +54,40 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     for name, value in settings.options.items():  # a backbone of a user's own has options of its own
         if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBOURS:
             raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBOURS}")
-    names = [content["title"], *content["treatments"], *content["treatments"].values(), *content["gpc"]["classes"]]
-    if not all(isinstance(name, str) and name.isprintable() for name in names):
-        raise ValueError("a name is not a line of text")
+    if not isinstance(content["title"], str) or not content["title"].isprintable():
+        raise ValueError("its title is not a line of text")
+    _require_treatments(content["treatments"])
     if type(content["stand_in"]) is not bool:
         raise ValueError("stand_in is neither true nor false")
     with torch.device("meta"):  # what the options ask for may not fit into the memory
         encoder = make_encoder(settings.backbone, settings.options)
     require_like(content["encoder"], encoder.state_dict(), "encoder")
-    _require_classifier(content["gpc"], encoder.embedding_size)
+    _require_classifier(content["gpc"], CONCEPTS, encoder.embedding_size)
 
 
 def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
     for name, (count, least, most) in counts.items():
         if type(count) is not int or not least <= count <= most:
             raise ValueError(f"{name}: {count!r} is not a number from {least} to {most}")
+
+
+def _require_treatments(treatments: Mapping) -> None:
+    for concept, action in treatments.items():
+        if concept not in CONCEPTS:
+            raise ValueError(f"treatments: {str(concept)[:40]!r} is not one of {', '.join(CONCEPTS)}")
+        if action not in (actions := _known_actions([*treatments.values()])):
+            raise ValueError(f"treatments: {str(action)[:40]!r} is not one of {', '.join(actions)}")
+    if len(set(treatments.values())) < len(treatments):
+        raise ValueError("treatments: one action treats two concepts")
+
+
+def _known_actions(named: list[str]) -> Collection[str]:
+    """Return the actions that there are; those of the paper need no robot's code to be loaded."""
+    if set(named) <= set(TREATMENTS.values()):
+        return TREATMENTS.values()
+    from gpca.recovery.actions import ACTIONS
+
+    return ACTIONS
 
 
 def _require_ranges(ranges: Mapping) -> None:
@@ -100,18 +123,19 @@ def _require_diagnoser(state: Mapping) -> None:
         raise ValueError(f"'error_weights' has shape {tuple(weights.shape)}, not {(features + 1,)}")
     if type(threshold) is not float or not 0 <= threshold <= 2:
         raise ValueError(f"threshold: {threshold!r} is not a probability")
-    for gpc in (state["classifier"]["failure"], *causes):
+    for gpc, classes in [
+        (state["classifier"]["failure"], (NOMINAL, FAILED)),
+        *((cause, (ABSENT, PRESENT)) for cause in causes),
+    ]:
         _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
         check_settings(gpc["settings"], "explainers", "gpca")
-        _require_classifier(gpc, features)
-        if len(gpc["classes"]) != 2:
-            raise ValueError("a classifier of the pair does not have two classes")
+        _require_classifier(gpc, classes, features)
 
 
-def _require_classifier(state: Mapping, d: int) -> None:
-    n_classes = len(state["classes"])
-    if n_classes < 2 or len(set(state["classes"])) < n_classes:
-        raise ValueError("its concepts are fewer than two or not all different")
+def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> None:
+    if tuple(state["classes"]) != classes:  # their order is that of the scores
+        raise ValueError(f"its classes are {str(state['classes'])[:80]}, not {', '.join(classes)}")
+    n_classes = len(classes)
     m, n = len(state["inducing"]), len(state["labelled"])
     shapes = {
         "scaler_mean": (d,),
@@ -131,7 +155,9 @@ def _require_classifier(state: Mapping, d: int) -> None:
         raise ValueError("its kernel has different bounds")
     if not (state["scaler_scale"] > 0).all():
         raise ValueError("'scaler_scale' contains values that are not above 0")
-    if (torch.diagonal(state["covariance"], dim1=1, dim2=2) < 0).any():
-        raise ValueError("'covariance' contains negative variances")
+    covariance = state["covariance"].double()
+    # Cholesky reads one triangle alone.
+    if (covariance - covariance.mT).abs().max() > ASYMMETRY or torch.linalg.cholesky_ex(covariance).info.any():
+        raise ValueError("'covariance' is not symmetric and positive definite")
     if state["targets"].is_floating_point() or not ((state["targets"] >= 0) & (state["targets"] < n_classes)).all():
         raise ValueError("'targets' names a missing concept")

@@ -22,6 +22,7 @@ from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_ERROR = 1e-3  # diameters; below it lies the spacing of the points
+UNKNOWN = "unknown"  # the state where nothing that is said means anything
 LIKELY = 0.5  # probability from which a concept is called one of the causes
 
 
@@ -37,6 +38,7 @@ class Diagnosis:
         bald: of the least certain of these probabilities, nats (Eq. 7).
         expected_error: of the pose: ADD, or ADD-S of a symmetric object.
         unlikeness: how unlike the training samples the pair is: 1 % of these are above 1.
+        void: the pair is such that none of these numbers means anything (:mod:`gpca.model.voids`).
     """
 
     failure: float
@@ -46,16 +48,19 @@ class Diagnosis:
     bald: float
     expected_error: float
     unlikeness: float = 0.0
+    void: bool = False
 
     @property
     def state(self) -> str:
-        """``nominal`` or ``failed``."""
+        """``nominal``, ``failed`` or ``unknown``."""
+        if self.void:
+            return UNKNOWN
         return NOMINAL if self.failure < self.threshold else FAILED
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The causes that are more likely than not, the likeliest first, and at least that one; none if nominal."""
-        if self.state == NOMINAL:
+        """The causes that are more likely than not, the likeliest first, and at least that one; none unless failed."""
+        if self.state != FAILED:
             return ()
         first, *rest = sorted(self.causes, key=lambda cause: -self.causes[cause])
         return first, *(cause for cause in rest if self.causes[cause] >= LIKELY)

@@ -26,9 +26,10 @@ from gpca.encoders.training import best_device
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds
 from gpca.model.diagnoser import Diagnosis
-from gpca.model.explanation import Explanation, PoseSpread
+from gpca.model.explanation import CHECK, Explanation, PoseSpread
 from gpca.model.file import Model, model_path
 from gpca.model.pose_spread import MONTE_CARLO, NAMES, estimated_spread, spread_estimator, spread_of_icp
+from gpca.model.voids import Void, voids_of
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import UncertaintySettings
@@ -101,11 +102,12 @@ class Explainer:
             clouds = Clouds.prepared(*given, self.model.cloud_points, self.model.icp, notes)
         with _timed(seconds, "icp"):
             at_pose = self._aligned(clouds, register, method, notes)
+        voids = voids_of(clouds.source, clouds.target, at_pose.fitness, self.model.familiar)
         found = None
         if diagnose and self.model.diagnoser is not None:
             with _timed(seconds, "diagnosis"):
                 found = self.model.diagnoser.diagnose(clouds.source, clouds.target, at_pose.T_target_source)
-            found = replace(found, expected_error=found.expected_error * clouds.frame.diameter)
+            found = replace(found, expected_error=found.expected_error * clouds.frame.diameter, void=bool(voids))
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(at_pose.T_target_source, clouds.source))
         with _timed(seconds, "attribution"):
@@ -114,14 +116,14 @@ class Explainer:
         if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
             raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
-            warnings = self._warnings(clouds, found, at_pose.fitness)
+            warnings = [*map(str, voids), *self._warnings(clouds, found)]
             if T_target_source_init is not None and register is None:
                 warnings += self._inverted(clouds, at_pose)
         spread = None
         if uncertainty is not None and estimate is not None:
             with _timed(seconds, "uncertainty"):
                 spread = self._spread(clouds, at_pose, method, estimator, estimate, uncertainty, notes)
-        decision = self._decision(scores_C, float(bald), found)
+        decision = self._decision(scores_C, float(bald), found, voids)
         return Explanation(
             T_target_source=clouds.frame.pose_outside(at_pose.T_target_source) @ clouds.T_target_source_init,
             fitness=at_pose.fitness,
@@ -226,15 +228,17 @@ class Explainer:
         notes += [fault] if fault else []
         return spread
 
-    def _decision(self, scores_C: np.ndarray, bald: float, found: Diagnosis | None) -> Decision:
+    def _decision(self, scores_C: np.ndarray, bald: float, found: Diagnosis | None, voids: list[Void]) -> Decision:
         """Return what to do: by the diagnosis where there is one, otherwise by the scores alone."""
+        if voids:
+            return Decision(CHECK, "", ", ".join(void.check for void in voids))
         if found is None:
             return self.policy.decide(scores_C, bald, concepts=self.model.concepts)
         if found.state == NOMINAL:
             return Decision(NOTHING, "", "nothing is wrong")
         return self.policy.decide(np.array([*found.causes.values()]), found.bald, concepts=(*found.causes,))
 
-    def _warnings(self, clouds: Clouds, found: Diagnosis | None, fitness: float) -> list[str]:
+    def _warnings(self, clouds: Clouds, found: Diagnosis | None) -> list[str]:
         """Return what makes the scores doubtful, in words."""
         warnings = list(self.model.familiar.warnings(clouds.source, clouds.target)) if self.model.familiar else []
         if found is not None and found.unlikeness > 1:
@@ -242,8 +246,6 @@ class Explainer:
                 f"the pair is {found.unlikeness:.1f} times as far from the registrations that the diagnosis was "
                 "trained on as 99 % of these are from one another"
             )
-        if fitness == 0:
-            warnings.append("no source point is near the target at the initial pose, so the scores are meaningless")
         return warnings
 
     def _inverted(self, clouds: Clouds, at_pose: Outcome) -> list[str]:

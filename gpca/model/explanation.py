@@ -7,14 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.model.diagnoser import Diagnosis
+from gpca.model.diagnoser import UNKNOWN, Diagnosis
 from gpca.recovery.policy import NOTHING, QUEUE
 
+CHECK = "check"  # the branch where nothing that is said means anything: the user checks what was given
 WORDS = {  # what a reader is told of each branch
     NOTHING: "none",
     "reinitialize": "reinitialize ICP with a broader search",
     "new_view": "change the viewpoint",
     "denoise": "filter and check the sensor",
+    CHECK: "check what was given",
     QUEUE: "queue for labeling, so that the cause can be learned",
 }
 
@@ -60,7 +62,7 @@ class Explanation:
             mean and variance over the posterior draws (Eqs. 4, 5).
         bald, entropy: how uncertain these are, in nats: Eq. 7, and the entropy of the scores.
         concept: the one with the largest score (Eq. 6).
-        action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`).
+        action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`), or `CHECK`.
         reason: why this action, in words.
         spread: how uncertain the pose is by an estimator, where it was asked for and could tell.
         unit: that of all lengths.
@@ -87,6 +89,11 @@ class Explanation:
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
+    @property
+    def unknown(self) -> bool:
+        """Whether the pair is such that neither diagnosis nor scores mean anything."""
+        return self.action == CHECK
+
     def as_dict(self) -> dict[str, object]:
         """Return it as numbers, lists and names, for JSON."""
         spread = self.spread and {
@@ -111,7 +118,8 @@ class Explanation:
             f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
         )
         doubts = [f"warning   {line}" for line in self.warnings]
-        lines = [*doubts, *self._diagnosed(), action, "", *self._attributed(), "", registered]
+        said = [*self._diagnosed(), action, "", *self._attributed()]
+        lines = [*doubts, *([f"state     {UNKNOWN}", action] if self.unknown else said), "", registered]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
             by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"

@@ -34,9 +34,14 @@ def measure(source: np.ndarray, target: np.ndarray) -> dict[str, float]:
     - depth: the same share of the source in that of the target; NaN where this is a thin object.
     """
     closure = hidden_share(target)
-    radii = [np.sqrt(cloud.var(axis=0).sum()) for cloud in (source, target)]
     depth = hidden_share(source) / closure if closure >= FLAT else np.nan
-    return {"size": float(radii[0] / radii[1]), "depth": float(depth), "closure": closure}
+    return {"size": relative_size(source, target), "depth": float(depth), "closure": closure}
+
+
+def relative_size(source: np.ndarray, target: np.ndarray) -> float:
+    """Return the radius of gyration of points (N, 3) in that of others (M, 3)."""
+    radii = [np.sqrt(cloud.var(axis=0).sum()) for cloud in (source, target)]
+    return float(radii[0] / radii[1])
 
 
 def hidden_share(points: np.ndarray) -> float:
@@ -79,6 +84,11 @@ class Familiarity:
             margin = SIZE_MARGIN if name == "size" else 1.0
             ranges[name] = low / margin, high * margin
         return cls(ranges)
+
+    def is_foreign(self, source: np.ndarray, target: np.ndarray, factor: float) -> bool:
+        """Return whether the source's size in that of the target lies `factor` times beyond its range."""
+        low, high = self.ranges["size"]
+        return not low / factor <= relative_size(source, target) <= high * factor
 
     def warnings(self, source: np.ndarray, target: np.ndarray) -> list[str]:
         """Return a line for each measure of the pair that lies outside its range; see :func:`measure`."""

@@ -10,6 +10,7 @@ from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
 from gpca.limits import require_file
+from gpca.numerals import decimal
 from gpca.objects import mesh_folder, pcd
 from gpca.objects.canonical import bounding_centre, canonical_cloud
 
@@ -53,9 +54,9 @@ def read_pose(path: Path) -> np.ndarray:
     remedy = "give 4×4 numbers, row by row"
     require_file(path, "no such file", remedy, LARGEST_POSE_BYTES)
     try:
-        numbers = [float(word) for word in path.read_text(encoding="utf-8").replace(",", " ").split()]
+        numbers = [decimal(word) for word in path.read_text(encoding="utf-8").replace(",", " ").split()]
     except ValueError as fault:
-        raise InputError(path, f"contains something that is not a number ({fault})", remedy) from fault
+        raise InputError(path, f"contains something that is not a number: {fault}", remedy) from fault
     if len(numbers) != 16:
         raise InputError(path, f"contains {len(numbers)} numbers", remedy)
     T_target_source = np.array(numbers).reshape(4, 4)

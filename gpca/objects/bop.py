@@ -6,12 +6,12 @@ Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_form
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gpca.errors import InputError
 from gpca.limits import require_file
+from gpca.numerals import decimal, whole
 from gpca.objects.canonical import diameter
 from gpca.objects.mesh_folder import metres_per, read_surface
 from gpca.objects.surface import Surface
@@ -39,7 +39,7 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
     scale = metres_per(unit)
     info = read_models_info(models / "models_info.json")
     listed_mm = {number: model["diameter"] for number, model in info.items()}
-    ids = sorted(int(path.stem[4:]) for path in models.glob("obj_[0-9]*.ply")) if objects is None else sorted(objects)
+    ids = sorted(map(_id, models.glob("obj_[0-9]*.ply"))) if objects is None else sorted(objects)
     for number in ids:
         path = models / f"obj_{number:06d}.ply"
         if not path.is_file():
@@ -58,6 +58,13 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
         yield surface
 
 
+def _id(path: Path) -> int:
+    try:
+        return whole(path.stem.removeprefix("obj_"))
+    except ValueError as fault:
+        raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from fault
+
+
 def models_folder(folder: Path) -> Path:
     """Return the folder that holds the models of a dataset's folder, or of one that holds it."""
     if not folder.is_dir():
@@ -74,10 +81,10 @@ def read_models_info(path: Path) -> dict[int, dict]:
     require_file(path, "no such file", f"{remedy}, or use kind: mesh_folder for plain meshes")
     try:
         info = json.loads(path.read_text(encoding="utf-8"))
-        listed = {int(number): {**model, "diameter": float(model["diameter"])} for number, model in info.items()}
+        listed = {whole(id_): {**model, "diameter": decimal(str(model["diameter"]))} for id_, model in info.items()}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
         raise InputError(path, "is not a BOP models_info.json", remedy) from fault
     for number, model in listed.items():
-        if not 0 < model["diameter"] < math.inf:  # NaN compares with nothing, so it would agree with any model
+        if not model["diameter"] > 0:
             raise InputError(path, f"the diameter of object {number} is {model['diameter']} mm", remedy)
     return listed

@@ -21,16 +21,36 @@ NORMAL_NEIGHBOURS = 30
 # A cloud spans nearly its object's diameter. Few points miss some of it, but never nine tenths.
 SMALLEST_EXTENT = 0.1  # diameters
 UNIT_TOLERANCE = 1e-3  # of the length of a normal, a hundred times what float32 rounds
+NEARLY = 0.1  # steps; other numbers lie up to half a step off
+COARSEST = 0.01  # of a cloud's extent may lie between two numbers; the least part of a cause in the error is as much
 FEW_POINTS = 600  # up to so many, all distances take less time than the hull
 
 
 def require_points(points: np.ndarray, subject: object) -> None:
-    """Raise InputError unless `points` is (P, 3), P > 0, without NaN or infinity."""
+    """Raise InputError unless `points` is (P, 3), P > 0, without NaN or infinity, and finer than they are rounded."""
     if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
         raise InputError(subject, "has no points", "fetch or export it again")
     bad = int((~np.isfinite(points)).any(axis=1).sum())
     if bad:
         raise InputError(subject, f"{bad} of {len(points)} points contain NaN or infinity", "fetch or export it again")
+    _require_resolution(points, subject)
+
+
+def _require_resolution(points: np.ndarray, subject: object) -> None:
+    """Raise an InputError where an offset has left float32, or float64, too few digits to tell the points apart."""
+    extent, largest_3 = np.linalg.norm(np.ptp(points, axis=0)), np.abs(points).max(axis=0)
+    for kind in (np.float32, np.float64):
+        with np.errstate(all="ignore"):  # float32 does not hold all that float64 does
+            step_3 = np.spacing(largest_3.astype(kind)).astype(np.float64)
+            coarse_3 = step_3 > COARSEST * extent
+            # Files of text do not write all digits.
+            off = np.abs(points[:, coarse_3].astype(kind) - points[:, coarse_3]) / step_3[coarse_3]
+            rounded = (off < NEARLY).all()
+        if extent > 0 and coarse_3.any() and rounded:
+            step, largest = step_3.max(), largest_3[coarse_3].max()
+            found = f"at coordinates of {largest:.3g}, {kind.__name__} has steps of {step:.2g}, but all points span "
+            remedy = "subtract an offset before saving it, from source and target alike"
+            raise InputError(subject, f"{found}{extent:.2g}", remedy)
 
 
 def diameter(points: np.ndarray, subject: object) -> float:

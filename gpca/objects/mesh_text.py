@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from gpca.numerals import decimal
+
 OFF_VERTEX_COLUMNS = (3, 6, 7)  # coordinates, alone or with a colour
 OFF_COLOUR_COLUMNS = (0, 1, 3, 4)  # of a face
 OBJ_VERTEX_COLUMNS = (3, 4, 6, 7)  # coordinates, alone, with a weight, with a colour, with both
@@ -82,8 +84,10 @@ def _check_off(path: Path) -> None:
         counts = [word for word in (head[0].lstrip(b"COF"), *head[1:]) if word] or next(rows, [])
         vertices, faces = (_count(word) for word in counts[:2])
         for i in range(vertices):
-            if len(next(rows, [])) not in OFF_VERTEX_COLUMNS:
+            if len(row := next(rows, [])) not in OFF_VERTEX_COLUMNS:
                 raise ValueError(f"vertex {i + 1} of {vertices} is missing or does not have 3 coordinates")
+            for word in row:  # of the formats of text, trimesh reads this one by Python's float()
+                decimal(word.decode("utf-8", "replace"))
         for i in range(faces):
             row = next(rows, [b"0"])
             corners = _count(row[0])

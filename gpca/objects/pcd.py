@@ -15,6 +15,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.limits import require_memory
+from gpca.numerals import whole
 from gpca.objects.canonical import require_points
 
 SCALARS = {
@@ -85,14 +86,14 @@ def _parse_header(content: bytes) -> tuple[_Header, bytes]:
         raise ValueError("wrong header: unknown SIZE or TYPE")
     if not {"x", "y", "z"} <= set(fields) or any(counts[fields.index(axis)] != "1" for axis in "xyz"):
         raise ValueError("wrong header: FIELDS lacks x, y or z")
-    width, height, points = (int(values[key][0]) for key in ("WIDTH", "HEIGHT", "POINTS"))
-    if min(width, height) < 0 or width * height != points:
+    width, height, points = (whole(values[key][0], most=10**18) for key in ("WIDTH", "HEIGHT", "POINTS"))
+    if width * height != points:
         raise ValueError("wrong header: POINTS is not WIDTH times HEIGHT")
     encoding = " ".join(values["DATA"])
     if encoding not in _DECODERS:
         raise ValueError(f"wrong header: unknown DATA {encoding}")
     dtype = np.dtype(
-        [(str(i), f"<{scalar}", (int(count),)) for i, (scalar, count) in enumerate(zip(scalars, counts, strict=True))]
+        [(str(i), f"<{scalar}", (whole(count),)) for i, (scalar, count) in enumerate(zip(scalars, counts, strict=True))]
     )
     return _Header(dtype, tuple(fields.index(axis) for axis in "xyz"), points, height > 1, encoding), content[position:]
 

@@ -12,5 +12,5 @@ def instance_of(name: str) -> str:
 
 def view_order(name: str) -> tuple[str, int, int]:
     """Return instance, sequence and frame of a name such as ``coffee_mug_1_2_14``; else the name itself, 0 and 0."""
-    match = re.fullmatch(r"(.+)_(\d+)_(\d+)", name)
+    match = re.fullmatch(r"(.+)_([0-9]+)_([0-9]+)", name)
     return (match[1], int(match[2]), int(match[3])) if match else (name, 0, 0)

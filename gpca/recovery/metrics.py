@@ -11,6 +11,7 @@ from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import NOTHING, QUEUE
+from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,11 +119,3 @@ def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = A
         return None
     weight_R = count_R[share_R.index]
     return float((share_R * weight_R).sum() / weight_R.sum()), int(weight_R.sum())
-
-
-def seed_of_file(path: str | Path) -> int:
-    """Return the seed that a file's name tells."""
-    number = Path(path).stem.removeprefix("seed")
-    if not number.isdecimal():
-        raise InputError(path, "is not named …/seed{number}.csv", "rename it")
-    return int(number)

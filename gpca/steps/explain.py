@@ -18,6 +18,8 @@ from gpca.model.pose_spread import MONTE_CARLO, spread_estimator
 from gpca.objects.mesh_folder import METRES_PER_UNIT
 from gpca.uncertainty.settings import UncertaintySettings
 
+UNKNOWN_STATUS = 3  # of the process; 1 is a failed check of another step, 2 a fault of the user's
+
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and options."""
@@ -38,8 +40,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
 
 
-def run(options: Namespace) -> None:
-    """Read all files, then explain and print one source after the other; all that is no result goes to stderr."""
+def run(options: Namespace) -> int:
+    """Read all files, then explain and print one source after the other; all that is no result goes to stderr.
+
+    Returns:
+        `UNKNOWN_STATUS` where one of the explanations means nothing, otherwise 0.
+    """
     torch.set_num_threads(options.threads)
     if options.settings:
         raise InputError("--settings", "is not used by explain", "make another model to change its settings")
@@ -56,11 +62,13 @@ def run(options: Namespace) -> None:
     asked = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator}
     explainer = Explainer(model)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
+    status = 0
     for name, source in zip(options.source, sources, strict=True):
         try:
             explanation = explainer.explain(source, target, T_init, options.unit, frame, **asked)
         except InputError as fault:
             raise InputError(name, str(fault)) from fault
+        status = UNKNOWN_STATUS if explanation.unknown else status
         as_json = options.json or options.json_lines
         # A text begins with its warnings.
         warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
@@ -72,6 +80,7 @@ def run(options: Namespace) -> None:
         else:
             print(explanation.text(), end="")
     print(f"model {path}, trained on {trained_on}", file=sys.stderr)
+    return status
 
 
 def _require_known(method: str | None, estimator: str) -> None:

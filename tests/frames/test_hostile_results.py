@@ -66,7 +66,7 @@ ROWS = {
     "t behind": (scaled(-1), "line 2: t has z = -"),
     "t of NaN": (one(5, "nan nan nan"), "line 4: t contains values that are not finite numbers"),
     "t infinite": (one(5, "0 0 inf"), "line 4: t contains values that are not finite numbers"),
-    "t overflowing": (one(5, "0 0 1e999"), "line 4: t contains a number that is out of bounds"),
+    "t overflowing": (one(5, "0 0 1e999"), "line 4: t contains values that are not finite numbers"),
     "t huge": (one(5, "0 0 1e90"), "line 4: t is"),
     "t of two": (one(5, "0 700"), "line 4: t has 2 entries, not 3"),
     "t empty": (one(5, ""), "line 4: t has 0 entries, not 3"),

@@ -36,3 +36,10 @@ def spoil(path, change):
     content = torch.load(path, weights_only=True)
     change(content)
     torch.save(content, path)
+
+
+def indefinite(covariance):
+    """Variances above 0, and between the first two values a correlation of 2."""
+    covariance = covariance.clone()
+    covariance[:, 0, 1] = covariance[:, 1, 0] = 2 * (covariance[:, 0, 0] * covariance[:, 1, 1]).sqrt()
+    return covariance

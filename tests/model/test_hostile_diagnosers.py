@@ -5,7 +5,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.model.file import Model
 
-from .spoiled import HUGE, NAN, put, spoil
+from .spoiled import HUGE, NAN, indefinite, put, spoil
 
 CONTENTS = {
     "a threshold of failure of NaN": put("diagnoser/threshold", NAN),
@@ -20,6 +20,12 @@ CONTENTS = {
     "1e9 points of a description": put("diagnoser/points", HUGE),
     "a cause without a classifier": put("diagnoser/classifier/causes", lambda causes: causes[:2]),
     "three states": put("diagnoser/classifier/failure/classes", ["nominal", "failed", "odd"]),
+    "states in another order": put("diagnoser/classifier/failure/classes", ["failed", "nominal"]),
+    "other states": put("diagnoser/classifier/failure/classes", ["yes", "no"]),
+    "a cause of other classes": lambda content: content["diagnoser"]["classifier"]["causes"][1].update(
+        classes=["present", "absent"]
+    ),
+    "a covariance that is not positive definite": put("diagnoser/classifier/failure/covariance", indefinite),
     "a diagnoser of nothing": put("diagnoser", {}),
     "a diagnoser of text": put("diagnoser", "magic"),
 }  # fmt: skip

@@ -7,7 +7,7 @@ from gpca.errors import InputError
 from gpca.model.file import Model
 
 from ..hostile import refusal
-from .spoiled import EXPLAIN, HUGE, NAN, drop, put, spoil
+from .spoiled import EXPLAIN, HUGE, NAN, drop, indefinite, put, spoil
 
 
 def weight(content):
@@ -45,6 +45,9 @@ CONTENTS = {
     "posterior of text": put("gpc/mean", "zero"),
     "posterior of other inducing inputs": put("gpc/mean", lambda m: m[:, :-1]),
     "negative variances": put("gpc/covariance", lambda c: -c),
+    "a covariance that is not positive definite": put("gpc/covariance", indefinite),
+    "a singular covariance": put("gpc/covariance", lambda c: torch.ones_like(c)),
+    "a covariance that is not symmetric": put("gpc/covariance", lambda c: c.triu()),
     "covariance of another shape": put("gpc/covariance", lambda c: c[:, :1]),
     "inducing inputs of another encoder": put("gpc/inducing", lambda z: z[:, :-1]),
     "labels of another encoder": put("gpc/labelled", lambda z: z[:, :-1]),
@@ -61,6 +64,9 @@ CONTENTS = {
     "one concept": put("gpc/classes", ["noise"]),
     "a concept twice": put("gpc/classes", ["noise", "noise", "pose"]),
     "concepts of numbers": put("gpc/classes", [1, 2, 3]),
+    "concepts of another classifier": put("gpc/classes", ["red", "green", "blue"]),
+    "concepts in another order": put("gpc/classes", ["overlap", "noise", "pose"]),
+    "one concept more": put("gpc/classes", lambda classes: [*classes, "geometry"]),
     "a concept of two lines": put("gpc/classes", ["noise", "pose\nTraceback", "overlap"]),
     "draws of 1e9": put("gpc/settings/draws", HUGE),
     "no draws": put("gpc/settings/draws", 0),
@@ -88,6 +94,11 @@ CONTENTS = {
     "no attempts": put("thresholds/attempts", 0),
     "attempts without end": put("thresholds/attempts", 10**12),
     "treatments of a list": put("treatments", ["denoise"]),
+    "an action that no robot has": put("treatments/noise", "rm -rf"),
+    "an action that is no treatment": put("treatments/noise", "nothing"),
+    "an empty action": put("treatments/noise", ""),
+    "a treatment of no concept": put("treatments/geometry", "denoise"),
+    "one action for two concepts": put("treatments/noise", "new_view"),
     "an action of a number": put("treatments/noise", 5),
     "a list that contains itself": holds_itself,
     "a title of two lines": put("title", "Mugs\nTraceback"),

@@ -57,6 +57,19 @@ def test_a_file_that_cannot_be_right_is_one_line(tmp_path, make, unit, message):
         read_points(make(tmp_path), unit)
 
 
+@pytest.mark.parametrize("name", ["cloud.ply", "cloud.pcd", "box.stl", "box.obj", "box.ply"])
+def test_a_cloud_or_mesh_that_an_offset_has_rounded_is_refused(tmp_path, name):
+    if name.startswith("cloud"):
+        path = written(tmp_path, name, (POINTS + 1e6).astype(np.float32))
+    else:
+        mesh = trimesh.creation.icosphere(2, radius=0.1)
+        mesh.vertices = (mesh.vertices + 1e6).astype(np.float32).astype(float)
+        mesh.export(path := tmp_path / name)
+    with pytest.raises(InputError, match=rf"{name}: at coordinates of 1e\+06, float32 has steps of 0.062, .* subtract"):
+        read_points(path, "m")
+    read_points(written(tmp_path, "near.ply", (POINTS + 1e3).astype(np.float32)), "m")
+
+
 def test_a_pose_is_16_numbers_however_they_are_parted(tmp_path):
     T = exp(np.array([[0.1, 0.2, 0.3, 1.0, 2.0, 3.0]]))[0]
     np.savetxt(tmp_path / "rows.txt", T)
@@ -73,7 +86,10 @@ def test_a_pose_is_16_numbers_however_they_are_parted(tmp_path):
         ("one " * 16, "is not a number"),
         (" ".join(map(str, (2 * np.eye(4)).ravel())), "the pose is not a rigid transform"),
         (" ".join(map(str, np.diag([-1, 1, 1, 1]).ravel())), "the pose is not a rigid transform"),
-        (" ".join(["nan"] * 16), "the pose is not a rigid transform"),
+        (" ".join(["nan"] * 16), "something that is not a number: 'nan' is not a finite"),
+        (" ".join(map(str, np.eye(4).astype(int).ravel())).replace("1", "١"), "'١' is not a finite decimal number"),
+        (" ".join(map(str, np.eye(4).astype(int).ravel())).replace(" 0", " 0_0"), "'0_0' is not a finite decimal"),
+        (" ".join(map(str, (np.eye(4) + np.eye(4, k=3) * 1e16).ravel())), "the pose has a translation of 1e\\+16"),
         (" ".join(map(str, np.diag([1, 1, 1, 5]).ravel())), "the pose is not a rigid transform"),
     ],
 )

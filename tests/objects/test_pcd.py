@@ -97,7 +97,7 @@ WRONG = {
     "double x": (GOOD.replace("COUNT 1", "COUNT 2"), "x, y or z"),
     "points differ": (GOOD.replace("POINTS 2", "POINTS 3"), "POINTS is not"),
     "points no number": (GOOD.replace("POINTS 2", "POINTS two"), "two"),
-    "negative": (GOOD.replace("WIDTH 2", "WIDTH -2").replace("HEIGHT 1", "HEIGHT -1"), "POINTS"),
+    "negative": (GOOD.replace("WIDTH 2", "WIDTH -2").replace("HEIGHT 1", "HEIGHT -1"), "'-2' is not a whole number"),
     "rows missing": (GOOD.replace("WIDTH 2", "WIDTH 9").replace("POINTS 2", "POINTS 9"), "9×6"),
     "value missing": (GOOD.replace(" 315 218", " 315"), "column"),
     "no number": (GOOD.replace("0.75", "abc"), "abc"),

@@ -65,6 +65,33 @@ def test_another_method_finds_the_pose_and_the_model_says_why(folder, capsys):
     assert "registration   gicp, fitness " in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("form", ["", "--json", "--json-lines"])
+def test_a_pair_without_meaning_has_a_status_of_its_own(folder, capsys, form):
+    import trimesh
+
+    trimesh.load(folder / "meshes/brick.stl").apply_translation((1000, 0, 0)).export(folder / "far.stl")
+    sources = ["far.stl", "meshes/brick.stl"] if form == "--json-lines" else ["far.stl"]
+    words = ["explain", *sources, "meshes/brick.stl", "--unit", "mm", "--model", "model.pt", *filter(None, [form])]
+    assert main(words) == 3
+    out, err = capsys.readouterr()
+    if form:
+        first, *rest = (json.loads(line) for line in out.splitlines())
+        assert (first["diagnosis"]["state"], first["action"]) == ("unknown", "check")
+        assert all(line["diagnosis"]["state"] != "unknown" for line in rest)
+        assert "warning: no source point ended near the target, so the scores are meaningless" in err
+    else:
+        assert "state     unknown\naction    check what was given (the initial pose and the unit)" in out
+
+
+@pytest.mark.parametrize("word", ["1e15", "1e16", "٣", "0_0", "nan", "1e999"])
+def test_a_start_with_a_translation_that_cannot_be_is_refused(folder, capsys, word):
+    (folder / "pose.txt").write_text(f"1 0 0 {word}  0 1 0 0  0 0 1 0  0 0 0 1")
+    assert main(arguments("explain", {"--init": "pose.txt"})) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "pose" in err.splitlines()[-1]
+
+
 def test_several_sources_are_a_line_each(folder, capsys):
     sources = ["meshes/brick.stl", "meshes/cone.ply"]
     words = ["explain", *sources, "meshes/cone.ply", "--unit", "mm", "--model", "model.pt", "--json-lines"]

@@ -21,6 +21,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
 from gpca.reporting.words import object_in_words
+from gpca.seeds import seed_of_file
 
 PANEL_IN = 1.02
 HEAD_IN = 0.3
@@ -61,7 +62,7 @@ def draw_causes_example(
     """
     causes = Causes.load(causes_npz)
     row = choose_sample(causes, causes_npz)
-    source, seed = Path(causes_npz).parent.name, int(Path(causes_npz).stem.removeprefix("seed"))
+    source, seed = Path(causes_npz).parent.name, seed_of_file(causes_npz)
     given = dict(settings)
     own = CauseSettings.from_dict({k: v for k, v in given.items() if k != "icp"}, given.get("icp"))
     shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)

@@ -20,6 +20,7 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
+from gpca.seeds import seed_of_file
 from gpca.trials.covariances import REFERENCE, ReferenceSamples
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def draw_estimators(
     Raises:
         InputError: an unusable file, or files that do not belong together.
     """
-    source, seed = Path(samples_npz).parent.name, int(Path(samples_npz).stem.removeprefix("seed"))
+    source, seed = Path(samples_npz).parent.name, seed_of_file(samples_npz)
     samples = ReferenceSamples.load(samples_npz)
     method = next(iter(methods))
     titles = {REFERENCE: "Reference", **estimators}
