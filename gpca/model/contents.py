@@ -72,9 +72,9 @@ def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
 
 
 def _require_treatments(treatments: Mapping) -> None:
-    for concept, action in treatments.items():
-        if concept not in CONCEPTS:
-            raise ValueError(f"treatments: {str(concept)[:40]!r} is not one of {', '.join(CONCEPTS)}")
+    if set(treatments) != set(CONCEPTS):
+        raise ValueError(f"treatments: of {str([*treatments])[:80]}, not of {', '.join(CONCEPTS)}")
+    for action in treatments.values():
         if action not in (actions := _known_actions([*treatments.values()])):
             raise ValueError(f"treatments: {str(action)[:40]!r} is not one of {', '.join(actions)}")
     if len(set(treatments.values())) < len(treatments):
@@ -149,6 +149,10 @@ def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> Non
     for name, shape in shapes.items():
         if tuple(state[name].shape) != shape:
             raise ValueError(f"'{name}' has shape {tuple(state[name].shape)}, not {shape}")
+        if name != "targets" and not state[name].is_floating_point():
+            raise ValueError(f"'{name}' does not hold real numbers")
+    if not all(isinstance(axis, str | int) for axis in state["axes"]) or isinstance(state["axes"], str):
+        raise ValueError("the names of its seed are neither texts nor numbers")
     kernel = make_covariance(state["settings"]["kernel"], n_classes, lengthscale=1.0).state_dict()
     require_like(state["kernel"], kernel, "kernel")
     if not all(torch.equal(state["kernel"][name], kernel[name]) for name in kernel if name.endswith("_bound")):

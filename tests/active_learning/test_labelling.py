@@ -58,6 +58,7 @@ def test_the_same_answer_twice_is_no_conflict(path):
         ("77,train,pose\n", r"line 2: no sample '77' of split 'train'"),
         ("3,test,pose\n", r"line 2: no sample '3' of split 'test'"),
         ("-3,train,pose\n", r"line 2: no sample '-3'"),
+        ("٣,train,pose\n", r"line 2: no sample '٣'"),
         ("3,train,two words\n", r"line 2: 'two words' is not a valid concept name"),
         ("3,tra", r"line 2: no sample '3' of split 'tra'"),
     ],

@@ -60,12 +60,29 @@ def test_tolerance_of_the_diameter(folder, factor, passes):
 
 
 @pytest.mark.parametrize(
-    "content", [None, "{", "[]", '{"1": {}}', '{"one": {"diameter": 1}}', '{"1": {"diameter": 131}}']
+    "content",
+    [
+        None,
+        "{",
+        "[]",
+        '{"1": {}}',
+        '{"0_1": {"diameter": 131}}',
+        '{"1": {"diameter": "1_31"}}',
+        '{"one": {"diameter": 1}}',
+        '{"1": {"diameter": 131}}',
+    ],
 )
 def test_bad_models_info(folder, content):
     path = folder / "models" / "models_info.json"
     path.unlink() if content is None else path.write_text(content)
     with pytest.raises(InputError, match=r"models_info\.json"):
+        list(surfaces(folder))
+
+
+@pytest.mark.parametrize("name", ["obj_1_0.ply", "obj_1٣.ply", "obj_000001_old.ply"])
+def test_a_model_without_a_plain_number_in_its_name(folder, name):
+    (folder / "models" / name).write_bytes((folder / "models/obj_000001.ply").read_bytes())
+    with pytest.raises(InputError, match=rf"{name}: is not named obj_\{{number\}}\.ply; name it like"):
         list(surfaces(folder))
 
 

@@ -111,6 +111,8 @@ BROKEN = {
     "text.ply": (b"hello\n", "readable"),
     "text.stl": (b"hello\n", "no points"),
     "text.off": (b"hello\n", "readable"),
+    "underline.off": (b"OFF\n3 1 0\n1_0 0 0\n0 1 0\n0 0 1\n3 0 1 2\n", "'1_0' is not a finite decimal number"),
+    "digits.off": ("OFF\n3 1 0\n٣ 0 0\n0 1 0\n0 0 1\n3 0 1 2\n".encode(), "'٣' is not a finite decimal number"),
 }
 
 

@@ -97,6 +97,8 @@ WRONG = {
     "double x": (GOOD.replace("COUNT 1", "COUNT 2"), "x, y or z"),
     "points differ": (GOOD.replace("POINTS 2", "POINTS 3"), "POINTS is not"),
     "points no number": (GOOD.replace("POINTS 2", "POINTS two"), "two"),
+    "width with an underline": (GOOD.replace("WIDTH 2", "WIDTH 0_2"), "'0_2' is not a whole number"),
+    "count with an underline": (GOOD.replace("COUNT 1 1 1 1", "COUNT 1 1 1 0_1"), "'0_1' is not a whole number"),
     "negative": (GOOD.replace("WIDTH 2", "WIDTH -2").replace("HEIGHT 1", "HEIGHT -1"), "'-2' is not a whole number"),
     "rows missing": (GOOD.replace("WIDTH 2", "WIDTH 9").replace("POINTS 2", "POINTS 9"), "9×6"),
     "value missing": (GOOD.replace(" 315 218", " 315"), "column"),
