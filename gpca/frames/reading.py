@@ -17,7 +17,7 @@ from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, w
 from gpca.frames.estimates import EstimatorErrors, Estimators, error_of, read_pose_errors
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
 from gpca.frames.instances import Instances
-from gpca.frames.plausibility import Observation, require_plausible, require_usual_form
+from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
 from gpca.frames.results_file import read_bop_results
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_centre
@@ -155,7 +155,8 @@ def read_instances(
             shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
             shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.colour)}
             of_dataset += [(found, frame, n, shown | row) for n, row in found.in_frame(frame, left_out)]
-        require_usual_form([found.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset])
+        observations = [found.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]
+        require_shared_form(dataset.name, observations)
         seen += of_dataset
     if not seen:
         reasons = f"; the first skipped: {left_out[0]}" if left_out else ""

@@ -5,13 +5,15 @@ Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_form
 
 from __future__ import annotations
 
-import json
+import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.json_file import read_json
 from gpca.limits import require_file
-from gpca.numerals import decimal, whole
+from gpca.numerals import whole
 from gpca.objects.canonical import diameter
 from gpca.objects.mesh_folder import metres_per, read_surface
 from gpca.objects.surface import Surface
@@ -40,12 +42,11 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
     info = read_models_info(models / "models_info.json")
     listed_mm = {number: model["diameter"] for number, model in info.items()}
     ids = sorted(map(_id, models.glob("obj_[0-9]*.ply"))) if objects is None else sorted(objects)
+    require_models(models, ids)
+    if unlisted := [number for number in ids if number not in listed_mm]:
+        raise InputError(models / "models_info.json", f"lists no object {unlisted[0]}", "fetch the models again")
     for number in ids:
-        path = models / f"obj_{number:06d}.ply"
-        if not path.is_file():
-            raise InputError(path, "no such model", "check objects in the config, or fetch the models again")
-        if number not in listed_mm:
-            raise InputError(models / "models_info.json", f"lists no object {number}", "fetch the models again")
+        path = _model(models, number)
         surface = read_surface(path, scale)
         measured_mm = 1e3 * diameter(surface.vertices_m, path)
         if abs(measured_mm - listed_mm[number]) > DIAMETER_TOLERANCE * listed_mm[number]:
@@ -65,6 +66,22 @@ def _id(path: Path) -> int:
         raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from fault
 
 
+def require_entry(entry: dict, folder: Path) -> None:
+    """Raise an InputError unless the folder of a configured source has the objects that it names; reads no model."""
+    require_models(models_folder(folder), entry.get("objects") or ())
+
+
+def require_models(models: Path, ids: Sequence[int]) -> None:
+    """Raise an InputError for the first object that a folder of models has no model of."""
+    for number in ids:
+        if not (path := _model(models, number)).is_file():
+            raise InputError(path, "no such model", "check objects in the config, or fetch the models again")
+
+
+def _model(models: Path, number: int) -> Path:
+    return models / f"obj_{number:06d}.ply"
+
+
 def models_folder(folder: Path) -> Path:
     """Return the folder that holds the models of a dataset's folder, or of one that holds it."""
     if not folder.is_dir():
@@ -76,15 +93,24 @@ def models_folder(folder: Path) -> Path:
 
 
 def read_models_info(path: Path) -> dict[int, dict]:
-    """Return what models_info.json lists by object id; InputError where it is missing, damaged or lacks diameters."""
+    """Return what models_info.json lists by object id.
+
+    Raises:
+        InputError: missing, damaged, an id that is no number or stands twice, a diameter that cannot be, or a symmetry
+            that is no rigid transform.
+    """
+    from gpca.objects.symmetry import require_symmetries  # needs scipy, and the config's checks import this module
+
     remedy = "fetch the models again"
     require_file(path, "no such file", f"{remedy}, or use kind: mesh_folder for plain meshes")
-    try:
-        info = json.loads(path.read_text(encoding="utf-8"))
-        listed = {whole(id_): {**model, "diameter": decimal(str(model["diameter"]))} for id_, model in info.items()}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as fault:
-        raise InputError(path, "is not a BOP models_info.json", remedy) from fault
-    for number, model in listed.items():
-        if not model["diameter"] > 0:
-            raise InputError(path, f"the diameter of object {number} is {model['diameter']} mm", remedy)
+    listed: dict[int, dict] = {}
+    for key, model in read_json(path, "a BOP models_info.json", remedy).items():
+        number = int(key) if re.fullmatch("[0-9]{1,6}", key) else None
+        if number is None or number in listed or not isinstance(model, dict):
+            raise InputError(path, f"is not a BOP models_info.json: its entry {key[:40]!r} is no object's", remedy)
+        diameter_mm = model.get("diameter")
+        if type(diameter_mm) not in (int, float) or not 0 < diameter_mm < math.inf:
+            raise InputError(path, f"the diameter of object {key} is {repr(diameter_mm)[:40]}", remedy)
+        require_symmetries(model, f"{path}: object {key}")
+        listed[number] = model | {"diameter": float(diameter_mm)}
     return listed

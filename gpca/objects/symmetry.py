@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+
+from gpca.errors import InputError
 
 TOLERANCE = 0.01  # diameters
 DISCRETE_DEG = (90.0, 180.0)
@@ -23,6 +26,42 @@ def read_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None
     """
     lists = {n: {k: v for k, v in entry.items() if k.startswith("symmetries_")} for n, entry in models_info.items()}
     return lists.get(object_id, {}) if any(lists.values()) else None
+
+
+def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
+    """Raise an InputError that names `subject` unless every symmetry that is listed of an object is a rigid transform.
+
+    Args:
+        listed: what models_info.json says of the object: ``symmetries_discrete``, matrices of 16 numbers, row by row;
+            ``symmetries_continuous``, each an ``axis`` and an ``offset`` of 3 numbers, in millimeters.
+    """
+    for n, matrix in enumerate(_entries(listed, "symmetries_discrete", subject)):
+        place = f"{subject}, symmetries_discrete {n}"
+        T = _numbers(matrix, 16, place).reshape(4, 4)
+        R = T[:3, :3]
+        if not (np.allclose(R @ R.T, np.eye(3), atol=1e-3) and np.linalg.det(R) > 0 and (T[3] == (0, 0, 0, 1)).all()):
+            raise InputError(place, "is not a rotation and a shift", "give a rigid transform, row by row")
+    for n, turn in enumerate(_entries(listed, "symmetries_continuous", subject)):
+        place = f"{subject}, symmetries_continuous {n}"
+        axis, offset = (turn.get(key) if isinstance(turn, Mapping) else None for key in ("axis", "offset"))
+        if not np.linalg.norm(_numbers(axis, 3, f"{place}: axis")) > 0:
+            raise InputError(f"{place}: axis", "has no direction", "give the axis of revolution, such as 0 0 1")
+        _numbers(offset, 3, f"{place}: offset")
+
+
+def _entries(listed: Mapping[str, Any], key: str, subject: str) -> list:
+    entries = listed.get(key, [])
+    if not isinstance(entries, list):
+        raise InputError(f"{subject}, {key}", "is not a list", "list the symmetries, or leave the key out")
+    return entries
+
+
+def _numbers(value: Any, count: int, subject: str) -> np.ndarray:
+    rows = value if isinstance(value, list) else []
+    numbers = [number for row in rows for number in (row if isinstance(row, list) else [row])]
+    if len(numbers) != count or any(type(n) not in (int, float) or not abs(n) < 1e12 for n in numbers):
+        raise InputError(subject, f"is not {count} finite numbers", "write it as the BOP format does")
+    return np.array(numbers, float)
 
 
 def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:

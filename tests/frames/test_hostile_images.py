@@ -137,6 +137,19 @@ def moved(entry):
     entry["cam_t_m2c"][0] += 200
 
 
+def beside(entry):
+    entry["cam_t_m2c"][0] += 30
+
+
+def untold(entry):
+    entry["cam_R_m2c"] = np.eye(3).ravel().tolist()
+
+
+def focal_length(factor):
+    factors = np.diag([factor, factor, 1]) + 1 - np.eye(3)
+    return lambda camera: camera.update(cam_K=(camera["cam_K"] * factors.ravel()).tolist())
+
+
 def depth_scale(factor):
     return lambda camera: camera.update(depth_scale=factor * camera["depth_scale"])
 
@@ -195,6 +208,10 @@ PLACES = {
     "no centre": (with_camera(corner), "check its pose, mask, cam_K"),
     "centre outside": (with_camera(outside), "check its pose, mask, cam_K"),
     "too long a lens": (with_camera(long), "check its pose, mask, cam_K"),
+    "a lens a tenth too long": (with_camera(focal_length(1.1)), "focal lengths are about 0.9 times as long"),
+    "a lens a tenth too short": (with_camera(focal_length(1 / 1.1)), "focal lengths are about 1.1 times as long"),
+    "30 mm beside": (of_all(beside), "above the limit of 3 % or 4 mm, whichever is more; check cam_R_m2c"),
+    "R left out": (of_all(untold), "every cam_R_m2c is the identity: fill in the rotations"),
     "images mirrored": (flip, "is the image mirrored?"),
     "another image": (other_image, ""),
 }
@@ -204,7 +221,7 @@ PLACES = {
 def test_depth_that_lies_elsewhere_than_the_pose(damaged, name):
     spoil, words = PLACES[name]
     spoil(damaged.parent)
-    refusal(instances(), damaged.parent, "scene_gt.json: image ", ", object ", "diameters", words)
+    refusal(instances(), damaged.parent, "scene_gt.json: image ", ", object ", "diameter", words)
 
 
 def test_the_dataset_itself_is_none_of_this(scenes, tmp_path):
