@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,14 @@ from gpca.json_file import parse_json
 LARGEST_BYTES = 2**18  # fifteen times the longest config of the suite; PyYAML reads it within seconds
 MOST_ENTRIES = 100_000  # with every alias unfolded; the configs of the suite have a thousand
 _MERGE = "tag:yaml.org,2002:merge"
+# What every YAML reads alike. PyYAML, and with it Snakemake, reads by YAML 1.1 more than most people know of: 12:30 is
+# 750, 010 is 8, 1_000 is 1000 and `no` is false. What is written so is refused, since what was meant is anyone's guess.
+_ALIKE = {
+    int: re.compile("[-+]?(0|[1-9][0-9]*|0x[0-9a-fA-F]+)"),
+    float: re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"),
+    bool: re.compile("true|True|TRUE|false|False|FALSE"),
+    type(None): re.compile("|~|null|Null|NULL"),
+}
 
 
 def load_own_yaml(path: Path) -> Any:
@@ -28,7 +37,8 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
 
     Raises:
         InputError: no such file, too large, not UTF-8, neither YAML nor JSON, no mapping, a key that stands twice,
-            aliases that unfold to more than `MOST_ENTRIES` or to themselves, or what :func:`require_plain` refuses.
+            a number or switch that YAML 1.1 alone has (`_ALIKE`), aliases that unfold to more than `MOST_ENTRIES` or to
+            themselves, or what :func:`require_plain` refuses.
     """
     path = Path(path)
     if not path.is_file():
@@ -51,6 +61,16 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
         raise InputError(path, "has no keys at its top level", "write 'key: value', as in config/config.yaml")
     require_plain(mapping, path)
     return mapping
+
+
+def read_scalar(text: str) -> Any:
+    """Return the number, the boolean or the null that a text is in every YAML, else the text itself."""
+    try:
+        value = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError):  # a name or a path
+        return text
+    alike = _ALIKE.get(type(value))
+    return value if alike and alike.fullmatch(text.strip()) else text
 
 
 def require_plain(mapping: Mapping, subject: object) -> None:
@@ -106,9 +126,10 @@ def _parse_yaml(text: str, path: Path) -> Any:
 
 def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
     """Return how many entries a node has with all aliases unfolded."""
-    if isinstance(node, yaml.ScalarNode):
-        return 1
     place = f"line {node.start_mark.line + 1}"
+    if isinstance(node, yaml.ScalarNode):
+        _require_alike(node, f"{path}: {place}")
+        return 1
     if (known := sizes.get(id(node), 0)) is None:
         raise InputError(path, f"{place}: the value that begins here contains itself", "remove the alias")
     if known:
@@ -126,3 +147,13 @@ def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
                 seen.add((key.tag, key.value))
     sizes[id(node)] = size
     return size
+
+
+def _require_alike(node: yaml.ScalarNode, place: str) -> None:
+    if node.tag == _MERGE:
+        return
+    value = yaml.constructor.SafeConstructor().construct_object(node)
+    if (alike := _ALIKE.get(type(value))) and not alike.fullmatch(node.value):
+        raise InputError(
+            place, f"YAML 1.1 reads {node.value} as {value}", f'write {json.dumps(value)}, or "{node.value}" in quotes'
+        )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
+from gpca.structured_text import read_scalar
 
 
 def with_types(config: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
@@ -33,10 +33,4 @@ def _read(value: Any) -> Any:
         return {name: _read(entry) for name, entry in value.items()}
     if isinstance(value, list):
         return [_read(entry) for entry in value]
-    if isinstance(value, str):
-        try:
-            scalar = yaml.safe_load(value)
-        except yaml.YAMLError:  # a name or a path
-            return value
-        return scalar if scalar is None or isinstance(scalar, bool | int | float) else value
-    return value
+    return read_scalar(value) if isinstance(value, str) else value

@@ -29,7 +29,7 @@ def test_values_of_the_command_line_have_the_types_of_a_config_file():
     assert list(check(config)) == ["coffee_cup", "ycb"]
 
 
-@pytest.mark.parametrize("text", ["a: b: c", "{", "/data: x", "2024-01-01", "[a, b]"])
+@pytest.mark.parametrize("text", ["a: b: c", "{", "/data: x", "2024-01-01", "[a, b]", "12:30", "010", "1_000", "on"])
 def test_text_that_is_no_number_stays_text(text):
     assert given(downloads=text)["downloads"] == text
 

@@ -54,7 +54,15 @@ TEXTS = {
     "bytes": ("run: !!binary aGVsbG8=", "run", "is a bytes"),
     "set": ("seeds: !!set {0, 1}", "seeds", "is a set"),
     "number as name": ("sources: {1: {title: x, kind: procedural, family: ycb}}", "sources.1", "is not text"),
-    "switch as name": ("encoders: {on: {backbone: dgcnn}}", "encoders.True", "is not text"),
+    "switch as name": ("encoders: {on: {backbone: dgcnn}}", "line 1: YAML 1.1 reads on as True", '"on" in quotes'),
+    "number in base 60": ("run: a\nseeds: [12:30]", "line 2: YAML 1.1 reads 12:30 as 750; write 750"),
+    "decimals in base 60": ("registrations: {severities: {rotation_deg: [1:30.5, 60]}}", "reads 1:30.5 as 90.5"),
+    "octal": ("seeds: [010]", "reads 010 as 8; write 8"),
+    "binary": ("seeds: [0b11]", "reads 0b11 as 3; write 3"),
+    "underlined": ("registrations: {train: 1_000}", "reads 1_000 as 1000; write 1000"),
+    "no": ("sources: {ycb: no}", "reads no as False; write false"),
+    "number in base 60 by a tag": ('seeds: [!!int "12:30"]', "reads 12:30 as 750"),
+    "number in base 60 as name": ("encoders: {1:30: {backbone: dgcnn}}", "reads 1:30 as 90"),
     "nothing as name": ("learners: {~: {}}", "learners.None", "is not text"),
     "list as name": ("? [a, b]\n: 1\n", "neither YAML nor JSON"),
     "too long": ("#" * (LARGEST_BYTES + 1), "bytes"),
@@ -222,7 +230,15 @@ def test_configs_are_laid_over_each_other_as_snakemake_does_it():
     assert with_defaults(own)["registrations"] == load()["registrations"] | {"train": 36}
 
 
-@pytest.mark.parametrize("text", ["run: mine\n", '{"run":\n\t"mine"}', "\ufeffrun: mine\n", "run: mine # café\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "run: mine\nregistrations: {train: +90, cloud_points: 0x800}\ndata_dir: ~\n",
+        '{"run":\n\t"mine"}',
+        "\ufeffrun: mine\n",
+        "run: mine # café\n",
+    ],
+)
 def test_a_sound_config_says_so(tmp_path, text):
     (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(AssertionError, match="status 0: run mine: valid"):
