@@ -22,6 +22,7 @@ from gpca.config.checks.left_out import check_left_out
 from gpca.config.checks.methods import check_methods
 from gpca.config.checks.places import check_places
 from gpca.config.checks.recovery import check_recovery
+from gpca.config.checks.sizes import check_sizes
 from gpca.config.checks.sources import check_named_sources, resolve_sources
 from gpca.config.command_line import with_types
 from gpca.config.layers import with_defaults
@@ -83,6 +84,7 @@ def check(config: dict) -> dict[str, dict]:
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs, sources)
+    check_sizes(whole)
     resolved = resolve_sources(whole)
     check_named_sources(whole, sources, encoders)
     return resolved

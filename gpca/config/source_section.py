@@ -42,7 +42,7 @@ class Source:
     family: str = ""
     location: Place | None = None
     files: list[Pattern] = field(default_factory=list)
-    objects: list[Annotated[int, Bounds(minimum=0)]] = field(default_factory=list)
+    objects: Annotated[list[Annotated[int, Bounds(minimum=0)]], Bounds(uniqueItems=True)] = field(default_factory=list)
     unit: Unit = "m"
     url: Url = ""
     urls: Urls = field(default_factory=list)

@@ -52,13 +52,6 @@ class UMAP:
 
         The places that the fit gave them are left: a classifier shall meet one function in training and in test.
         """
-        n = len(z_train_N_d)
-        # Beyond these umap-learn takes fewer neighbours, or starts at random, with no more than a warning.
-        for key, most in (("neighbours", n - 1), ("components", n - 3)):
-            if (value := getattr(self, key)) > most:
-                raise InputError(
-                    "reduction 'umap'", f"{value} {key} are too many for {n} training embeddings", f"lower {key}"
-                )
         seed = seed_of(*axes, "umap") % 2**32
         with warnings.catch_warnings(action="ignore"):
             from umap import UMAP as UmapLearn
@@ -141,10 +134,7 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
             raise InputError(role, "contain NaN or infinity", "regenerate them with 'python -m gpca embed'")
     if reduction is None:
         return np.asarray(h_S_d, np.float32)
-    n, d = h_train_N_d.shape
-    if reduction.components > min(n, d):
-        fault = f"{reduction.components} components are too many for {n} training embeddings of {d} numbers"
-        raise InputError(f"reduction '{name}'", fault, f"set components to at most {min(n, d)}")
+    require_room(name, reduction, *h_train_N_d.shape)
     if not np.ptp(h_train_N_d, axis=0).any():
         raise InputError("training embeddings", "are all identical", "retrain the encoder")
     from sklearn.preprocessing import StandardScaler
@@ -152,6 +142,24 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
     scaler = StandardScaler().fit(h_train_N_d.astype(np.float64))
     z_train_N_d, z_S_d = (scaler.transform(h.astype(np.float64)) for h in (h_train_N_d, h_S_d))
     return reduction.fit(z_train_N_d, *axes)(z_S_d).astype(np.float32)
+
+
+def require_room(name: str, reduction: PCA | UMAP | Autoencoder, n: int, d: int | None) -> None:
+    """Raise an InputError where a reduction has more components or neighbours than the training embeddings allow.
+
+    Args:
+        n, d: how many training embeddings there are, and how many numbers each has, where that is known.
+    """
+    if reduction.components > min(n, d or n):
+        of = f" of {d} numbers" if d else ""
+        fault = f"{reduction.components} components are too many for {n} training embeddings{of}"
+        raise InputError(f"reduction '{name}'", fault, f"set components to at most {min(n, d or n)}")
+    if isinstance(reduction, UMAP):
+        # Beyond these umap-learn takes fewer neighbours, or starts at random, with no more than a warning.
+        for key, most in (("neighbours", n - 1), ("components", n - 3)):
+            if (value := getattr(reduction, key)) > most:
+                fault = f"{value} {key} are too many for {n} training embeddings"
+                raise InputError(f"reduction '{name}'", fault, f"lower {key}")
 
 
 def make_reduction(name: str, settings: dict):

@@ -49,6 +49,10 @@ class EncoderSettings:
     def __post_init__(self) -> None:
         if self.patience and not self.validation_share:
             raise InputError("encoder setting 'patience'", "needs held-out samples", "set validation_share above 0")
+        neighbours = self.options.get("k", DGCNNOptions.k) if self.backbone == "dgcnn" else 0
+        if (points := self.fewest_points or self.draw_points) < neighbours:
+            fault = f"{neighbours} neighbors are too many for draws of {points} points"
+            raise InputError("encoder option 'k'", fault, "lower it, or draw more points")
         if self.fewest_points is None:
             return
         if self.backbone not in OF_ANY_SIZE:
@@ -66,6 +70,11 @@ class DGCNNOptions:
     k: Annotated[int, Bounds(minimum=2)] = 20
     point_features: Count = 256
 
+    @property
+    def embedding_size(self) -> int:
+        """Numbers of an embedding."""
+        return 2 * self.point_features
+
 
 @dataclass(frozen=True)
 class PointNetOptions:
@@ -73,19 +82,23 @@ class PointNetOptions:
 
     width: Count = 64
 
+    @property
+    def embedding_size(self) -> int:
+        """Numbers of an embedding."""
+        return 16 * self.width
+
 
 @dataclass(frozen=True)
-class PointNet2Options:
+class PointNet2Options(PointNetOptions):
     """Options of the backbone ``pointnet2``."""
 
-    width: Count = 64
     centroids: Annotated[int, Bounds(minimum=4)] = 256
     radius: PositiveShare = 0.1
     neighbours: Count = 32
 
 
 @dataclass(frozen=True)
-class PointNeXtOptions:
+class PointNeXtOptions(PointNetOptions):
     """Options of the backbone ``pointnext``."""
 
     width: Count = 32

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.objects.source import data_files, resolve
+from gpca.objects.source import data_files, require_place, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
 VIRTUAL = "virtual_rgbd"  # frames rendered of the models of a run's datasets
@@ -76,7 +76,7 @@ def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
 
 
 def _below(data_dir: str | None, path: str) -> Path:
-    return Path(data_dir or "", path).expanduser().absolute()
+    return require_place(Path(data_dir or "", require_place(path))).absolute()
 
 
 def _matching(path: Path) -> list[Path]:

@@ -68,7 +68,8 @@ def _id(path: Path) -> int:
 
 def require_entry(entry: dict, folder: Path) -> None:
     """Raise an InputError unless the folder of a configured source has the objects that it names; reads no model."""
-    require_models(models_folder(folder), entry.get("objects") or ())
+    if ids := entry.get("objects"):
+        require_models(models_folder(folder), ids)
 
 
 def require_models(models: Path, ids: Sequence[int]) -> None:

@@ -1,11 +1,13 @@
 """A configured source of objects: where its data is, and its surfaces.
 
 A kind of source is a module beside this one with ``from_entry(entry, folder) -> Iterator[Surface]``; a new kind is
-such a file and nothing else. ``procedural`` needs no data and has ``surfaces(family)`` instead.
+such a file and nothing else; with a ``require_entry(entry, folder)`` it can refuse an entry whose data is at hand, as
+far as names of files tell, when a workflow loads. ``procedural`` needs no data and has ``surfaces(family)`` instead.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 import pkgutil
 from collections.abc import Iterator
@@ -38,7 +40,8 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         `location`. A download keeps the declared one: it says what a `data_dir` would have to hold.
 
     Raises:
-        InputError: unknown kind, missing data_dir, location nowhere to be found and no url, checksums unlike the urls.
+        InputError: unknown kind, missing data_dir, location nowhere to be found and no url, checksums unlike the urls,
+            and what the kind refuses of the entry.
     """
     entry = dict(entry)
     local = entry.pop("local", None)
@@ -51,8 +54,10 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
                 raise InputError(subject, "names no family", "set family in the config")
             procedural.require_family(candidate["family"])
             return {**candidate, "origin": "procedural"}
-        _module_of(candidate.get("kind"))
+        module = _module_of(candidate.get("kind"))
         if folder := _found(candidate, data_dir):
+            if require_entry := getattr(module, "require_entry", None):
+                require_entry(candidate, folder)
             return {**candidate, "origin": "local", "location": os.path.abspath(folder)}
     urls, checksums = _as_list(entry.get("urls") or entry.get("url")), _as_list(entry.get("sha256"))
     if not urls:
@@ -84,14 +89,15 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
     """Return where a resolved entry's data is: its location, or what was downloaded, a folder for each archive.
 
     Raises:
-        InputError: from :mod:`gpca.objects.download` and :mod:`gpca.objects.archive`.
+        InputError: from :mod:`gpca.objects.download`, :mod:`gpca.objects.archive` and :func:`require_place`.
     """
     if entry["origin"] == "local":
         return [Path(entry["location"])]
+    cache = require_place(cache_folder)
     urls = _as_list(entry.get("urls") or entry.get("url"))
     checksums = _as_list(entry.get("sha256")) or [None] * len(urls)
     files = [
-        download.fetch(url, sha256, cache_folder, entry.get("location"))
+        download.fetch(url, sha256, cache, entry.get("location"))
         for url, sha256 in zip(urls, checksums, strict=True)
     ]
     return [_unpacked(file) for file in files] if unpack else files
@@ -150,28 +156,35 @@ def _found(entry: dict, data_dir: str | None) -> Path | None:
 
 
 def require_place(place: str | Path) -> Path:
-    """Return a place of data as a path, with the user's home in place of ``~``.
+    """Return a place of data as a path, with the user's home in place of ``~``: for each path that a user names.
 
     Raises:
-        InputError: nobody's home, or a place of the system's own, where nothing ends that is read.
+        InputError: nobody's home, symbolic links that lead in a circle, or a place of the system's own, where nothing
+            ends that is read.
     """
     try:
         path = Path(place).expanduser()
     except RuntimeError as fault:
         raise InputError(place, "is the home folder of an unknown user", "write the full path") from fault
-    real = path.resolve()
+    try:
+        path.stat()
+    except OSError as fault:  # not there, perhaps: it may be downloaded
+        if fault.errno == errno.ELOOP:
+            raise InputError(place, "is a symbolic link that leads in a circle", "name the folder itself") from fault
+    real = Path(os.path.realpath(path))
     if any(real.is_relative_to(system) for system in SYSTEM) and not real.is_relative_to("/dev/shm"):
         raise InputError(place, "is a folder of devices, not of data", "name a folder of files")
     return path
 
 
 def _require_pattern(pattern: str) -> None:
+    remedy = "give one relative to location"
+    if ".." in Path(pattern).parts:
+        raise InputError(f"pattern '{pattern}'", "leads out of location", remedy)
     try:
         next(Path(os.devnull).glob(pattern), None)  # nothing is below that, but the pattern is looked at
     except (ValueError, IndexError, NotImplementedError) as fault:
-        raise InputError(
-            f"pattern '{pattern}'", f"finds no files ({fault})", "give one relative to location"
-        ) from fault
+        raise InputError(f"pattern '{pattern}'", f"finds no files ({fault})", remedy) from fault
 
 
 def _module_of(kind: object) -> ModuleType:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import torch
 
@@ -17,6 +18,7 @@ from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import write_tensors
 from gpca.encoders.training import load_model, train_encoder
+from gpca.errors import InputError
 from gpca.frames.sample_file import read_instances_of
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.reading import read_as
@@ -43,6 +45,10 @@ def run(options: Namespace) -> None:
     given, of_icp = checked_with_icp(options.settings, "encoders", "*")
     settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
     registrations = joined([Registrations.load(path) for path in options.registrations])
+    # Clouds of frames are as small as objects look, so some of their points are drawn twice; others are as configured.
+    if options.poses is None and settings.draw_points > (most := int(np.diff(registrations.offsets).max())):
+        fault = f"the largest cloud has {most} points, fewer than draw_points, {settings.draw_points}"
+        raise InputError(options.registrations[0], fault, "lower draw_points, or raise cloud_points of registrations")
     instance_S = read_instances_of(options.poses, registrations) if options.poses else None
     start = load_model(options.start, settings).state_dict() if options.start else None
     # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.

@@ -101,6 +101,10 @@ def source(**more):
     return {"sources": {"mine": {"title": "Mine", "kind": "mesh_folder", "location": "parts", "unit": "mm"} | more}}
 
 
+def frames(**more):
+    return {"real_world": {"datasets": {"mine": {"location": "parts", "split": "parts"} | more}}}
+
+
 def learner(**settings):
     return {"learners": {"learner_forest": settings}}
 
@@ -197,7 +201,21 @@ VALUES = [
     ({"downloads": "/dev"}, "downloads", "devices"),
     ({"downloads": "/dev/null/here"}, "downloads", "devices"),
     ({"downloads": "mine.yaml/here"}, "downloads", "is not a folder"),
+    (source(location="loop"), "sources.mine", "loop: is a symbolic link that leads in a circle"),
+    (source(location="loop/parts"), "sources.mine", "leads in a circle"),
+    ({"data_dir": "loop"}, "data_dir", "leads in a circle"),
+    ({"downloads": "loop/here"}, "downloads", "leads in a circle"),
+    (frames(location="loop"), "real_world.datasets", "leads in a circle"),
+    (frames(location="loop", optional=True), "real_world.datasets", "leads in a circle"),
+    (frames(results="loop/*.csv"), "real_world.datasets", "leads in a circle"),
+    (frames(errors="~nobody_of_this_name/e.csv"), "real_world.datasets", "home folder of an unknown user"),
+    # objects
+    (source(kind="bop", objects=[1, 2]), "sources.mine", "obj_000002.ply: no such model; check objects in the config"),
+    (source(kind="bop", objects=[1, 1]), "sources.mine.objects", "non-unique"),
     # patterns
+    (source(files=["../*.ply"]), "sources.mine", "pattern '../*.ply': leads out of location"),
+    (source(files=["*.ply", "sub/../../*.ply"]), "sources.mine", "leads out of location"),
+    (frames(split="../test"), "real_world.datasets", "leads out of location"),
     (source(files=["/etc/*.ply"]), "sources.mine", "/etc/*.ply"),
     (source(files=[""]), "sources.mine.files.0"),
     (source(files=["."]), "sources.mine", "pattern"),
@@ -216,7 +234,10 @@ VALUES = [
 
 @pytest.mark.parametrize(("config", "words"), [(config, words) for config, *words in VALUES])
 def test_a_value_that_cannot_be(tmp_path, config, words):
-    (tmp_path / "parts").mkdir()
+    for name in ("parts/models/obj_000001.ply", "parts/parts/000001/scene_gt.json"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).touch()
+    (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "link").symlink_to("/dev")
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"data_dir": str(tmp_path)} | config))

@@ -16,10 +16,9 @@ def check_places(config: dict) -> None:
     """Check the run's name, and the folders that data comes from and downloads go to."""
     if config["run"].lower() in TAKEN:
         raise InputError("config key run", f"results/{config['run']} is reserved", "choose another name")
-    for key in ("data_dir", "downloads"):
-        if config[key] is not None:
-            with_key(key, require_place, config[key])
-    folder = Path(config["downloads"]).expanduser()
+    if config["data_dir"] is not None:
+        with_key("data_dir", require_place, config["data_dir"])
+    folder = with_key("downloads", require_place, config["downloads"])
     existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     if not existing.is_dir():
         raise InputError("config key downloads", f"{existing} is not a folder", "name a folder; it need not exist")
