@@ -64,6 +64,23 @@ class ProbableSVM(Learner):
         super().fit(registrations)
 
 
+class Nearest(Learner):
+    """A k-nearest-neighbour classifier."""
+
+    def __init__(self, neighbours: int) -> None:
+        from sklearn.neighbors import KNeighborsClassifier
+
+        self._neighbours = neighbours
+        super().__init__(_standardised(KNeighborsClassifier(neighbours)))
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit to the labelled embeddings; fewer of them than neighbours raise an InputError."""
+        if self._neighbours > len(registrations):
+            fault = f"{self._neighbours} neighbors are too many for {len(registrations)} training samples"
+            raise InputError("learner_nearest", fault, "lower neighbours")
+        super().fit(registrations)
+
+
 def linear_svm(source: str, seed: int) -> Learner:
     """Make a linear support vector machine."""
     return ProbableSVM("linear")
@@ -81,9 +98,7 @@ def logistic(source: str, seed: int, inverse_regularisation: float = 1.0) -> Lea
 
 def nearest(source: str, seed: int, neighbours: int = 5) -> Learner:
     """Make a k-nearest-neighbour classifier; a probability is a share of the neighbours."""
-    from sklearn.neighbors import KNeighborsClassifier
-
-    return Learner(_standardised(KNeighborsClassifier(neighbours)))
+    return Nearest(neighbours)
 
 
 def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:

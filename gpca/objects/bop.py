@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from gpca.errors import InputError
 from gpca.json_file import read_json
@@ -109,7 +110,7 @@ def read_models_info(path: Path) -> dict[int, dict]:
         number = int(key) if re.fullmatch("[0-9]{1,6}", key) else None
         if number is None or number in listed or not isinstance(model, dict):
             raise InputError(path, f"is not a BOP models_info.json: its entry {key[:40]!r} is no object's", remedy)
-        diameter_mm = model.get("diameter")
+        diameter_mm: Any = model.get("diameter")
         if type(diameter_mm) not in (int, float) or not 0 < diameter_mm < math.inf:
             raise InputError(path, f"the diameter of object {key} is {repr(diameter_mm)[:40]}", remedy)
         require_symmetries(model, f"{path}: object {key}")

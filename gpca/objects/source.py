@@ -97,8 +97,7 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
     urls = _as_list(entry.get("urls") or entry.get("url"))
     checksums = _as_list(entry.get("sha256")) or [None] * len(urls)
     files = [
-        download.fetch(url, sha256, cache, entry.get("location"))
-        for url, sha256 in zip(urls, checksums, strict=True)
+        download.fetch(url, sha256, cache, entry.get("location")) for url, sha256 in zip(urls, checksums, strict=True)
     ]
     return [_unpacked(file) for file in files] if unpack else files
 

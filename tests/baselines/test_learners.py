@@ -44,6 +44,12 @@ def test_a_concept_absent_from_training_keeps_its_column(name, embedded):
     assert scores.sum(axis=1) == pytest.approx(1)
 
 
+def test_more_neighbors_than_training_samples_are_refused(embedded):
+    learner = learners.nearest("tiny", 0, neighbours=len(embedded.rows("train")) + 1)
+    with pytest.raises(InputError, match="learner_nearest: 37 neighbors are too many for 36 training samples"):
+        learner.fit(embedded.subset(embedded.rows("train")))
+
+
 @pytest.mark.parametrize("name", EXPLAINERS)
 def test_scale_and_offset_of_the_embedding_do_not_matter(name, embedded):
     moved = dataclasses.replace(embedded, attached={"embedding": 50 + 1000 * embedded.embedding})

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from gpca.encoders.registry import ENCODERS, make_encoder, parameter_count
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
@@ -42,6 +42,13 @@ def test_a_cloud_of_any_size_becomes_one_embedding(backbone, n):
     assert h.shape == (3, encoder.embedding_size) == (3, 128)
     assert h.dtype == torch.float32
     assert h.isfinite().all()
+
+
+@pytest.mark.parametrize("options", [{}, {"width": 16}])
+def test_the_settings_know_the_size_of_an_embedding(options):
+    for backbone in ENCODERS:
+        own = {"point_features": 24} if options and backbone == "dgcnn" else options
+        assert OPTIONS[backbone](**own).embedding_size == make_encoder(backbone, own).embedding_size
 
 
 def test_pointnet_has_the_published_widths():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from gpca.config.checks.named import with_key
 from gpca.errors import InputError
 from gpca.objects.source import require_place
