@@ -13,7 +13,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.files import whole_file
-from gpca.limits import LARGEST_NUMBER, is_bounded, require_memory
+from gpca.limits import LARGEST_NUMBER, is_bounded, require_file, require_memory
 
 TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy
 _KNOWN = f"b{REAL}{TEXT}"
@@ -45,8 +45,7 @@ def load_arrays(
             machine can hold, NaN, infinity, or numbers beyond all that can be measured.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "no such file", f"make it with '{made_by}'")
+    require_file(path, "no such file", f"make it with '{made_by}'", math.inf)
     remedy = f"regenerate it with '{made_by}'"
     try:
         with zipfile.ZipFile(path) as archive:

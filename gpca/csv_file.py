@@ -24,9 +24,9 @@ def read_csv(path: str | Path, columns: Iterable[str]) -> pd.DataFrame:
         InputError: missing, empty or unreadable file, column that is missing or there twice, no rows, rows longer than
             the head.
     """
+    require_file(path, "no such file", "make it with snakemake")
     import pandas as pd
 
-    require_file(path, "no such file", "make it with snakemake")
     try:
         rows = pd.read_csv(path, dtype=str, keep_default_na=False)
     except pd.errors.EmptyDataError as fault:

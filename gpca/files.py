@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.limits import require_file
 
 MOST_PIXELS = 2**26  # of an image; depth cameras have a tenth of that, and a few bytes may unpack to any number
 IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content, and runs programs for some
@@ -92,10 +93,9 @@ def read_image(path: str | Path, remedy: str) -> np.ndarray:
     Raises:
         InputError: missing, truncated, unreadable or too large; it ends with the remedy.
     """
+    require_file(path, "no such image", remedy)
     from PIL import Image
 
-    if not Path(path).is_file():
-        raise InputError(path, "no such image", remedy)
     too_many = f"has more than {MOST_PIXELS} pixels, too many for a frame"
     try:
         with warnings.catch_warnings():

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from gpca.errors import InputError
+from gpca.limits import require_file
 
 LARGEST_BYTES = 2**26  # ten times the largest scene of the BOP benchmark; parsed, it takes ten times the memory
 
@@ -20,10 +21,7 @@ def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
     Raises:
         InputError: missing, too large, not UTF-8, another type than an object, or what :func:`parse_json` refuses.
     """
-    if not path.is_file():
-        raise InputError(path, "no such file", remedy)
-    if (size := path.stat().st_size) > LARGEST_BYTES:
-        raise InputError(path, f"is {size / 2**20:.0f} MB, too large for {what}", remedy)
+    require_file(path, "no such file", remedy, LARGEST_BYTES)
     try:
         content = parse_json(path.read_text(encoding="utf-8"))
     except ValueError as fault:  # also of UTF-8

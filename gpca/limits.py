@@ -6,6 +6,7 @@ A small file may say that it is a large one, or unpack to one. So sizes are look
 from __future__ import annotations
 
 import os
+import stat
 import zipfile
 from pathlib import Path
 
@@ -23,15 +24,38 @@ LARGEST_NUMBER = 1e15
 _BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
-def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: int = LARGEST_FILE_BYTES) -> None:
-    """Raise an InputError with `fault` where there is no regular file, and another where it is too large to parse.
+def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float = LARGEST_FILE_BYTES) -> None:
+    """Raise an InputError unless a file of a user's can be read to its end; every reader of such files calls this.
 
-    A device or a pipe is no file: reading one may never end.
+    Reading a device or a pipe may never end, and nor may reading what the kernel shows as an empty file, as in /proc.
+
+    Args:
+        path: the file.
+        fault: what is said where there is none.
+        remedy: what to do.
+        largest_bytes: that its reader can parse.
     """
-    if not Path(path).is_file():
-        raise InputError(path, fault, remedy)
-    if (size := Path(path).stat().st_size) > largest_bytes:
-        raise InputError(path, f"is {size / 1e9:.3g} GB, more than the limit of {largest_bytes / 1e9:.3g} GB", remedy)
+    try:
+        status = os.stat(path)
+        if stat.S_ISREG(status.st_mode) and status.st_size:
+            os.close(os.open(path, os.O_RDONLY))
+    except (FileNotFoundError, NotADirectoryError) as missing:
+        raise InputError(path, fault, remedy) from missing
+    except (OSError, ValueError) as denied:  # no permission, a loop of links, a name that can be none
+        reason = getattr(denied, "strerror", None) or denied
+        raise InputError(path, f"cannot be read ({reason})", "correct its name or permissions") from denied
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "a device, pipe or socket"
+        raise InputError(path, f"is {kind}, not a file", remedy)
+    if not status.st_size:
+        raise InputError(path, "is empty", remedy)
+    if status.st_size > largest_bytes:
+        raise InputError(path, f"is {_size(status.st_size)}, more than the limit of {_size(largest_bytes)}", remedy)
+
+
+def _size(number_of_bytes: float) -> str:
+    scale, unit = (1e9, "GB") if number_of_bytes >= 1e9 else (1e6, "MB")
+    return f"{number_of_bytes / scale:.3g} {unit}"
 
 
 def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: str) -> None:

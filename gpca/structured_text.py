@@ -12,6 +12,7 @@ import yaml
 
 from gpca.errors import InputError
 from gpca.json_file import parse_json
+from gpca.limits import require_file
 
 LARGEST_BYTES = 2**18  # fifteen times the longest config of the suite; PyYAML reads it within seconds
 MOST_ENTRIES = 100_000  # with every alias unfolded; the configs of the suite have a thousand
@@ -41,12 +42,7 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
             themselves, or what :func:`require_plain` refuses.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(
-            path, "is not a file" if path.exists() else "no such file", "name a config, a YAML or JSON file"
-        )
-    if (size := path.stat().st_size) > LARGEST_BYTES:
-        raise InputError(path, f"is too large for a config: it has {size} bytes", f"the limit is {LARGEST_BYTES}")
+    require_file(path, "no such file", "name a config, a YAML or JSON file", LARGEST_BYTES)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as fault:

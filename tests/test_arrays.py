@@ -59,8 +59,8 @@ def arrays(**changed):
     ("write", "expected"),
     [
         (lambda path: None, "no such file"),
-        (lambda path: path.mkdir(), "no such file"),
-        (lambda path: path.write_bytes(b""), "not a readable npz"),
+        (lambda path: path.mkdir(), "is a folder, not a file"),
+        (lambda path: path.write_bytes(b""), "is empty"),
         (lambda path: path.write_bytes(b"version https://git-lfs.github.com/spec/v1\n"), "not a readable npz"),
         (truncate, "not a readable npz"),
         (change_a_byte, "not a readable npz"),

@@ -23,6 +23,7 @@ from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, require_like
 from gpca.errors import InputError
+from gpca.limits import require_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
@@ -250,8 +251,7 @@ def load_model(weights: Path, settings: EncoderSettings, classes: tuple[str, ...
     """
     model = make_model(settings, classes)
     remedy = "regenerate them with 'python -m gpca train'"
-    if not Path(weights).is_file():
-        raise InputError(weights, "no such weights", remedy)
+    require_file(weights, "no such weights", remedy)
     wrong = f"not the weights of backbone '{settings.backbone}'"
     try:
         state = read_tensors(weights)

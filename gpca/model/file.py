@@ -18,6 +18,7 @@ from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
+from gpca.limits import require_file
 from gpca.model.contents import require_possible
 from gpca.model.diagnoser import Diagnoser
 from gpca.model.familiarity import Familiarity
@@ -90,8 +91,7 @@ class Model:
         Raises:
             InputError: missing, damaged, pickled, no model, one of another version, or one with what cannot be.
         """
-        if not Path(path).is_file():
-            raise InputError(path, "no such model", REMEDY)
+        require_file(path, "no such model", REMEDY)
         try:
             content = read_tensors(path)
         except ValueError as fault:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import json
+import math
 import os
 import shutil
 import stat
@@ -22,7 +23,7 @@ from typing import IO
 from gpca.errors import InputError
 from gpca.files import sha256_of_file, whole_file
 from gpca.json_file import read_json
-from gpca.limits import LARGEST_FILE_BYTES, is_bounded
+from gpca.limits import LARGEST_FILE_BYTES, is_bounded, require_file
 
 LARGEST_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
 LONGEST_HEADER = 2**20  # bytes of what comes before a member, such as its long name; tarfile reads it as a whole
@@ -64,8 +65,7 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterat
             whose path leaves the archive's folder; more than `largest_bytes` unpacked.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError(path, "no such file", "check url or files in the config")
+    require_file(path, "no such file", "check url or files in the config", math.inf)
     with _damage_named(path):
         archive, list_members = _open(path)
     with archive:

@@ -76,8 +76,7 @@ def require_entry(entry: dict, folder: Path) -> None:
 def require_models(models: Path, ids: Sequence[int]) -> None:
     """Raise an InputError for the first object that a folder of models has no model of."""
     for number in ids:
-        if not (path := _model(models, number)).is_file():
-            raise InputError(path, "no such model", "check objects in the config, or fetch the models again")
+        require_file(_model(models, number), "no such model", "check objects in the config, or fetch the models again")
 
 
 def _model(models: Path, number: int) -> Path:

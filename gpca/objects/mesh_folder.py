@@ -10,7 +10,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.limits import require_file
 from gpca.objects.canonical import require_points
-from gpca.objects.mesh_text import require_whole
+from gpca.objects.mesh_text import CORNERS, require_whole
 from gpca.objects.surface import Surface
 
 SUFFIXES = (".ply", ".obj", ".stl", ".off")
@@ -70,18 +70,20 @@ def read_surface(path: Path, scale: float) -> Surface:
         InputError: unreadable, too large, truncated or longer than it declares, without points or faces, NaN, or faces
             that name no vertex.
     """
-    import trimesh
-
     remedy = "fetch or export it again"
     require_file(path, "no such file", remedy)
     try:
         require_whole(path)
+        import trimesh  # here, since a file that is refused above needs none of it
+
         # Unprocessed: processing would drop NaN vertices and merge others in silence.
         with np.errstate(all="ignore"):  # numbers that overflow are found below
             loaded = trimesh.load(path, process=False, skip_materials=True, fix_texture=False)
         if isinstance(loaded, trimesh.Scene) and loaded.geometry:  # an OBJ with several materials
             loaded = loaded.to_mesh()
         _require_equal_lists(loaded)
+    except InputError:
+        raise
     except Exception as fault:  # a malformed file makes the parsers raise nearly anything
         raise InputError(path, f"is truncated or not a readable {path.suffix} file ({fault})", remedy) from fault
     vertices = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64)
@@ -115,5 +117,10 @@ def _require_equal_lists(loaded) -> None:
     for name, element in raw.items():
         data = element.get("data")
         for field in (isinstance(data, np.ndarray) and data.dtype.names) or ():
-            if data.dtype[field].names and (data[field]["f0"] != data[field]["f0"][:1]).any():
+            if not data.dtype[field].names:
+                continue
+            lengths = data[field]["f0"]
+            if (lengths != lengths[:1]).any():
                 raise ValueError(f"lists of element {name} differ in length")
+            if field.encode() in CORNERS and (lengths < 3).any():
+                raise ValueError(f"element {name} has rows of {lengths[0]} corners")

@@ -22,6 +22,7 @@ from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.files import require_outputs
+from gpca.limits import require_file
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
@@ -95,8 +96,7 @@ def _start(registrations: Registrations, keys: list, options: Namespace) -> dict
 def _answers(path: Path | None):
     if path is None:
         return sys.stdin
-    if not path.is_file():
-        raise InputError(path, "no such file", "give a text file with one answer per line")
+    require_file(path, "no such file", "give a text file with one answer per line")
     return path.open(encoding="utf-8")
 
 

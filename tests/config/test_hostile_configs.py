@@ -36,7 +36,7 @@ TEXTS = {
     "key twice": ("seeds: [0]\nrun: a\nseeds: [1]", "line 3: key 'seeds' appears twice"),
     "nested key twice": ("registrations:\n  train: 36\n  train: 90\n", "line 3: key 'train' appears twice"),
     "key twice in JSON": ('{"seeds": [0], "seeds": [1]}', "key 'seeds' appears twice"),
-    "empty": ("", "no keys"),
+    "empty": ("", "is empty"),
     "comment": ("# nothing\n", "no keys"),
     "list": ("- 1\n- 2\n", "no keys"),
     "text": ("hello", "no keys"),
@@ -65,7 +65,7 @@ TEXTS = {
     "number in base 60 as name": ("encoders: {1:30: {backbone: dgcnn}}", "reads 1:30 as 90"),
     "nothing as name": ("learners: {~: {}}", "learners.None", "is not text"),
     "list as name": ("? [a, b]\n: 1\n", "neither YAML nor JSON"),
-    "too long": ("#" * (LARGEST_BYTES + 1), "bytes"),
+    "too long": ("#" * (LARGEST_BYTES + 1), "more than the limit of 0.262 MB"),
 }
 
 

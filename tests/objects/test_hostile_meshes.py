@@ -1,6 +1,7 @@
 """Mesh and cloud files that are damaged, or say what they do not hold, through the command line."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -51,6 +52,14 @@ def binary(spoil):
     return bytes(content)
 
 
+def cornered(corners):
+    """A binary PLY whose faces have as many corners."""
+    face = np.dtype([("n", "u1"), ("corners", "<i4", (corners,))])
+    faces = np.array([(corners, range(i, i + corners)) for i in range(150)], face)
+    head = ply(n_faces=150).replace("ascii", "binary_little_endian").partition("end_header\n")
+    return "".join(head[:2]).encode() + BALL.vertices.astype("<f4").tobytes() + faces.tobytes()
+
+
 def stl(spoil):
     content = bytearray(BALL.export(file_type="stl"))
     spoil(content)
@@ -92,6 +101,14 @@ MESHES = {
     "two_axes.ply": ply([row.rsplit(" ", 1)[0] for row in VERTICES], properties=XYZ.replace("property float z\n", "")),
     "no_end.ply": ply()[:100],
     "empty.ply": "",
+    "vertices_twice.ply": ply().replace("element face", f"element vertex {len(VERTICES)}\n{XYZ}element face"),
+    "x_twice.ply": ply([f"{row} 1" for row in VERTICES], properties=f"{XYZ}property float x\n"),
+    "property_of_nothing.ply": ply().replace("element vertex", "property float x\nelement vertex"),
+    "no_name.ply": ply().replace("element face", "element"),
+    "middle_endian.ply": binary(lambda content, start: write(content, 0, content[:40].replace(b"little", b"middle"))),
+    "no_format.ply": binary(lambda content, start: write(content, 4, b"comment")),
+    "two_corners_binary.ply": cornered(2),
+    "zeros.ply": "\0" * 3_000_000,
     # numbers
     "nan.ply": ply(changed(VERTICES, "nan 0 0")),
     "infinite.ply": ply(changed(VERTICES, "1e39 0 0")),
@@ -105,6 +122,8 @@ MESHES = {
     "binary_cut.ply": binary(lambda content, start: content.__delitem__(slice(len(content) - 130, None))),
     # OFF
     "every_wide.off": off([f"1051 {row}" for row in VERTICES]),
+    "two_corners.off": off(faces=changed(FACES, "2 1 2")),
+    "zeros.off": "\0" * 3_000_000,
     "narrow.off": off(changed(VERTICES, "1 2")),
     "list_too_long.off": off(faces=changed(FACES, "5 1 2 3")),
     "more_rows.off": off(faces=[*FACES, *FACES]),
@@ -122,6 +141,7 @@ MESHES = {
     "weights.obj": obj([f"1051 {row}" for row in VERTICES]),
     "narrow.obj": obj(changed(VERTICES, "1 2")),
     "nan.obj": obj(changed(VERTICES, "nan 0 0")),
+    "zeros.obj": "\0" * 3_000_000,
     "half_corner.obj": obj(faces=[*(BALL.faces + 1), [1, 2, 3.5]]),
     # STL
     "cut.stl": stl_text()[:4000],
@@ -130,6 +150,13 @@ MESHES = {
     "count_too_high.stl": stl(lambda content: write(content, 80, (10**9).to_bytes(4, "little"))),
     "count_too_low.stl": stl(lambda content: write(content, 80, (10).to_bytes(4, "little"))),
     "binary_cut.stl": stl(lambda content: content.__delitem__(slice(84 + 2000, None))),
+    "misspelled_vertex.stl": stl_text().replace("vertex", "vertx"),
+    "misspelled_normal.stl": stl_text().replace("facet normal", "facet norml", 1),
+    "misspelled_loop.stl": stl_text().replace("outer loop", "outter loop"),
+    "misspelled_end.stl": stl_text().replace("endfacet", "endfacets"),
+    "two_vertices.stl": re.sub("vertex .*\n", "", stl_text(), count=1),
+    "two_numbers.stl": re.sub(r"(vertex \S+ \S+) \S+", r"\1", stl_text(), count=1),
+    "no_end.stl": stl_text().replace("endsolid", ""),
     "binary_nan.stl": stl(lambda content: write(content, 96, NAN)),
 }
 CLOUDS = {
@@ -172,6 +199,40 @@ def test_a_file_too_large_to_be_parsed_is_not_opened(tmp_path):
         refusal(arguments(kind, unit="m"), tmp_path, name, "is 5 GB, more than the limit of 1 GB")
 
 
+@pytest.mark.parametrize("name", ["zeros.obj", "zeros.off", "zeros.stl", "zeros.ply"])
+def test_more_text_than_can_be_parsed_is_not_read(name, tmp_path):
+    heads = {".stl": b"solid\n", ".ply": b"ply\nformat ascii 1.0\nelement vertex 9\nend_header\n"}
+    with (tmp_path / name).open("wb") as file:
+        file.write(heads.get(name[-4:], b""))
+        file.truncate(9 * 10**8)
+    line = refusal(
+        arguments("mesh_folder"), tmp_path, name, "has 900 MB of text, more than the limit of 250 MB; export"
+    )
+    assert "damaged" not in line
+
+
+FAULTS = {
+    "middle_endian.ply": "its format 'binary_middle_endian' is unknown",
+    "no_format.ply": "its format '' is unknown",
+    "vertices_twice.ply": "declares element vertex twice",
+    "x_twice.ply": "declares property 'x' twice",
+    "two_corners.ply": f"row 6 of {len(FACES)} of element face has 2 corners",
+    "two_corners_binary.ply": "element face has rows of 2 corners",
+    "two_corners.off": f"face 6 of {len(FACES)} has 2 corners",
+    "misspelled_vertex.stl": "line 4: 'vertx' stands where 'vertex' should",
+    "misspelled_normal.stl": "line 2: 'facet' stands where 'facet normal' should",
+    "two_numbers.stl": "line 4: 'vertex' has 2 numbers",
+    "zeros.obj": "a line is longer than 1048576 bytes, so it is not text",
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_line_names_the_fault(name, tmp_path):
+    content = MESHES[name]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    refusal(arguments("mesh_folder"), tmp_path, name, FAULTS[name])
+
+
 @pytest.mark.parametrize("points", [0, 63, -5])
 def test_too_few_points_of_a_surface(points, tmp_path):
     (tmp_path / "ball.ply").write_text(ply())
@@ -186,6 +247,8 @@ def test_the_same_files_unspoilt_are_read(tmp_path):
     (tmp_path / "back.obj").write_text(obj(faces=BALL.faces - 162))
     (tmp_path / "colours.off").write_text(off([f"{row} 255 0 0" for row in VERTICES], head="COFF"))
     (tmp_path / "ball.stl").write_text(stl_text())
+    (tmp_path / "capitals.stl").write_text(stl_text().replace("solid", "Solid a b").replace("vertex", "  VERTEX"))
+    (tmp_path / "two_solids.stl").write_text(stl_text() + "\n" + stl_text().replace("solid", "solid other"))
     (tmp_path / "binary.ply").write_bytes(binary(lambda content, start: None))
     (tmp_path / "binary.stl").write_bytes(stl(lambda content: None))
     for surface in surfaces(files_in(tmp_path, None, (".ply", ".obj", ".off", ".stl")), "mm"):

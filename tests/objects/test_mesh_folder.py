@@ -109,7 +109,7 @@ BROKEN = {
     "wild.obj": (b"v 0 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 9\n", "readable"),
     "points.obj": (b"v 0 0 0\nv 0 1 0\nv 1 0 0\n", "no faces"),
     "text.ply": (b"hello\n", "readable"),
-    "text.stl": (b"hello\n", "no points"),
+    "text.stl": (b"hello\n", "neither begins"),
     "text.off": (b"hello\n", "readable"),
     "underline.off": (b"OFF\n3 1 0\n1_0 0 0\n0 1 0\n0 0 1\n3 0 1 2\n", "'1_0' is not a finite decimal number"),
     "digits.off": ("OFF\n3 1 0\n٣ 0 0\n0 1 0\n0 0 1\n3 0 1 2\n".encode(), "'٣' is not a finite decimal number"),

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.limits import require_file
 
 
 @dataclass(frozen=True)
@@ -46,10 +47,9 @@ def read_markdown_table(path: str | Path) -> ShownTable:
         InputError: missing or unreadable file, no caption, no table, rows of different lengths.
     """
     remedy = "regenerate it with snakemake"
+    require_file(path, "no such file", remedy)
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except FileNotFoundError as fault:
-        raise InputError(path, "no such file", remedy) from fault
     except (UnicodeDecodeError, OSError) as fault:
         raise InputError(path, f"is not readable text ({fault})", remedy) from fault
     caption, *blocks = text.strip().split("\n\n")

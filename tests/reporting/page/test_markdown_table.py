@@ -36,7 +36,7 @@ def test_what_a_table_writes_is_read_again(table, tmp_path):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("", "is not a caption with a table below it"),
+        ("", "is empty"),
         ("**Caption**\n", "is not a caption with a table below it"),
         ("| A |\n| :-- |\n| 1 |\n", "is not a caption with a table below it"),
         ("**Caption**\n\n| A | B |\n| :-- | --: |\n| 1 |\n", "contains rows of different lengths"),

@@ -158,7 +158,7 @@ def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
         ("tiny/tables/table4_mine.md", "no table", "is not a caption with a table below it"),
         ("tiny/figures/reliability.png", "no image", "is not a readable image"),
         ("tiny/comparison.csv", "", "is empty"),
-        ("tiny/registrations/bricks/seed0.npz", "", "is not a readable npz archive"),
+        ("tiny/registrations/bricks/seed0.npz", "PK", "is not a readable npz archive"),
     ],
 )
 def test_a_damaged_file_is_named(copied, damaged, text, fault):
