@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -20,6 +21,7 @@ from typing import Any
 from gpca.code_files import code_files
 
 VARIABLE = "NUMBA_CACHE_DIR"
+NOTICE = "compiling loops, which takes up to half a minute; later calls load what is kept of them"
 
 
 def _set_cache_folder() -> None:
@@ -49,10 +51,11 @@ _set_cache_folder()  # numba reads the variable when it is imported
 
 import numba  # noqa: E402
 from numba import config, prange  # noqa: E402
+from numba.core.event import Listener, register  # noqa: E402
 
 setattr(config, "CACHE_DIR", os.environ.get(VARIABLE, ""))  # noqa: B010 - numba declares it at run time; where it was imported before
 
-__all__ = ["INNER_LOOP", "njit", "prange"]
+__all__ = ["INNER_LOOP", "NOTICE", "njit", "prange", "say_when_compiling"]
 
 # Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
 # in the loops of ICP takes longer than the search. Functions compiled so cannot make arrays; they are given room to
@@ -75,6 +78,24 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
         return compiled
 
     return decorate
+
+
+@cache
+def say_when_compiling() -> None:
+    """Print one line to stderr as soon as a loop is compiled, not loaded: a first call takes longer than all others."""
+    register("numba:compile", _Notice())
+
+
+class _Notice(Listener):
+    said = False
+
+    def on_start(self, event: object) -> None:
+        if not self.said:
+            print(NOTICE, file=sys.stderr, flush=True)
+        self.said = True
+
+    def on_end(self, event: object) -> None:
+        """Others are compiled after the first one."""
 
 
 @cache

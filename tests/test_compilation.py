@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from gpca.compilation import NOTICE
+
 from .documents import ROOT
 
 CODE = "import numba, gpca.alignment.icp_kernels; print(numba.config.CACHE_DIR)"
@@ -56,6 +58,19 @@ def test_a_missing_folder_for_temporary_files_is_no_fault(read_only):
 def test_elsewhere_numba_chooses_itself(tmp_path):
     assert imported(ROOT).stdout == "\n"
     assert imported(ROOT, NUMBA_CACHE_DIR=str(tmp_path)).stdout == f"{tmp_path}\n"
+
+
+def test_a_first_call_says_that_it_compiles_and_later_ones_do_not(tmp_path):
+    (tmp_path / "loops.py").write_text("from numba import njit\n@njit(cache=True)\ndef twice(x):\n    return 2 * x\n")
+    code = "from gpca.compilation import say_when_compiling as say; say(); say(); from loops import twice; twice(1); "
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{ROOT}:{tmp_path}"}
+    said = []
+    for _ in range(2):
+        command = [sys.executable, "-c", code + "twice(1.0)"]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[-2000:]
+        said.append(done.stderr)
+    assert said == [f"{NOTICE}\n", ""]
 
 
 def test_a_loop_is_compiled_anew_when_a_module_beneath_its_own_has_changed(tmp_path):

@@ -13,7 +13,8 @@ import yaml
 import gpca
 from gpca.files import sha256_of_file
 from gpca.model.explainer import Explainer
-from gpca.model.file import SHIPPED, Model
+from gpca.model.file import Model
+from gpca.model.location import SHIPPED
 from gpca.steps.ship import LARGEST_BYTES
 
 from .documents import ROOT

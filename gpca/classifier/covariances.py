@@ -34,10 +34,23 @@ COVARIANCES = {
 }
 
 
+class Scaled(gpytorch.kernels.ScaleKernel):
+    """Scales over a covariance of the same batch shape: no shapes to broadcast, for which torch would load SymPy."""
+
+    @property
+    def batch_shape(self) -> torch.Size:
+        """Return that of the scales."""
+        return self._batch_shape
+
+    @batch_shape.setter
+    def batch_shape(self, shape: torch.Size) -> None:
+        self._batch_shape = shape
+
+
 def make_covariance(name: str, n_classes: int, lengthscale: float) -> gpytorch.kernels.ScaleKernel:
     """Return C covariances, each with a scale of its own; the polynomial one has an offset and no lengthscale."""
     batch = torch.Size([n_classes])
-    covariance = gpytorch.kernels.ScaleKernel(COVARIANCES[name](batch_shape=batch), batch_shape=batch)
+    covariance = Scaled(COVARIANCES[name](batch_shape=batch), batch_shape=batch)
     if covariance.base_kernel.has_lengthscale:
         covariance.base_kernel.lengthscale = lengthscale
     return covariance

@@ -13,8 +13,6 @@ from dataclasses import asdict
 
 import numpy as np
 import torch
-from sklearn.cluster import KMeans
-from sklearn.preprocessing import StandardScaler
 
 from gpca.adam import Adam
 from gpca.attribution.scores import score_marginals, summarise_marginals
@@ -23,6 +21,7 @@ from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import SparseGPs
+from gpca.classifier.standardization import Standardization
 from gpca.errors import InputError
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
@@ -63,7 +62,7 @@ class GPC:
     ) -> Iterator[int]:
         """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many."""
         around_R_d = h_N_d if around_R_d is None else around_R_d
-        self._scaler = StandardScaler().fit(around_R_d)
+        self._scaler = Standardization.of(around_R_d)
         starts_R_d = self._scaled(around_R_d)
         inputs_N_d = self._scaled(h_N_d)
         targets_N = self._targets(labels_N)
@@ -152,7 +151,7 @@ class GPC:
 
     def mean_logits(self, h_N_d: torch.Tensor) -> torch.Tensor:
         """Return the means (N, C) of the latent logits, differentiable in the embeddings."""
-        scaled_N_d = (h_N_d - torch.from_numpy(self._scaler.mean_)) / torch.from_numpy(self._scaler.scale_)
+        scaled_N_d = (h_N_d - torch.from_numpy(self._scaler.mean_d)) / torch.from_numpy(self._scaler.scale_d)
         return self._prior.means(scaled_N_d, self._latents.mean_C_M)
 
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -176,8 +175,8 @@ class GPC:
             "classes": list(self.classes),
             "settings": asdict(self.settings),
             "axes": list(self._axes),
-            "scaler_mean": torch.from_numpy(self._scaler.mean_),
-            "scaler_scale": torch.from_numpy(self._scaler.scale_),
+            "scaler_mean": torch.from_numpy(self._scaler.mean_d),
+            "scaler_scale": torch.from_numpy(self._scaler.scale_d),
             "kernel": self._prior.covariance.state_dict(),
             "inducing": self._prior.inducing_M_d,
             "mean": torch.from_numpy(self._latents.mean_C_M),
@@ -190,8 +189,7 @@ class GPC:
     def from_state(cls, state: dict) -> GPC:
         """Return the classifier of a :meth:`state`: it attributes alike, and learns further labels."""
         gpc = cls(tuple(state["classes"]), GPCSettings(**state["settings"]), *state["axes"])
-        gpc._scaler = StandardScaler()
-        gpc._scaler.mean_, gpc._scaler.scale_ = state["scaler_mean"].numpy(), state["scaler_scale"].numpy()
+        gpc._scaler = Standardization(state["scaler_mean"].numpy(), state["scaler_scale"].numpy())
         covariance = make_covariance(gpc.settings.kernel, len(gpc.classes), lengthscale=1.0).requires_grad_(False)
         covariance.load_state_dict(state["kernel"])
         gpc._prior = Prior(covariance, state["inducing"])
@@ -204,10 +202,12 @@ class GPC:
         return np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
 
     def _scaled(self, h_N_d: np.ndarray) -> torch.Tensor:
-        return torch.from_numpy(self._scaler.transform(h_N_d).astype(np.float32))
+        return torch.from_numpy(self._scaler(h_N_d).astype(np.float32))
 
 
 def _inducing_inputs(inputs_N_d: torch.Tensor, settings: GPCSettings, axes: tuple) -> torch.Tensor:
+    from sklearn.cluster import KMeans
+
     clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
     kmeans = KMeans(clusters, n_init=1, random_state=seed_of(*axes, "inducing") % 2**32)
     return torch.from_numpy(kmeans.fit(inputs_N_d.numpy()).cluster_centers_.astype(np.float32))

@@ -12,7 +12,6 @@ from functools import cache
 
 import numpy as np
 from scipy.special import softmax
-from scipy.stats import norm, qmc
 
 
 @dataclass(frozen=True)
@@ -143,4 +142,6 @@ def _expected_softmax(mean_N_C: np.ndarray, deviation_N_C: np.ndarray) -> tuple[
 @cache
 def _normal_points(n_classes: int, log2_points: int = 6) -> np.ndarray:
     """Return 64 points (Q, C) of a scrambled Sobol sequence as standard normal numbers, the same at every call."""
+    from scipy.stats import norm, qmc
+
     return norm.ppf(qmc.Sobol(n_classes, rng=0).random_base2(log2_points))

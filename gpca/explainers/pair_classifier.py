@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import torch
+from scipy.special import ndtri
 
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.gpc import GPC
@@ -16,6 +17,7 @@ from gpca.seeds import seed_of
 
 QUANTILES = 100  # of each descriptor, at most
 FARTHEST = 3.0  # standard deviations; what lies beyond all training samples lies there
+AT_THE_END = 1e-7  # of a descriptor; what comes as near to its last quantile has reached it
 NEIGHBOURS = 3  # among the training samples, by which a pair is told to be like them
 USUAL = 0.99  # share of the training samples that are no farther from their neighbours than is usual
 ABSENT, PRESENT = "absent", "present"
@@ -34,32 +36,28 @@ class NormalisedDescriptors:
         """Learn the ranks."""
         from sklearn.preprocessing import QuantileTransformer
 
-        self._transformer = QuantileTransformer(
+        fitted = QuantileTransformer(
             n_quantiles=min(QUANTILES, len(features_N_F)),
             output_distribution="normal",
             random_state=seed_of(*self._axes, "quantiles") % 2**32,
         ).fit(features_N_F)
+        self._quantiles_Q_F = fitted.quantiles_
         return self
 
     def __call__(self, features_N_F: np.ndarray) -> np.ndarray:
         """Return the normalised descriptors (N, F)."""
-        return self._transformer.transform(features_N_F).clip(-FARTHEST, FARTHEST)
+        columns = zip(features_N_F.T, self._quantiles_Q_F.T, strict=True)
+        return ndtri(np.column_stack([_ranks(*column) for column in columns])).clip(-FARTHEST, FARTHEST)
 
     def state(self) -> torch.Tensor:
         """Return the quantiles (Q, F), for :meth:`from_state`."""
-        return torch.from_numpy(self._transformer.quantiles_)
+        return torch.from_numpy(self._quantiles_Q_F)
 
     @classmethod
     def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalisedDescriptors:
         """Return what normalises as the one of that state did."""
-        from sklearn.preprocessing import QuantileTransformer
-
-        made, quantiles = cls(), quantiles_Q_F.numpy()
-        transformer = QuantileTransformer(n_quantiles=len(quantiles), output_distribution="normal")
-        transformer.n_quantiles_, transformer.n_features_in_ = len(quantiles), quantiles.shape[1]
-        transformer.references_ = np.linspace(0, 1, len(quantiles))
-        transformer.quantiles_ = quantiles
-        made._transformer = transformer
+        made = cls()
+        made._quantiles_Q_F = quantiles_Q_F.numpy()
         return made
 
 
@@ -155,6 +153,19 @@ class PairClassifier:
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
         return made
+
+
+def _ranks(values_N: np.ndarray, quantiles_Q: np.ndarray) -> np.ndarray:
+    """Return the ranks of values in [0, 1], as scikit-learn's QuantileTransformer has them to the last digit.
+
+    Where quantiles are equal, that is the mean of the lowest and the highest rank.
+    """
+    ranks_Q = np.linspace(0, 1, len(quantiles_Q))
+    from_above_N = -np.interp(-values_N, -quantiles_Q[::-1], -ranks_Q[::-1])
+    ranks_N = 0.5 * (np.interp(values_N, quantiles_Q, ranks_Q) + from_above_N)
+    ranks_N[values_N + AT_THE_END > quantiles_Q[-1]] = 1
+    ranks_N[values_N - AT_THE_END < quantiles_Q[0]] = 0
+    return ranks_N
 
 
 def _to_nearest(of_N_F: np.ndarray, known_M_F: np.ndarray, skipped: int) -> np.ndarray:

@@ -27,12 +27,13 @@ from gpca.errors import InputError
 from gpca.model.clouds import Clouds
 from gpca.model.diagnoser import Diagnosis
 from gpca.model.explanation import CHECK, Explanation, PoseSpread
-from gpca.model.file import Model, model_path
-from gpca.model.pose_spread import MONTE_CARLO, NAMES, estimated_spread, spread_estimator, spread_of_icp
+from gpca.model.file import Model
+from gpca.model.location import model_path
+from gpca.model.pose_spread import NAMES, estimated_spread, spread_estimator, spread_of_icp
 from gpca.model.voids import Void, voids_of
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 GOOD_FITNESS = 0.9  # from which on an initial pose is not doubted
 INVERSE_COST = 0.5  # of that from the initial pose; where the inverse of this ends with less, it was probably meant
@@ -42,7 +43,7 @@ class Explainer:
     """Explains registrations with a trained model.
 
     Args:
-        model: by default the one that :func:`gpca.model.file.model_path` finds.
+        model: by default the one that :func:`gpca.model.location.model_path` finds.
         policy: what turns scores into an action; by default the model's own.
         device: where the encoder runs; by default a GPU where torch finds one.
     """
@@ -57,7 +58,7 @@ class Explainer:
 
     @classmethod
     def load(cls, path: str | Path | None = None) -> Explainer:
-        """Return the explainer of a model file, or of the one that :func:`gpca.model.file.model_path` finds."""
+        """Return the explainer of a model file, or of the one that :func:`gpca.model.location.model_path` finds."""
         return cls(Model.load(model_path(path)))
 
     def explain(

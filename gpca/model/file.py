@@ -5,7 +5,6 @@ It holds tensors, numbers and names alone, so that loading one runs nobody's cod
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,18 +17,13 @@ from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
-from gpca.limits import require_file
 from gpca.model.contents import require_possible
 from gpca.model.diagnoser import Diagnoser
 from gpca.model.familiarity import Familiarity
+from gpca.model.location import REMEDY, require_model
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 FORMAT, VERSION = "GP-CA model", 3
-VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to take where no other is named
-RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
-SHIPPED = Path(__file__).with_name("shipped.pt")  # comes with the package where `python -m gpca ship` has put it
-BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
-REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results/embedded/model.pt'"
 
 
 @dataclass(frozen=True)
@@ -91,7 +85,7 @@ class Model:
         Raises:
             InputError: missing, damaged, pickled, no model, one of another version, or one with what cannot be.
         """
-        require_file(path, "no such model", REMEDY)
+        require_model(path)
         try:
             content = read_tensors(path)
         except ValueError as fault:
@@ -131,35 +125,6 @@ def _familiarity(content: Mapping) -> Familiarity | None:
 def _renamed(settings: Mapping, old: str, new: str) -> dict:
     """Rename one setting in its place: files of this version say `points`, whatever the config calls it now."""
     return {new if name == old else name: value for name, value in settings.items()}
-
-
-def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path:
-    """Return the model that is meant: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
-
-    Of those in `results`, by default the folder of that name in the working directory, that of the run ``real`` comes
-    first, then ``embedded``, then the newest of any other, and ``smoke`` last.
-
-    Raises:
-        InputError: there is none.
-    """
-    if given is not None:
-        return Path(given)
-    if named := os.environ.get(VARIABLE):
-        if not Path(named).is_file():
-            raise InputError(f"{VARIABLE}={named}", "no such model", f"correct it or {REMEDY}")
-        return Path(named)
-
-    def rank(path: Path) -> tuple:
-        run = path.parent.name
-        preferred = BEST_FIRST.index(run) if run in BEST_FIRST else len(BEST_FIRST)
-        return run == "smoke", preferred, -path.stat().st_mtime
-
-    found = [*sorted(results.glob("*/model.pt"), key=rank), *([SHIPPED] if SHIPPED.is_file() else [])]
-    if not found:
-        raise InputError(
-            "no model", f"none in {results.absolute()}", f"{REMEDY}, or name one with --model or {VARIABLE}"
-        )
-    return found[0]
 
 
 def _given(settings: dict) -> dict:

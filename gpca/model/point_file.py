@@ -19,6 +19,13 @@ LARGEST_POSE_BYTES = 10**5  # 16 numbers, however they are written
 SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd")
 
 
+def require_format(path: Path) -> None:
+    """Raise an InputError unless there is a file to be read, of a format that :func:`read_points` reads."""
+    require_file(path, "no such file", f"give one of {', '.join(SUFFIXES)}")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(path, "has an unsupported format", f"give one of {', '.join(SUFFIXES)}")
+
+
 def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
     """Return the points (N, 3) of a cloud, or drawn on a mesh, in the file's unit, and the frame that they span.
 
@@ -30,10 +37,8 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
             that this unit does not give.
     """
     scale = mesh_folder.metres_per(unit)
-    require_file(path, "no such file", f"give one of {', '.join(SUFFIXES)}")
-    if (suffix := path.suffix.lower()) not in SUFFIXES:
-        raise InputError(path, "has an unsupported format", f"give one of {', '.join(SUFFIXES)}")
-    if suffix == ".pcd":
+    require_format(path)
+    if path.suffix.lower() == ".pcd":
         points = pcd.parse(path.read_bytes(), path)
     else:
         surface = mesh_folder.read_surface(path, scale)

@@ -14,10 +14,9 @@ from gpca.model.explanation import PoseSpread
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import Estimate, RegisteredPair
 from gpca.uncertainty.estimators.registry import make_estimator
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
 
-MONTE_CARLO = "monte_carlo"
 NAMES: dict[Method, str] = {  # of the model's kinds of ICP among the registration methods
     "point_to_point": "point_to_point",
     "point_to_plane": "point_to_plane",

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import IO
 
 from gpca.errors import InputError
-
 from gpca.numerals import decimal
 
 OFF_VERTEX_COLUMNS = (3, 6, 7)  # coordinates, alone or with a colour

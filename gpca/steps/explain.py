@@ -7,16 +7,11 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-import torch
-
-from gpca.alignment.methods.registry import make_method
 from gpca.errors import InputError
-from gpca.model.explainer import Explainer
-from gpca.model.file import Model, model_path
-from gpca.model.point_file import read_points, read_pose
-from gpca.model.pose_spread import MONTE_CARLO, spread_estimator
+from gpca.model.location import model_path, require_model
+from gpca.model.point_file import read_points, read_pose, require_format
 from gpca.objects.mesh_folder import METRES_PER_UNIT
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 UNKNOWN_STATUS = 3  # of the process; 1 is a failed check of another step, 2 a fault of the user's
 
@@ -43,22 +38,34 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; all that is no result goes to stderr.
 
+    The clouds are read before any library is loaded that they do not need: most mistakes are found there.
+
     Returns:
         `UNKNOWN_STATUS` where one of the explanations means nothing, otherwise 0.
     """
-    torch.set_num_threads(options.threads)
     if options.settings:
         raise InputError("--settings", "is not used by explain", "make another model to change its settings")
     if len(options.source) > 1 and not options.json_lines:
         raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
     uncertainty = UncertaintySettings() if options.uncertainty is not None else None
     estimator = MONTE_CARLO if options.uncertainty is None else options.uncertainty
-    _require_known(options.method, estimator)
     path = model_path(options.model)
-    model = Model.load(path)
+    require_model(path)
+    for cloud in (*options.source, options.target):
+        require_format(cloud)
     T_init = read_pose(options.init) if options.init else None
     sources = [read_points(source, options.unit)[0] for source in options.source]
     target, frame = read_points(options.target, options.unit)
+    _require_known(options.method, options.uncertainty)
+    import torch
+
+    from gpca.compilation import say_when_compiling
+    from gpca.model.explainer import Explainer
+    from gpca.model.file import Model
+
+    torch.set_num_threads(options.threads)
+    say_when_compiling()
+    model = Model.load(path)
     asked = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator}
     explainer = Explainer(model)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
@@ -83,8 +90,13 @@ def run(options: Namespace) -> int:
     return status
 
 
-def _require_known(method: str | None, estimator: str) -> None:
-    """Refuse an option before any file is read, so that the line does not blame a file for it."""
+def _require_known(method: str | None, estimator: str | None) -> None:
+    """Refuse an option before anything is explained, so that the line does not blame a file for it."""
     if method is not None:
+        from gpca.alignment.methods.registry import make_method
+
         make_method(method)
-    spread_estimator(estimator, UncertaintySettings())
+    if estimator is not None:
+        from gpca.model.pose_spread import spread_estimator
+
+        spread_estimator(estimator, UncertaintySettings())

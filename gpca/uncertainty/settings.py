@@ -11,6 +11,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
 from gpca.settings import Bounds
 
+MONTE_CARLO = "monte_carlo"  # the estimator that these are settings of
 FEWEST_STARTS = 13  # the 2·6 + 1 of an unscented estimate; a 6×6 covariance of 6 samples or fewer is singular
 
 

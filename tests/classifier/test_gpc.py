@@ -271,7 +271,7 @@ def test_the_kernel_of_an_added_class_is_the_mean_of_the_others(gpc):
 
 def test_inducing_inputs_lie_around_the_embeddings_named():
     def nearest_centres(gpc):
-        inducing = gpc._scaler.inverse_transform(gpc._prior.inducing_M_d.numpy())
+        inducing = gpc._prior.inducing_M_d.numpy() * gpc._scaler.scale_d + gpc._scaler.mean_d
         return np.linalg.norm(inducing[:, None] - CENTRES, axis=2).argmin(axis=1)
 
     of_labelled = GPC(CLASSES, QUICK, "blobs", 0).fit(H[SEEN], LABELS[SEEN])

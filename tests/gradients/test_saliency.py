@@ -43,7 +43,7 @@ def gpc(encoder):
 
 
 def test_the_differentiable_means_are_those_of_the_posterior(gpc):
-    h_N_d = gpc.learnt_N_d * gpc._scaler.scale_ + gpc._scaler.mean_
+    h_N_d = gpc.learnt_N_d * gpc._scaler.scale_d + gpc._scaler.mean_d
     assert gpc.mean_logits(torch.from_numpy(h_N_d)).numpy() == pytest.approx(gpc.posterior(h_N_d)[0], abs=1e-4)
 
 

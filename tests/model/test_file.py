@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from gpca.errors import InputError
-from gpca.model.file import VARIABLE, Model, model_path
+from gpca.model.file import Model
+from gpca.model.location import VARIABLE, model_path
 
 
 @pytest.fixture
@@ -104,7 +105,7 @@ def test_a_file_that_is_no_model_of_this_version_is_one_line(path, spoil, messag
 def none_shipped(tmp_path, monkeypatch):
     """No model is named, and none comes with the package, whether or not this checkout has one."""
     monkeypatch.delenv(VARIABLE, raising=False)
-    monkeypatch.setattr("gpca.model.file.SHIPPED", tmp_path / "shipped.pt")
+    monkeypatch.setattr("gpca.model.location.SHIPPED", tmp_path / "shipped.pt")
 
 
 def test_the_best_model_of_the_workflow_is_taken(tmp_path, none_shipped):

@@ -1,12 +1,17 @@
 """The step ``explain`` by hand, and what it says of faulty files and settings."""
 
 import json
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from gpca.__main__ import main
+from gpca.model.location import SHIPPED
 
+from ..documents import ROOT
 from .command_lines import arguments, refused, removed, truncated, untouched, written
 
 FAULTS = [
@@ -46,6 +51,43 @@ def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys
     text = capsys.readouterr().out
     for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
         assert word in text
+
+
+# What loads for tenths of a second or more, and what of that an explanation by the model's own ICP needs.
+HEAVY = {"torch", "numba", "scipy", "trimesh", "gpytorch", "sklearn", "pandas", "sympy", "open3d", "torch._dynamo"}
+NEEDED = {"torch", "numba", "scipy", "trimesh", "gpytorch"}
+CODE = "import sys; from gpca.__main__ import main; print(main(sys.argv[1:]), *sys.modules, file=sys.stderr)"
+
+
+def loaded_by(folder, *words):
+    """Run a command in a process of its own, and return its exit status and the heavy modules that it loaded."""
+    command = [sys.executable, "-c", CODE, *map(str, words)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    status, *modules = done.stderr.splitlines()[-1].split()
+    return int(status), HEAVY & set(modules)
+
+
+@pytest.mark.parametrize("fault", ["suffix", "missing", "folder", "header", "model", "pose"])
+def test_a_file_that_cannot_be_used_is_refused_before_heavy_libraries_are_loaded(tmp_path, fault):
+    source, options = tmp_path / "cloud.ply", ["--model", SHIPPED]
+    if fault == "suffix":
+        source = tmp_path / "cloud.xyz"
+    if fault == "folder":
+        source.mkdir()
+    elif fault != "missing":
+        source.write_text("ply\nformat binary_middle_endian 1.0\nend_header\n")
+    if fault == "model":
+        options = ["--model", "lost.pt"]
+    if fault == "pose":
+        options += ["--init", "lost.txt"]
+    assert loaded_by(tmp_path, "explain", source, source, *options) == (2, set())
+
+
+def test_an_explanation_loads_no_library_that_it_does_not_need(folder):
+    status, modules = loaded_by(folder, *arguments("explain", {}))
+    assert status == 0
+    assert modules <= NEEDED
 
 
 def test_an_estimator_says_how_uncertain_another_methods_pose_is(folder, capsys):
