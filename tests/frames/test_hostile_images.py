@@ -25,7 +25,8 @@ def as_tiff(pixels):
 
 
 def halves(path):
-    path.write_bytes(path.read_bytes()[:-200])
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
 
 
 def postscript(path):
@@ -56,7 +57,7 @@ IMAGES = {
     "negative depth": (DEPTH, as_tiff(np.full(SHAPE, -0.7, np.float32)), "contains negative or infinite depth"),
     "infinite depth": (DEPTH, as_tiff(np.full(SHAPE, np.inf, np.float32)), "contains negative or infinite depth"),
     "depth cut": (DEPTH, halves, "is truncated or not a readable image"),
-    "depth empty": (DEPTH, lambda p: p.write_bytes(b""), "is truncated or not a readable image"),
+    "depth empty": (DEPTH, lambda p: p.write_bytes(b""), "is empty"),
     "depth a flipped byte": (DEPTH, flipped, "is truncated or not a readable image"),
     "depth a script": (DEPTH, postscript, "is truncated or not a readable image"),
     "depth a GIF": (DEPTH, lambda p: Image.fromarray(COLOURS).save(p, "GIF"), "is truncated or not a readable image"),

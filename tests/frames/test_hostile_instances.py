@@ -88,7 +88,8 @@ def test_instances_that_cannot_be(tiny, folder, name):
 @pytest.mark.parametrize("content", [b"", b"PK", b"scene,image\n1,2\n"])
 def test_a_file_that_holds_no_instances(folder, content):
     (folder / "instances.npz").write_bytes(content)
-    refusal(CALL, folder, "instances.npz: is not a readable npz archive; regenerate it")
+    found = "is not a readable npz archive; regenerate it" if content else "is empty; make it"
+    refusal(CALL, folder, f"instances.npz: {found}")
 
 
 def test_no_file_of_instances(folder):

@@ -136,7 +136,7 @@ def test_what_grows_with_the_distance_has_rho_one(files):
 
 def test_the_files_of_sets_are_checked(files):
     predictions, set_files = files
-    set_files[0].write_bytes(b"")
+    set_files[0].write_bytes(b"PK")
     with pytest.raises(InputError, match="not a readable npz"):
         collect_diagnostics(predictions, set_files)
     assert ShiftedSets.load(set_files[1])
