@@ -6,11 +6,23 @@ import argparse
 from collections.abc import Callable
 from typing import NoReturn
 
+from gpca.errors import InputError
+from gpca.names import is_name
 from gpca.numerals import whole
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """A parser whose errors are one line, as every other refusal of the suite."""
+    """A parser whose errors are one line, as every other refusal of the suite, and whose names are on one line, too."""
+
+    def parse_args(self, args=None, namespace=None):
+        """Parse; what is given as text, and not as a path or a number, names something, but for the settings."""
+        options = super().parse_args(args, namespace)
+        for option, value in vars(options).items():
+            for text in value if isinstance(value, list) else [value]:
+                if isinstance(text, str) and option != "settings" and not is_name(text):
+                    fault = f"{text!r} is empty or does not fit on one line"
+                    raise InputError(f"--{option.replace('_', '-')}", fault, "give a name")
+        return options
 
     def error(self, message: str) -> NoReturn:
         """End with status 2 and one line that names the command, the fault and the help."""

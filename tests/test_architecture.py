@@ -16,6 +16,7 @@ TOP = {
         "adam",
         "arguments",
         "arrays",
+        "axes",
         "code_files",
         "compilation",
         "csv_file",
@@ -26,6 +27,7 @@ TOP = {
         "json_file",
         "limits",
         "numerals",
+        "names",
     ),
     *("processor", "progress", "provenance", "registry", "seeds", "settings", "standard_streams", "structured_text"),
 }

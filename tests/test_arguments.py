@@ -69,3 +69,9 @@ SETTINGS = {
 def test_settings_that_cannot_be(tmp_path, name):
     text, word = SETTINGS[name]
     refusal(["objects", "--source", "mine", "--out", "objects.npz", "--settings", text], tmp_path, word)
+
+
+@pytest.mark.parametrize("name", ["", " ", "tiny\nother", "tiny\u2028", "\x1b[2J"])
+def test_names_that_are_empty_or_take_more_than_a_line_are_refused(tmp_path, name):
+    words = ["registrations", "--objects", "a.npz", "--seed", 0, "--out", "b.npz", "--timings", "c.csv"]
+    refusal([*words, "--source", name], tmp_path, "--source", "is empty or does not fit on one line; give a name")

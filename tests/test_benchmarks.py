@@ -198,7 +198,7 @@ def run_with_uncertainty(tmp_path, registrations):
         (path := tmp_path / "registrations" / "tiny" / f"seed{seed}.npz").parent.mkdir(parents=True, exist_ok=True)
         registrations.save(path)
         for design, variances in (("additive", additive), ("causal", causal)):
-            isotropic(test, variances).save(tmp_path / "uncertainty" / "tiny" / design / path.name)
+            isotropic(test, variances).save(tmp_path / "uncertainty" / "tiny" / design / path.name, ("tiny", seed))
     return tmp_path
 
 

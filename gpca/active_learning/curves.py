@@ -23,6 +23,7 @@ STREAM_COLUMNS = (
     "accuracy",
     "accuracy_new",
 )
+_SHARED = ("setting", "held_out", "labels", "accuracy", "accuracy_new")
 
 
 def write_curves(
@@ -45,7 +46,7 @@ def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
     Raises:
         InputError: missing, empty or unreadable file, missing column, something that is not a finite number.
     """
-    rows = read_csv(path, ("setting", "held_out", "labels", "accuracy", "accuracy_new"))
+    rows = read_csv(path, _SHARED, others=(*POOL_COLUMNS, *STREAM_COLUMNS))
     for column in rows.columns[2:]:
         # Before the first arrival there is no running accuracy; without test samples of a concept, none of it.
         rows[column] = numbers(path, rows, column, rows[column] != "")

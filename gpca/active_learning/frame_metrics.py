@@ -101,7 +101,7 @@ def _validation_accuracies(curve_files: Iterable[str | Path]) -> dict[tuple[str,
     """Return (source, backbone, seed) -> accuracy of the epoch with the smallest validation loss."""
     found = {}
     for path in curve_files:
-        curve = read_csv(path, ("epoch", "loss"))
+        curve = read_csv(path, ("epoch", "loss"), others=("learning_rate", "accuracy", "validation_*"))
         if "validation_loss" in curve:
             best = numbers(path, curve, "validation_loss").idxmin()
             found[source_method_seed(path)] = float(numbers(path, curve, "validation_accuracy")[best])

@@ -39,7 +39,7 @@ class LabelFile:
         written = self.path.read_text(encoding="utf-8", errors="replace").strip() if self.path.is_file() else ""
         if written in ("", ",".join(LABEL_COLUMNS)):
             return
-        rows = read_csv(self.path, LABEL_COLUMNS)
+        rows = read_csv(self.path, LABEL_COLUMNS, remedy="correct or remove the line")
         for line, (sample, split, concept) in enumerate(rows[list(LABEL_COLUMNS)].itertuples(index=False), start=2):
             where = f"{self.path}, line {line}"
             try:

@@ -98,7 +98,7 @@ def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a sample twice, an uncertainty not finite.
     """
-    rows = read_csv(path, _CAUSAL_COLUMNS)
+    rows = read_csv(path, _CAUSAL_COLUMNS, others=("uncertainty_*",))
     require_samples(path, rows)
     limit = numbers(path, rows, "uncertainty_clean").quantile(CAUSAL_QUANTILE)
     return numbers(path, rows, "uncertainty_observed").set_axis(_samples(rows)), float(limit)

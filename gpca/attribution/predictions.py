@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 PREDICTION_COLUMNS = ("sample", "split", "object", "concept_true", "concept_predicted", "abstained", "icp_calls")
 TIMING_COLUMNS = ("sample", "split", "seconds", "icp_seconds")
+_OF_CONCEPTS = ("score_?*", "variance_?*", "bald", "entropy")  # further columns; an explainer may lack some
 _TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
 
@@ -64,7 +65,7 @@ def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFra
             ICP calls that is not a finite number; a variance that is neither that nor empty; negative variances or
             numbers of calls.
     """
-    rows = read_csv(path, (*labels, *PREDICTION_COLUMNS))
+    rows = read_csv(path, (*labels, *PREDICTION_COLUMNS), _OF_CONCEPTS)
     concepts = concepts_of(rows)
     if not concepts:
         raise InputError(path, "has no column score_<concept>", "regenerate it")
@@ -122,8 +123,6 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
 
 
 def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:
-    """Raise an InputError unless every row is of split train or test and each sample of a split stands once."""
-    if not rows["split"].isin(["train", "test"]).all():
-        raise InputError(path, "column 'split' contains values other than train and test", "regenerate it")
+    """Raise an InputError unless each sample of a split stands once."""
     if rows.duplicated(list(keys)).any():
         raise InputError(path, "contains a sample twice", "regenerate it")

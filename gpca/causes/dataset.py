@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.arrays import REAL, load_arrays, save_arrays
+from gpca.axes import Axes
 from gpca.causes.shapley import ALL, SUBSETS
 from gpca.causes.truth import LARGEST_ERROR, Truth
 from gpca.errors import InputError
@@ -75,16 +76,17 @@ class Causes:
         arrays |= {name: getattr(self.truth, name) for name in MEASURED}
         arrays |= {f"{name}_again": getattr(self.truth_again, name) for name in MEASURED}
         arrays |= {name: np.array(getattr(self.truth, name)) for name in LIMITS}
-        save_arrays(path, arrays)
+        save_arrays(path, arrays, self.registrations.axes)
 
     @classmethod
-    def load(cls, path: str | Path) -> Causes:
-        """Read the npz.
+    def load(cls, path: str | Path, axes: Axes | None = None) -> Causes:
+        """Read the npz; `axes` are the source and the seed that it has to be of.
 
         Raises:
-            InputError: the file is missing, damaged, holds wrong shapes, NaN or what cannot be.
+            InputError: the file is missing, damaged, of another source or seed, holds wrong shapes, NaN or what cannot
+                be.
         """
-        registrations = Registrations.load(path, MADE_BY)
+        registrations = Registrations.load(path, axes, MADE_BY)
         n, subsets = len(registrations), len(SUBSETS)
         tested = int((registrations.split == "test").sum())
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(COLUMNS, (n,)) | dict.fromkeys(LIMITS, ())

@@ -43,7 +43,7 @@ def draw_causes(
     records: list[dict[str, Any]] = []
     for split, of_split in split_by_object(subjects, source, seed, settings).items():
         records += drawing.of_split(split, of_split)
-    causes, icp_seconds_S = as_causes(records)
+    causes, icp_seconds_S = as_causes(records, (source, seed))
     return causes, drawing.tally, icp_seconds_S
 
 
@@ -72,7 +72,9 @@ def draw_geometry(
         drawing.up_to(most, split, of_split, Quotas(wanted[split], alone))
         for split, of_split in split_by_object(subjects, source, seed, settings).items()
     ]
-    return as_causes([record for records in of_splits for record in records])[0] if all(of_splits) else None
+    if not all(of_splits):
+        return None
+    return as_causes([record for records in of_splits for record in records], (source, seed))[0]
 
 
 @dataclass

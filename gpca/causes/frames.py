@@ -93,7 +93,7 @@ def measure_frames(
         raise InputError(
             f"causes of {source}", "no instance in the frames can be measured", "check the meshes and poses"
         )
-    causes, _ = as_causes(records)
+    causes, _ = as_causes(records, (source, seed))
     return causes, _table(instances, causes)
 
 

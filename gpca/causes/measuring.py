@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
+from gpca.axes import Axes
 from gpca.causes.counterfactuals import Counterfactuals, Registrar
 from gpca.causes.dataset import COLUMNS, Causes
 from gpca.causes.settings import CauseSettings
@@ -82,17 +83,18 @@ class Measuring:
         return generator(*axes, starts).normal(size=shape) * self.settings.deviation_6()
 
 
-def as_causes(records: list[dict[str, Any]]) -> tuple[Causes, np.ndarray]:
+def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.ndarray]:
     """Return rows as registrations with their truth, and the seconds (S,) that ICP took for each.
 
     Args:
         records: what :meth:`Measuring.observed` returned, with ``sample``, ``split``, ``candidate``, ``truth`` and, of
             test samples, the truth ``again``.
+        axes: the source and the seed that they are of.
     """
     truth = joined([record["truth"] for record in records])
     concept_S = np.array(CONCEPTS)[truth.phi.argmax(axis=1)]
     registrations, icp_seconds_S = as_registrations(
-        [record | {"concept": concept} for record, concept in zip(records, concept_S, strict=True)]
+        [record | {"concept": concept} for record, concept in zip(records, concept_S, strict=True)], axes
     )
     columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
     again = joined([record["again"] for record in records if "again" in record])

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.attribution.metrics import mean_interval
-from gpca.csv_file import finite_number, read_csv
+from gpca.csv_file import ANY, finite_number, read_csv
 from gpca.errors import InputError
 
 TIMES = "*seconds*"
@@ -67,7 +67,7 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
     Raises:
         InputError: empty, unreadable, neither tidy nor a table, something that is not a number.
     """
-    table = read_csv(path, ())
+    table = read_csv(path, (), others=ANY)
     heads = list(table)
     rows = table.to_dict("records")
     if tuple(heads) == TIDY:

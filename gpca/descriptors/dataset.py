@@ -11,6 +11,7 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.axes import Axes
 from gpca.causes.dataset import Causes
 from gpca.descriptors.distances import describe_distances
 from gpca.descriptors.entropy import ENTROPY, describe_entropy
@@ -41,31 +42,34 @@ class Descriptors:
     Attributes:
         sample, split: (S,) as in the registrations.
         groups: name in `GROUPS` -> (S, F); the modules of this folder say what their numbers are.
+        axes: the source and the seed of the registrations.
     """
 
     sample: np.ndarray
     split: np.ndarray
     groups: Mapping[str, np.ndarray]
+    axes: Axes | None
 
     def save(self, path: str | Path) -> None:
         """Write an npz with an array for each group."""
-        save_arrays(path, {"sample": self.sample, "split": self.split, **self.groups})
+        save_arrays(path, {"sample": self.sample, "split": self.split, **self.groups}, self.axes)
 
     @classmethod
     def load(cls, path: str | Path, registrations: Registrations) -> Descriptors:
         """Read the npz of these registrations.
 
         Raises:
-            InputError: the file is missing, damaged, of other samples, or holds wrong shapes or NaN.
+            InputError: the file is missing, damaged, of other samples, of another source or seed, or holds wrong
+                shapes or NaN.
         """
         shapes: dict[str, tuple[int | str, ...]] = {name: ("S", WIDTHS[name]) for name in GROUPS}
         kinds = dict.fromkeys(GROUPS, REAL) | {"sample": WHOLE, "split": TEXT}
-        arrays = load_arrays(path, shapes | {"sample": ("S",), "split": ("S",)}, MADE_BY, kinds)
+        arrays = load_arrays(path, shapes | {"sample": ("S",), "split": ("S",)}, MADE_BY, kinds, registrations.axes)
         if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
             raise InputError(
                 path, "its samples differ from those of the registrations", f"regenerate it with '{MADE_BY}'"
             )
-        return cls(arrays["sample"], arrays["split"], {name: arrays[name] for name in GROUPS})
+        return cls(arrays["sample"], arrays["split"], {name: arrays[name] for name in GROUPS}, registrations.axes)
 
 
 def describe(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> tuple[dict[str, np.ndarray], float]:
@@ -96,4 +100,5 @@ def describe_all(
         icp_seconds.append(remedies)
     registrations = causes.registrations
     groups = {name: np.array([described[name] for described in rows]) for name in GROUPS}
-    return Descriptors(registrations.sample, registrations.split, groups), np.array(seconds), np.array(icp_seconds)
+    all_described = Descriptors(registrations.sample, registrations.split, groups, registrations.axes)
+    return all_described, np.array(seconds), np.array(icp_seconds)

@@ -14,7 +14,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL
-from gpca.csv_file import read_csv
+from gpca.csv_file import ANY, read_csv
 from gpca.diagnosis.intervals import COLUMNS, rows_of
 from gpca.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by
 from gpca.diagnosis.measures import MEASURES, measure
@@ -78,7 +78,7 @@ def _seeds(*given: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataF
     for causes_file, sample_file, prediction_file in zip(*files, strict=True):
         causes = Causes.load(causes_file)
         numbers = [str(number) for number in causes.registrations.sample]
-        samples = read_csv(sample_file, SAMPLE_COLUMNS)
+        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
         said = read_predictions(prediction_file, labels=("explainer",))
         for path, of_path in ((sample_file, [samples]), (prediction_file, [r for _, r in said.groupby("explainer")])):
             if any(rows["sample"].tolist() != numbers for rows in of_path):

@@ -74,7 +74,7 @@ def read_judged(
     truths, judged = {}, {}
     for path in causes_files:
         source, seed = Path(path).parent.name, seed_of_file(path)
-        causes = Causes.load(path)
+        causes = Causes.load(path, (source, seed))
         truths[source, seed] = causes.subset(causes.rows("test"))
         judged[source, CEILING, seed] = ceiling_of(truths[source, seed], seed)
     for path in prediction_files:

@@ -21,9 +21,7 @@ from gpca.adam import Adam, OneCycle
 from gpca.encoders.checkpoint import fingerprint, fingerprint_of, keep, resume
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.tensor_file import read_tensors, require_like
 from gpca.errors import InputError
-from gpca.limits import require_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
@@ -241,27 +239,6 @@ def embed(
         parts.append(torch.stack([model.encoder(_on(device, clouds)) for clouds in draws]).mean(dim=0))
     h_S_d = torch.cat(parts)
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
-
-
-def load_model(weights: Path, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
-    """Load encoder and head as the step ``train`` wrote them, ready for inference.
-
-    Raises:
-        InputError: missing, damaged, pickled or another encoder's weights.
-    """
-    model = make_model(settings, classes)
-    remedy = "regenerate them with 'python -m gpca train'"
-    require_file(weights, "no such weights", remedy)
-    wrong = f"not the weights of backbone '{settings.backbone}'"
-    try:
-        state = read_tensors(weights)
-        require_like(state, model.state_dict(), "network")
-    except ValueError as fault:
-        raise InputError(weights, f"{wrong}, or damaged ({fault})", remedy) from fault
-    except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
-        raise InputError(weights, wrong, remedy) from fault
-    model.load_state_dict(state)
-    return model.eval()
 
 
 class Classifier(nn.Sequential):

@@ -14,7 +14,8 @@ from gpca.controls.rivals import Embed, Rival, described_for
 from gpca.exchange.estimated import OBSERVED, Estimates, Registrar
 from gpca.exchange.registered import registered_by
 from gpca.exchange.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
-from gpca.pairs.dataset import SPLITS, Registrations
+from gpca.names import SPLITS
+from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.trials.judge import Judges
 from gpca.uncertainty.designs import ADDITIVE_KNOBS

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import ANY, numbers, read_csv
 from gpca.errors import InputError
 from gpca.frames.results_file import Estimates, nearest_to
 
@@ -99,7 +99,7 @@ def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.nda
         InputError: missing file or column, an entry that is no finite number, an id that is none, a rotation beyond
             half a turn, a translation that no estimator is off by.
     """
-    rows = read_csv(path, COLUMNS)
+    rows = read_csv(path, COLUMNS, others=ANY)
     columns = {name: numbers(path, rows, name).to_numpy() for name in COLUMNS}
     ids = columns["obj_id"]
     if (ids != np.round(ids)).any() or (ids < 0).any():

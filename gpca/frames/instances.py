@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import require_rigid
-from gpca.arrays import load_arrays, save_arrays
+from gpca.arrays import TEXT, WHOLE, load_arrays, save_arrays
 from gpca.errors import InputError
 from gpca.files import MOST_PIXELS
 from gpca.frames.scene_files import require_camera
@@ -77,24 +77,21 @@ class Instances:
         is_test = np.isin(scene_I, scenes[: min(n_test, len(scenes) - 1)])
         return {"train": np.flatnonzero(~is_test), "test": np.flatnonzero(is_test)}
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, source: str) -> None:
         """Write the npz described in results/README.md."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)})
+        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, (source, None))
 
     @classmethod
-    def load(cls, path: str | Path) -> Instances:
-        """Read the npz; InputError where it is missing, damaged or inconsistent."""
+    def load(cls, path: str | Path, source: str | None = None) -> Instances:
+        """Read the npz; InputError where it is missing, damaged, inconsistent or of another source than this."""
         shapes: dict[str, tuple[int | str, ...]] = {field.name: ("I",) for field in fields(cls)}
         shapes |= {name: ("I", 4, 4) for name in shapes if name.startswith("T_")}
         shapes |= {"camera_3_3": ("I", 3, 3), "points_m": ("P", 3), "pixels": ("P", 2), "offsets": ("O",)}
-        arrays = load_arrays(path, shapes, MADE_BY)
-        remedy = f"regenerate it with '{MADE_BY}'"
-        kinds = dict.fromkeys(shapes, "iu") | dict.fromkeys(("camera_3_3", "points_m"), "f")
+        kinds = dict.fromkeys(shapes, WHOLE) | dict.fromkeys(("camera_3_3", "points_m"), "f")
         kinds |= {name: "f" for name in shapes if name.startswith("T_")}
-        kinds |= dict.fromkeys(("dataset", "colour", "init_from"), "U") | {"symmetric": "b"}
-        for name, kind in kinds.items():
-            if arrays[name].dtype.kind not in kind:
-                raise InputError(path, f"array '{name}' has type {arrays[name].dtype}", remedy)
+        kinds |= dict.fromkeys(("dataset", "colour", "init_from"), TEXT) | {"symmetric": "b"}
+        arrays = load_arrays(path, shapes, MADE_BY, kinds, None if source is None else (source, None))
+        remedy = f"regenerate it with '{MADE_BY}'"
         offsets = arrays["offsets"]
         whole = len(offsets) == len(arrays["scene"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays["points_m"])
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():

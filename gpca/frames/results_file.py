@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import require_rotation
-from gpca.csv_file import read_csv
+from gpca.csv_file import ANY, read_csv
 from gpca.errors import InputError
 from gpca.numerals import decimal, whole
 
@@ -44,7 +44,7 @@ def read_bop_results(
             that is none, an image or object that the dataset does not have, a pose behind the camera, translations in
             another unit than millimetres.
     """
-    rows = read_csv(path, COLUMNS)
+    rows = read_csv(path, COLUMNS, others=ANY, remedy=REMEDY)
     found: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
     ratios = []
     for number, row in enumerate(rows.to_dict("records"), start=2):

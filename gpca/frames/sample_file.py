@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
+FRAME_COLUMNS = (  # all that the file may hold
+    *COLUMNS,
+    *("concept", "scene", "image", "object", "symmetric", "init_from", "init_error", "icp_error", "lost_to"),
+)
 _TRUTH = {"True": True, "False": False}
 
 
@@ -24,7 +28,7 @@ def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, `in_training` that is neither True nor False.
     """
-    rows = read_csv(path, COLUMNS)
+    rows = read_csv(path, COLUMNS, others=FRAME_COLUMNS)
     rows["in_training"] = rows["in_training"].map(_TRUTH)
     if rows["in_training"].isna().any():
         raise InputError(path, "column 'in_training' contains values other than True and False", "regenerate it")

@@ -12,8 +12,9 @@ from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.environment import require_open3d
 from gpca.frames.instances import Instances
 from gpca.frames.occlusion import occlude
+from gpca.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import SPLITS, Registrations
+from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
 from gpca.pairs.synthesis import RegistrationSettings, align_pair, as_registrations
 from gpca.progress import progress
@@ -74,7 +75,7 @@ def make_frame_registrations(
         record |= {"sample": n, "split": split, "concept": concept}
         records.append(record)
         poses.append(_pose_row(instances, i, objects, record, trained) | {"lost_to": lost_to})
-    return *as_registrations(records), pd.DataFrame(poses)
+    return *as_registrations(records, (source, seed)), pd.DataFrame(poses)
 
 
 def _register_one(

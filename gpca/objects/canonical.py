@@ -13,6 +13,7 @@ from gpca import seeds
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.environment import require_open3d
 from gpca.errors import InputError
+from gpca.names import is_name
 from gpca.objects.surface import Surface
 
 FEWEST_CLOUD_POINTS = 64
@@ -182,6 +183,10 @@ def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 163
     """Return the canonical clouds of a source; InputError as :func:`write_objects` raises it."""
     names, clouds, diameters_m = [], [], []
     for surface in surfaces:
+        if not is_name(surface.name):
+            raise InputError(
+                f"{source}: object {surface.name!r}", "its name is empty or does not fit on one line", "rename it"
+            )
         if surface.name in names:
             raise InputError(f"{source}: object '{surface.name}'", "occurs twice", "give each file its own name")
         points_m, normals, diameter_m = canonical_cloud(surface, source, n_points)
@@ -208,13 +213,17 @@ class ObjectClouds:
     clouds: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     @classmethod
-    def load(cls, path: str | Path) -> ObjectClouds:
-        """Read an objects npz; InputError when it is missing, unreadable or inconsistent."""
+    def load(cls, path: str | Path, source: str | None = None) -> ObjectClouds:
+        """Read an objects npz; InputError when it is missing, unreadable, inconsistent or of another source than this.
+
+        A file that does not say of which source it is may be of any: rules of users' own write such files.
+        """
         made_by = f"snakemake -j2 {path}"
         remedy = f"regenerate it with '{made_by}'"
         shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
         kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE}
-        arrays = load_arrays(path, shapes, made_by, kinds)
+        axes = None if source is None else (source, None)
+        arrays = load_arrays(path, shapes, made_by, kinds, axes, optional=("source",))
         points_m, offsets, names = arrays["points_m"], arrays["offsets"], arrays["names"].tolist()
         whole = len(offsets) == len(names) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
         if not whole or not names or not (np.diff(offsets) > 0).all():
@@ -263,6 +272,7 @@ class ObjectClouds:
                 "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
                 "diameters_m": self.diameters_m,
             },
+            (source, None),
         )
         for name, cloud_m, diameter_m in zip(self.names, points_m, self.diameters_m, strict=True):
             print(f"{source}: {name}: {len(cloud_m)} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
-from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.arrays import REAL, TEXT, WHOLE, axes_in, load_arrays, save_arrays
+from gpca.axes import Axes
 from gpca.errors import InputError
+from gpca.names import SPLITS
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 
-SPLITS = ("train", "test")
 FARTHEST = 1e3  # diameters from the target's centre; a registration may fail, but nothing lies so far away
 RIGID_TOLERANCE = 1e-2  # of a rotation's products with itself; datasets round their poses
 
@@ -36,6 +37,7 @@ class Registrations:
         T_target_source_true, T_target_source_init, T_target_source_icp: (S, 4, 4), translations in metres.
         fitness, inlier_rmse: (S,) of ICP.
         attached: arrays (S, …) from other files, for explainers that read them: ``embedding``, ``head_logits``, …
+        axes: the source and the seed that they are of; None where they are of several.
     """
 
     sample: np.ndarray
@@ -58,6 +60,7 @@ class Registrations:
     fitness: np.ndarray
     inlier_rmse: np.ndarray
     attached: Mapping[str, np.ndarray] = field(default_factory=dict)
+    axes: Axes | None = None
 
     def __len__(self) -> int:
         return len(self.sample)
@@ -89,10 +92,10 @@ class Registrations:
 
     def subset(self, rows: np.ndarray) -> Registrations:
         """Return the given rows, in the given order."""
-        columns = {name: getattr(self, name)[rows] for name in REGISTRATION_COLUMNS}
+        columns: dict[str, Any] = {name: getattr(self, name)[rows] for name in REGISTRATION_COLUMNS}
         attached = {name: array[rows] for name, array in self.attached.items()}
-        clouds = ragged([self.cloud(i) for i in rows], [self.target(i) for i in rows])
-        return replace(self, **columns, **clouds, attached=attached)
+        columns |= ragged([self.cloud(i) for i in rows], [self.target(i) for i in rows])
+        return replace(self, **columns, attached=attached)
 
     def without_labels(self) -> Registrations:
         """Return the same registrations as an explainer may see them: nothing that tells what was perturbed."""
@@ -105,24 +108,30 @@ class Registrations:
 
     def save(self, path: str | Path) -> None:
         """Write the npz described in results/README.md."""
-        save_arrays(path, {name: getattr(self, name) for name in (*REGISTRATION_COLUMNS, *CLOUDS)})
+        save_arrays(path, {name: getattr(self, name) for name in (*REGISTRATION_COLUMNS, *CLOUDS)}, self.axes)
 
     @classmethod
-    def load(cls, path: str | Path, made_by: str = "python -m gpca registrations") -> Registrations:
+    def load(
+        cls, path: str | Path, axes: Axes | None = None, made_by: str = "python -m gpca registrations"
+    ) -> Registrations:
         """Read the npz.
 
         Args:
+            path: the file.
+            axes: the source and the seed that it has to be of; it may be of any where this is None.
             made_by: the command that writes it, where that is another.
 
         Raises:
-            InputError: the file is missing, damaged, holds pickled objects, wrong shapes, NaN or unknown labels.
+            InputError: the file is missing, damaged, of another source or seed, holds pickled objects, wrong shapes,
+                NaN or unknown labels.
         """
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(REGISTRATION_COLUMNS, ("S",))
         shapes |= {name: ("S", 4, 4) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
         shapes |= {"points": ("P", 3), "offsets": ("O",), "target_points": ("Q", 3), "target_offsets": ("R",)}
         kinds = dict.fromkeys(shapes, REAL) | dict.fromkeys(("split", "concept", "object_name"), TEXT)
         kinds |= dict.fromkeys(("sample", "object_index", "offsets", "target_offsets"), WHOLE)
-        arrays = load_arrays(path, shapes, made_by, kinds)
+        of = {"source": TEXT, "seed": WHOLE}
+        arrays = load_arrays(path, shapes | dict.fromkeys(of, ()), made_by, kinds | of, axes)
         remedy = f"regenerate it with '{made_by}'"
         for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):
             offsets = arrays[ends]
@@ -130,14 +139,13 @@ class Registrations:
                 raise InputError(path, f"'{ends}' do not match '{points}' and 'sample'", remedy)
             if len(offsets) == 1 or (np.diff(offsets) < 3).any():
                 raise InputError(path, "has no samples, or a cloud of fewer than 3 points", remedy)
-        for name, known in (("split", SPLITS), ("concept", CONCEPTS)):
-            if unknown := set(arrays[name].tolist()) - set(known):
-                raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"expected one of {', '.join(known)}")
+        if unknown := set(arrays["concept"].tolist()) - set(CONCEPTS):
+            raise InputError(path, f"unknown concept {sorted(unknown)[0]!r}", f"expected one of {', '.join(CONCEPTS)}")
         for name, within in _possible(arrays).items():
             if not within.all():
                 raise InputError(path, f"'{name}' contains impossible values", remedy)
         columns: dict[str, Any] = {name: arrays[name] for name in shapes}
-        return cls(**columns)
+        return cls(**columns, axes=axes_in(arrays))
 
 
 def _possible(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -182,10 +190,10 @@ def load_embeddings(
     """Read arrays of the registrations from a file of embeddings; see :func:`gpca.arrays.load_arrays`.
 
     Raises:
-        InputError: also where the file is of other samples.
+        InputError: also where the file is of other samples, or of another source or seed.
     """
     kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT}
-    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by, kinds)
+    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by, kinds, registrations.axes)
     if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
         raise InputError(path, "its samples differ from those of the registrations", f"regenerate it with '{made_by}'")
     return arrays
@@ -208,7 +216,8 @@ def read_embedding(
 
 
 CLOUDS = ("points", "offsets", "target_points", "target_offsets")
-REGISTRATION_COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in (*CLOUDS, "attached"))
+_BESIDE = (*CLOUDS, "attached", "axes")
+REGISTRATION_COLUMNS = tuple(field.name for field in fields(Registrations) if field.name not in _BESIDE)
 
 
 def ragged(clouds: list[np.ndarray], targets: list[np.ndarray]) -> dict[str, np.ndarray]:

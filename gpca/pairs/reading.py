@@ -60,4 +60,4 @@ def registered_backwards(registrations: Registrations, settings: ICPSettings) ->
         fits.append((found.fitness, found.inlier_rmse))
     fitness, inlier_rmse = np.array(fits).T
     changed: dict[str, Any] = {"T_target_source_icp": np.array(poses), "fitness": fitness, "inlier_rmse": inlier_rmse}
-    return replace(registrations, **ragged(clouds, targets), **changed, attached={})
+    return replace(registrations, **changed | ragged(clouds, targets), attached={})

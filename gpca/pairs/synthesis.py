@@ -10,9 +10,11 @@ import numpy as np
 
 from gpca.alignment.icp import ICP, ICPSettings
 from gpca.alignment.rigid import scale_translation, transform
+from gpca.axes import Axes
 from gpca.environment import require_open3d
+from gpca.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import REGISTRATION_COLUMNS, SPLITS, Registrations, ragged
+from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed, Severities
 from gpca.progress import progress
 from gpca.seeds import generator
@@ -69,7 +71,7 @@ def make_registrations(
         random = generator(source, seed, "registration", split, n)
         record = _register_one(objects, object_index, concept, settings, random)
         records.append(record | {"sample": n, "split": split})
-    return as_registrations(records)
+    return as_registrations(records, (source, seed))
 
 
 def _register_one(
@@ -117,8 +119,13 @@ def align_pair(
     }
 
 
-def as_registrations(records: list[dict]) -> tuple[Registrations, np.ndarray]:
-    """Return rows that :func:`align_pair` made as registrations, and the seconds (S,) that ICP took for each."""
+def as_registrations(records: list[dict], axes: Axes | None = None) -> tuple[Registrations, np.ndarray]:
+    """Return rows that :func:`align_pair` made as registrations, and the seconds (S,) that ICP took for each.
+
+    Args:
+        records: the rows.
+        axes: the source and the seed that they are of.
+    """
     columns: dict[str, Any] = {name: np.array([record[name] for record in records]) for name in REGISTRATION_COLUMNS}
     columns |= ragged([record["cloud"] for record in records], [record["target"] for record in records])
-    return Registrations(**columns), np.array([record["icp_seconds"] for record in records])
+    return Registrations(**columns, axes=axes), np.array([record["icp_seconds"] for record in records])

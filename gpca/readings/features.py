@@ -26,7 +26,7 @@ COLUMNS = {
 def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies of the paper's GPC on each choice of features."""
     for (source, seed), path in given.registrations.items():
-        registrations = Registrations.load(path)
+        registrations = Registrations.load(path, (source, seed))
         features_S_F = analytical_features(registrations, source, seed, "analytical")
         train, test = (registrations.rows(split) for split in ("train", "test"))
         for reading in readings:

@@ -15,6 +15,7 @@ import torch
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_predictions
+from gpca.axes import Axes
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
@@ -40,7 +41,7 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
     for cloud in dict.fromkeys(reading["input"] for reading in readings):
         start = None if cloud == ALIGNED else pretrained(given, cloud, source)
         for of_source, _, seed in given.predictions:
-            shown = Registrations.load(_frames(given, of_source, seed))
+            shown = Registrations.load(_frames(given, of_source, seed), (of_source, seed))
             if cloud == ALIGNED:
                 rows = read_predictions(given.predictions[source, method, seed])
                 named_S = rows.loc[rows["split"] == "test", "concept_predicted"].to_numpy()
@@ -56,12 +57,12 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
 
 def pretrained(given: Given, cloud: str, frames: str) -> dict[str, torch.Tensor] | None:
     """Return the weights after the training on all sources but the frames; None where the config has none of it."""
-    parts = [path for (source, _), path in given.registrations.items() if source != frames]
+    parts = [(path, axes) for axes, path in given.registrations.items() if axes[0] != frames]
     if not parts or not given.sections["pretraining"]:
         return None
     seed = min(seed for source, seed in given.registrations if source != frames)
     settings = _settings(given, cloud, "pretraining")
-    seen = read_as(cloud, joined([_train_samples(path) for path in parts]), _icp(given))
+    seen = read_as(cloud, joined([_train_samples(*part) for part in parts]), _icp(given))
     return train_encoder(seen, "pretraining", seed, settings)[0].state_dict()
 
 
@@ -80,8 +81,8 @@ def named(
     return np.array(CONCEPTS)[scores_S_C.argmax(axis=1)]
 
 
-def _train_samples(path: Path) -> Registrations:
-    whole = Registrations.load(path)
+def _train_samples(path: Path, axes: Axes) -> Registrations:
+    whole = Registrations.load(path, axes)
     return whole.subset(whole.rows("train"))
 
 

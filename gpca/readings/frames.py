@@ -23,7 +23,7 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
     """Yield the accuracies of every backbone and reduction, repeat by repeat, and how concepts are confused."""
     of_seeds: dict[int, Registrations] = {}
     for source, seed in given.registrations:
-        of_seeds[seed] = Registrations.load(given.registrations[source, seed])
+        of_seeds[seed] = Registrations.load(given.registrations[source, seed], (source, seed))
     methods = list(dict.fromkeys(method for _, method, _ in given.predictions))
     first = next(iter(of_seeds))
     for repeats in dict.fromkeys(reading["repeats"] for reading in readings):

@@ -54,12 +54,12 @@ class Given:
     def in_distribution(self) -> Iterator[tuple[str, int, ShiftedSets, Registrations]]:
         """Yield source, seed, sets, and the samples like the training's with their embeddings attached."""
         for (source, seed), path in self.sets.items():
-            sets = ShiftedSets.load(path)
+            sets = ShiftedSets.load(path, (source, seed))
             yield source, seed, sets, sets.registrations((sets.set == "in_distribution").nonzero()[0])
 
     def embedded(self, source: str, method: str, seed: int) -> Registrations:
         """Return registrations with the embeddings of a ``{backbone}-{reduction}`` attached."""
-        registrations = Registrations.load(self.registrations[source, seed])
+        registrations = Registrations.load(self.registrations[source, seed], (source, seed))
         embedding = read_embedding(self.embeddings[source, method, seed], registrations)
         return replace(registrations, attached=embedding)
 

@@ -66,7 +66,7 @@ def _pairs(
     What is random in a sample is named as in :func:`gpca.uncertainty.evaluation.evaluate_design`.
     """
     for (source, seed), path in given.registrations.items():
-        registrations = Registrations.load(path)
+        registrations = Registrations.load(path, (source, seed))
         chosen = registrations.subset(design_rows(registrations, "additive", sizes.samples))
         yield source, seed, _runs(chosen, source, seed, settings, starts, f"{title} of {source}, seed {seed}")
 

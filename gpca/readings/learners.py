@@ -79,7 +79,7 @@ def encoder_head(given: Given, readings: Sequence[Reading], sizes: ReadingSizes)
     for number, (source, seed, _, registrations) in enumerate(given.in_distribution()):
         of_heads = {"linear": registrations}
         if number < sizes.encoders:
-            clouds = Registrations.load(given.registrations[source, seed])
+            clouds = Registrations.load(given.registrations[source, seed], (source, seed))
             settings = EncoderSettings(**{**given.sections["encoder"], "head": "two_layer"})
             model, _ = train_encoder(clouds, source, seed, settings)
             h_S_d, _ = embed(model, clouds, source, seed, settings)

@@ -20,7 +20,7 @@ CLASSIFIERS = {"paper": "gpca_paper", "converged": "gpca"}
 def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies under each reading, of all samples and of each concept."""
     for (source, seed), path in given.registrations.items():
-        registrations = Registrations.load(path)
+        registrations = Registrations.load(path, (source, seed))
         test = registrations.subset(registrations.rows("test"))
         part_S = dict(zip(test.sample.astype(str), parts(test), strict=True))
         for reading in readings:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse
 from gpca.arrays import save_arrays
+from gpca.axes import Axes
 from gpca.frames.camera import MeshScene, shade
 from gpca.frames.rgbd_scene import TABLE_COLOUR, model_colour
 from gpca.frames.shots import Shot
@@ -49,6 +50,7 @@ def save_example(
     actions: Mapping[str, Action],
     views: Mapping[str, Any],
     settings: LoopSettings,
+    axes: Axes,
 ) -> None:
     """Write the npz: of the ``first`` and the ``next`` view the image and silhouettes; scores, errors; viewpoints.
 
@@ -58,6 +60,7 @@ def save_example(
 
     Args:
         views: settings of the action that changes the viewpoint.
+        axes: the source and the seed that the file is of.
     """
     episode = next(e for e in episodes if e.number == choose_example(rows))
     shown = rows[(rows["episode"] == episode.number) & (rows["step"] == 1)]
@@ -80,7 +83,7 @@ def save_example(
     }
     for name, shot, outcome in (("first", before.holding.shots[0], before), ("next", after.holding.shots[-1], after)):
         arrays |= _seen(name, situation, shot, outcome)
-    save_arrays(path, arrays)
+    save_arrays(path, arrays, axes)
 
 
 def _seen(name: str, situation: Situation, shot: Shot, outcome: Attempt) -> dict[str, np.ndarray]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 TABLE = "recovery"  # `table` and `source` of the tidy rows read this
 RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "failed", "recovered", "tries")
+_OTHERS = ("object", "symmetric", "concept", "score_*", "bald", "error_before", "error_after")
 SECONDS = ("explanation_seconds", "action_seconds")
 FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
 
@@ -84,7 +85,7 @@ def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
 
     parts = []
     for path in files:
-        rows = read_csv(path, ("episode", "failed", "policy", *SECONDS))
+        rows = read_csv(path, ("episode", "failed", "policy", *SECONDS), others=("step",))
         rows = rows[rows["failed"] == "True"]
         rows["seconds"] = sum(numbers(path, rows, name) for name in SECONDS)
         parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
@@ -95,7 +96,7 @@ def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
 
 def read_recovery(path: str | Path) -> pd.DataFrame:
     """Read a file of the step ``recover``: `recovered` as booleans, numbers as numbers, the rest as text."""
-    rows = read_csv(path, RECOVERY_COLUMNS)
+    rows = read_csv(path, RECOVERY_COLUMNS, _OTHERS)
     for name in ("episode", "step", "tries"):
         rows[name] = numbers(path, rows, name).astype(int)
     flags = ("failed", "recovered")

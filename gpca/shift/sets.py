@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.axes import Axes
 from gpca.errors import InputError
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
@@ -56,29 +58,30 @@ class ShiftedSets:
         """Return the rows as explainers that read embeddings take them: without clouds and poses."""
         nan_S = np.full(len(rows), np.nan)
         zeros_S = np.zeros(len(rows), int)
-        columns = dict.fromkeys(REGISTRATION_COLUMNS, nan_S) | {"object_index": zeros_S}
+        columns: dict[str, Any] = dict.fromkeys(REGISTRATION_COLUMNS, nan_S) | {"object_index": zeros_S}
         columns |= {name: np.full((len(rows), 4, 4), np.nan) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
         columns |= {name: getattr(self, name)[rows] for name in ("sample", "split", "concept", "object_name")}
         nothing = [np.zeros((0, 3), np.float32)] * len(rows)
-        return Registrations(**columns, **ragged(nothing, nothing), attached={"embedding": self.h[rows]})
+        return Registrations(**columns | ragged(nothing, nothing), attached={"embedding": self.h[rows]})
 
-    def save(self, path: str | Path) -> None:
-        """Write the npz described in results/README.md."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)})
+    def save(self, path: str | Path, axes: Axes) -> None:
+        """Write the npz described in results/README.md; `axes` are the source and the seed."""
+        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, axes)
 
     @classmethod
-    def load(cls, path: str | Path) -> ShiftedSets:
-        """Read the npz.
+    def load(cls, path: str | Path, axes: Axes | None = None) -> ShiftedSets:
+        """Read the npz; `axes` are the source and the seed that it has to be of.
 
         Raises:
-            InputError: missing or damaged file, wrong shapes, NaN, unknown names, a set without training samples.
+            InputError: missing or damaged file, one of another source or seed, wrong shapes, NaN, unknown names, a set
+                without training samples.
         """
         shapes: dict[str, tuple[int | str, ...]] = {field.name: ("S",) for field in fields(cls)}
         shapes |= {"h": ("S", "d"), "distance": ("S", len(DISTANCES))}
         kinds = dict.fromkeys(shapes, TEXT) | {"sample": WHOLE, "h": REAL, "distance": REAL}
-        arrays = load_arrays(path, shapes, "python -m gpca shift", kinds)
+        arrays = load_arrays(path, shapes, "python -m gpca shift", kinds, axes)
         remedy = "regenerate it with 'python -m gpca shift'"
-        for name, known in (("set", TRAINED_ON), ("split", ("train", "test")), ("concept", CONCEPTS)):
+        for name, known in (("set", TRAINED_ON), ("concept", CONCEPTS)):
             if unknown := set(arrays[name].tolist()) - set(known):
                 raise InputError(path, f"unknown {name} {sorted(unknown)[0]!r}", f"expected one of {', '.join(known)}")
         if not len(arrays["set"]) or (arrays["distance"] < 0).any():

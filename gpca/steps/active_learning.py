@@ -74,7 +74,7 @@ def run(options: Namespace) -> None:
 
 def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, Task[Projection], GPC]]:
     """Yield setting, task and the GPC that knows two concepts: for each concept held out, and for a rare one."""
-    registrations = Registrations.load(options.registrations)
+    registrations = Registrations.load(options.registrations, (options.source, options.seed))
     held_out = options.settings.get("held_out", CONCEPTS)
     seen_S_d = read_embedding(options.embeddings, registrations)["embedding"]
     shapes = {f"h_{c}": ("S", "d") for c in held_out}

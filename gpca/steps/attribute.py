@@ -10,6 +10,7 @@ from time import perf_counter
 from baselines.registry import explainer_entry, require_settings
 from gpca.arguments import SEED
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
+from gpca.axes import Axes
 from gpca.errors import InputError
 from gpca.explainers.interface import Describing, ExplainerEntry
 from gpca.pairs.dataset import Registrations, read_embedding
@@ -25,6 +26,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--source", required=True)
     parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
     parser.add_argument("--registrations", required=True, type=Path, nargs="+")
+    parser.add_argument("--files-of", help="source of these files, where it is another than --source")
+    parser.add_argument("--files-seed", type=SEED, help="their seed, where it is one for all --seeds")
     parser.add_argument("--embeddings", type=Path, nargs="*", help="embeddings, for explainers that read them")
     parser.add_argument(
         "--uncertainty", type=Path, nargs="*", help="outcomes of a design, for explainers that read them"
@@ -48,7 +51,9 @@ def run(options: Namespace) -> None:
     for seed, *inputs, predictions, timings in per_seed(options, *files, "predictions", "timings"):
         explainer = entry.make(options.source, seed, **options.settings)
         with record_provenance([predictions, timings], [path for path in inputs if path], options.settings, seed=seed):
-            registrations = _load(options.explainer, entry, *inputs)
+            own_seed = seed if options.files_seed is None else options.files_seed
+            axes = (options.files_of or options.source, own_seed)
+            registrations = _load(options.explainer, entry, axes, *inputs)
             observed = registrations if entry.oracle else registrations.without_labels()
             started = perf_counter()
             if isinstance(explainer, Describing):  # once, for what it learns from and what it is asked about
@@ -68,10 +73,17 @@ def run(options: Namespace) -> None:
 
 
 def _load(
-    name: str, entry: ExplainerEntry, registrations: Path, embeddings, uncertainty, uncertainty_timings, timings: Path
+    name: str,
+    entry: ExplainerEntry,
+    axes: Axes,
+    registrations: Path,
+    embeddings: Path | None,
+    uncertainty: Path | None,
+    uncertainty_timings: Path | None,
+    timings: Path,
 ):
     """Return the registrations that the explainer gets, with what it reads and the seconds spent before attached."""
-    loaded = Registrations.load(registrations)
+    loaded = Registrations.load(registrations, axes)
     seconds_S, icp_seconds_S = read_timings(timings, loaded)
     earlier = {"earlier_seconds": seconds_S, "earlier_icp_seconds": icp_seconds_S}
     loaded = replace(loaded, attached=earlier)
@@ -82,7 +94,7 @@ def _load(
                 f"reads the uncertainty of design '{entry.design}'",
                 "give it with --uncertainty and --uncertainty-timings",
             )
-        outcomes = Outcomes.load(uncertainty)
+        outcomes = Outcomes.load(uncertainty, axes)
         found = outcomes.uncertainty.shape[1]
         if found != CONDITIONS.get(entry.design, found):
             remedy = f"make it with 'python -m gpca uncertainty --design {entry.design}'"

@@ -28,7 +28,7 @@ def run(options: Namespace) -> None:
     """Draw candidates, measure their causes, keep a balanced set."""
     given, icp = checked_with_icp(options.settings, "causes")
     settings = CauseSettings.from_dict(given, icp)
-    objects = ObjectClouds.load(options.objects)
+    objects = ObjectClouds.load(options.objects, options.source)
     outputs = [options.out, options.candidates, options.timings]
     with record_provenance(outputs, [options.objects], options.settings, seed=options.seed):
         causes, tally, icp_seconds_S = draw_causes(objects, options.source, options.seed, settings)

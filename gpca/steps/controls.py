@@ -16,7 +16,8 @@ from gpca.controls.settings import PAPER, RETRAINED, TRAININGS, ControlSettings
 from gpca.controls.variants import left_out, variant
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed, load_model
+from gpca.encoders.training import embed
+from gpca.encoders.weights import load_model
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
@@ -68,13 +69,14 @@ def run(options: Namespace) -> None:
     others = _pairs(options, "others", "other_registrations")
     if missing := set(settings.controls) & set(RETRAINED) - set(retrained):
         raise InputError("--retrained", f"lacks control '{sorted(missing)[0]}'", "give its embeddings")
+    axes = (options.source, options.seed)
     inputs = [options.objects, options.registrations, options.encoder, options.embeddings]
     inputs += [*retrained.values(), *others.values()]
     with record_provenance(
         [options.out, options.samples, options.timings], inputs, options.settings, seed=options.seed
     ):
-        registrations = Registrations.load(options.registrations)
-        model = load_model(options.encoder, encoder)
+        registrations = Registrations.load(options.registrations, axes)
+        model = load_model(options.encoder, encoder, axes=axes)
         embeddings = {PAPER: read_embedding(options.embeddings, registrations, logits=True)}
         for control, path in retrained.items():
             if not left_out(control, registrations, settings, encoder.backbone):
@@ -90,9 +92,9 @@ def run(options: Namespace) -> None:
             embed=lambda asked, source: embed(model, asked, source, options.seed, encoder),
             embeddings=embeddings,
         )
-        asked = {name: Registrations.load(path) for name, path in others.items()}
+        asked = {name: Registrations.load(path, (name, options.seed)) for name, path in others.items()}
         rows = experiment.run(registrations, asked)
-        samples = sample_table(registrations, ObjectClouds.load(options.objects))
+        samples = sample_table(registrations, ObjectClouds.load(options.objects, options.source))
         write_csv(options.out, rows)
         write_csv(options.samples, samples)
         write_csv(options.timings, experiment.costs.rows())

@@ -30,7 +30,7 @@ def run(options: Namespace) -> None:
     given, icp = checked_with_icp(options.settings, "diagnosis", "descriptors")
     outputs = [options.out, options.timings]
     with record_provenance(outputs, [options.causes, options.causes_timings], options.settings, seed=options.seed):
-        causes = Causes.load(options.causes)
+        causes = Causes.load(options.causes, (options.source, options.seed))
         seconds_S, icp_seconds_S = read_timings(options.causes_timings, causes.registrations)
         settings = DescriptorSettings(**given)
         described, own_S, own_icp_S = describe_all(causes, options.source, options.seed, settings, ICPSettings(**icp))

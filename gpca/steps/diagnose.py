@@ -47,7 +47,7 @@ def run(options: Namespace) -> None:
         explainer = entry.make(options.source, seed, **options.settings)
         inputs = [causes_file, read, read_timing]
         with record_provenance([predictions, timings], inputs, options.settings, seed=seed):
-            causes = Causes.load(causes_file)
+            causes = Causes.load(causes_file, (options.source, seed))
             registrations = with_what_it_reads(labelled(causes), entry, read)
             seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
             explainer.fit(registrations.subset(training_rows(registrations, causes_file)))

@@ -50,14 +50,15 @@ def run(options: Namespace) -> None:
     for option in ("out", "timings"):
         wanted = len((REFERENCE, *estimators)) * len(options.seeds)
         require_files(options, option, wanted, "pair(s) of reference or estimator and seed")
-    judges = Judges(ObjectClouds.load(options.objects), f"objects of {options.source}")
+    judges = Judges(ObjectClouds.load(options.objects, options.source), f"objects of {options.source}")
     for i, (seed, path, samples) in enumerate(per_seed(options, "causes", "samples")):
+        axes = (options.source, seed)
         of_seed = slice(i, None, len(options.seeds))
         out, timings = options.out[of_seed], options.timings[of_seed]
         inputs = [options.objects, path]
         with record_provenance([*out, *timings, samples], inputs, options.settings, seed=seed):
-            rows, cases = try_estimators(Causes.load(path), judges, options.source, seed, estimators, settings)
-            ReferenceSamples.of(cases).save(samples)
+            rows, cases = try_estimators(Causes.load(path, axes), judges, *axes, estimators, settings)
+            ReferenceSamples.of(cases).save(samples, axes)
             for of_estimator, own_out, own_timings in zip(rows.values(), out, timings, strict=True):
                 write_csv(own_out, of_estimator.drop(columns="seconds"))
                 write_csv(own_timings, of_estimator[["sample", "method", "seconds"]])

@@ -13,7 +13,8 @@ from gpca.arguments import SEED
 from gpca.controls.rivals import make_rivals
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed, load_model
+from gpca.encoders.training import embed
+from gpca.encoders.weights import load_model
 from gpca.exchange.asked import DESIGN, require_exchangeable
 from gpca.exchange.experiment import Exchange
 from gpca.exchange.settings import ExchangeSettings
@@ -53,7 +54,7 @@ def run(options: Namespace) -> None:
     methods = checked_by_name(given["methods"], "methods", settings.methods, require_settings)
     estimators = checked_by_name(given["estimators"], "estimators", settings.estimators, require_estimator_settings)
     runs = {name: value for name, value in given["uncertainty"].items() if name != "samples"}
-    objects = ObjectClouds.load(options.objects)
+    objects = ObjectClouds.load(options.objects, options.source)
     for seed, registrations_path, weights, out in per_seed(options, "registrations", "encoders", "out"):
         rivals = make_rivals(given["explainers"], options.source, seed)
         inputs = [options.objects, registrations_path, weights]
@@ -66,10 +67,10 @@ def run(options: Namespace) -> None:
                 estimators=estimators,
                 uncertainty=UncertaintySettings(**runs),
                 rivals=rivals,
-                embed=partial(_embedded, load_model(weights, encoder), encoder, seed),
+                embed=partial(_embedded, load_model(weights, encoder, axes=(options.source, seed)), encoder, seed),
             )
             judges = Judges(objects, f"objects of {options.source}")
-            write_csv(out, exchange.run(Registrations.load(registrations_path), judges))
+            write_csv(out, exchange.run(Registrations.load(registrations_path, (options.source, seed)), judges))
 
 
 def _embedded(model, encoder: EncoderSettings, seed: int, asked: Registrations, source: str):

@@ -115,7 +115,10 @@ def _files_of_sources(options: Namespace) -> list[tuple[Path, Path, Path, Path]]
 
 
 def _measure(options: Namespace, given: dict) -> tuple[Causes, pd.DataFrame]:
-    instances, objects = Instances.load(options.instances), ObjectClouds.load(options.objects)
+    instances, objects = (
+        Instances.load(options.instances, options.source),
+        ObjectClouds.load(options.objects, options.source),
+    )
     require_of_objects(instances, objects, options.instances)
     chosen = FrameCauseSettings(**given["frames"])
     rows = chosen_instances(instances, options.source, chosen)
@@ -167,12 +170,13 @@ class _Asked:
 
     def _pairs_by_embedding(self) -> list[tuple[Registrations, Registrations]]:
         if not self._embedded:
-            from gpca.encoders.training import embed, load_model
+            from gpca.encoders.training import embed
+            from gpca.encoders.weights import load_model
 
             entry = explainer_entry("gpca", CAUSES)
             for causes, _, weights, embeddings in self._lessons:
                 registrations = with_what_it_reads(labelled(Causes.load(causes)), entry, embeddings)
-                model = load_model(weights, self._encoder, LABELS)
+                model = load_model(weights, self._encoder, LABELS, registrations.axes, step="train_on_causes")
                 h_S_d, logits_S_C = embed(model, self._registrations, *self._axes, self._encoder)
                 lessons = registrations.subset(training_rows(registrations, causes))
                 self._embedded.append((lessons, self._with({"embedding": h_S_d, "head_logits": logits_S_C})))

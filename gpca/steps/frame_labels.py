@@ -68,7 +68,7 @@ def run(options: Namespace) -> None:
 
 def _embedded(options: Namespace, points: int) -> Iterator[tuple[str, Embedded]]:
     """Yield the name of each embedding, and the samples in it."""
-    registrations = Registrations.load(options.registrations)
+    registrations = Registrations.load(options.registrations, (options.source, options.seed))
 
     def samples(h_S_d: np.ndarray) -> Embedded:
         return Embedded(h_S_d, registrations.concept, registrations.split)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 
 from gpca.arguments import SEED
@@ -22,6 +23,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--instances", required=True, type=Path)
     parser.add_argument("--objects", required=True, type=Path)
     parser.add_argument("--source", required=True)
+    parser.add_argument("--name", help="name of the frames in the files, where it is another than --source")
     parser.add_argument("--seed", required=True, type=SEED)
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--poses", required=True, type=Path, help="CSV of each sample's origin and pose errors")
@@ -35,13 +37,13 @@ def run(options: Namespace) -> None:
     check_settings(given, "registrations")
     check_settings(own, "real_world")
     settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(given))
-    inputs = [options.instances, options.objects]
+    inputs, name = [options.instances, options.objects], options.name or options.source
     with record_provenance([options.out, options.poses, options.timings], inputs, options.settings, seed=options.seed):
-        instances = Instances.load(options.instances)
-        objects = ObjectClouds.load(options.objects)
+        instances = Instances.load(options.instances, name)
+        objects = ObjectClouds.load(options.objects, name)
         require_of_objects(instances, objects, options.instances)
         made = make_frame_registrations(instances, objects, options.source, options.seed, settings)
         registrations, icp_seconds_S, poses = made
-        registrations.save(options.out)
+        replace(registrations, axes=(name, options.seed)).save(options.out)
         write_csv(options.poses, poses)
         write_timings(options.timings, registrations, icp_seconds_S, icp_seconds_S)

@@ -15,7 +15,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.csv_file import write_csv
 from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import load_model
+from gpca.encoders.weights import load_model
 from gpca.errors import InputError
 from gpca.gradients.saliency import deletions
 from gpca.gradients.settings import GradientSettings
@@ -55,15 +55,15 @@ def run(options: Namespace) -> None:
     for seed, *paths in progress(list(per_seed(options, *files)), f"gradients of {options.source}"):
         inputs, outputs = paths[:3], paths[3:]
         with record_provenance(outputs, inputs, options.settings, seed=seed):
-            plain = Registrations.load(inputs[0])
+            of_seed = (options.source, seed)
+            plain = Registrations.load(inputs[0], of_seed)
             registrations = replace(plain, attached=read_embedding(inputs[2], plain))
             train, test = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
-            gpc = GPC(CONCEPTS, GPCSettings(**given["gpc"]), options.source, seed)
+            gpc = GPC(CONCEPTS, GPCSettings(**given["gpc"]), *of_seed)
             gpc.fit(train.embedding, train.concept)
-            encoder = load_model(inputs[1], encoding).encoder
-            of_seed = (options.source, seed)
+            encoder = load_model(inputs[1], encoding, axes=of_seed).encoder
             rows, maps = deletions(encoder, gpc, registrations, *of_seed, encoding, settings)
             tested = tcav(gpc, train, test, settings, *of_seed)
             write_csv(outputs[0], rows)
-            save_arrays(outputs[1], maps)
+            save_arrays(outputs[1], maps, of_seed)
             write_csv(outputs[2], tested)

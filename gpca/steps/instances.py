@@ -19,6 +19,7 @@ from gpca.settings import check_settings
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` are parts of the config's section ``real_world``."""
     parser.add_argument("--source", required=True, help="name of the source, which seeds the draws")
+    parser.add_argument("--name", help="name of the frames in the files, where it is another than --source")
     parser.add_argument("--scenes", type=Path, help="folder written by the step scenes, in place of datasets")
     parser.add_argument("--data-dir", help="folder with the datasets; what is there is not downloaded")
     parser.add_argument("--downloads", default="data/downloads", type=Path, help="where downloads are kept")
@@ -40,8 +41,9 @@ def run(options: Namespace) -> None:
         objects = sample_objects(distinct_surfaces(models), options.source, options.surface_points)
         read = {name: (dataset, frames[name], models[name]) for name, dataset in datasets.items()}
         instances = read_instances(read, objects, initial_pose)
-        objects.save(options.objects, options.source)
-        instances.save(options.out)
+        named = options.name or options.source
+        objects.save(options.objects, named)
+        instances.save(options.out, named)
     for name in datasets:
         medians_m = points_on_model(instances, objects)[instances.dataset == name]
         print(

@@ -33,6 +33,6 @@ def run(options: Namespace) -> None:
     grid = KernelGrid(**{name: value for name, value in options.settings.items() if name in known})
     for seed, registrations, embeddings, out in per_seed(options, "registrations", "embeddings", "out"):
         with record_provenance([out], [registrations, embeddings], options.settings, seed=seed):
-            loaded = Registrations.load(registrations)
+            loaded = Registrations.load(registrations, (options.source, seed))
             loaded = replace(loaded, attached=read_embedding(embeddings, loaded))
             write_grid(out, evaluate_grid(loaded, grid, options.source, seed))

@@ -41,7 +41,7 @@ def run(options: Namespace) -> None:
 
     torch.set_num_threads(options.threads)
     for i, (seed, path) in enumerate(sets_of_seeds):
-        sets = ShiftedSets.load(path)
+        sets = ShiftedSets.load(path, (options.source, seed))
         outputs = options.out[i :: len(options.seeds)]
         title = f"learners on {options.source}, seed {seed}"
         for learner, out in progress(list(zip(options.learners, outputs, strict=True)), title):

@@ -16,7 +16,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.descriptors.dataset import Descriptors
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import load_model
+from gpca.encoders.weights import load_model
 from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
 from gpca.model.learning import Lessons, joined, learn
@@ -75,12 +75,12 @@ def run(options: Namespace) -> None:
             own.get("false_alarms", 0.05),
             *("model", options.seed),
         )
-        settings = EncoderSettings(**given["encoder"])
+        settings, axes = EncoderSettings(**given["encoder"]), (options.source, options.seed)
         recovery = given["recovery"]
-        registrations = Registrations.load(options.registrations)
+        registrations = Registrations.load(options.registrations, axes)
         Model(
             diagnoser=diagnoser,
-            encoder=load_model(options.encoder, settings).encoder,
+            encoder=load_model(options.encoder, settings, axes=axes).encoder,
             encoder_settings=settings,
             gpc=_gpc(options, registrations, GPCSettings(**given["gpc"])),
             icp=ICPSettings(**icp),

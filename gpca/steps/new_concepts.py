@@ -33,7 +33,8 @@ from gpca.descriptors.groups import GROUPS
 from gpca.descriptors.registered import describe_registrations
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed, load_model
+from gpca.encoders.training import embed
+from gpca.encoders.weights import load_model
 from gpca.explainers.pair_classifier import NormalisedDescriptors
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
@@ -108,16 +109,18 @@ class _Work:
         self._axes = (options.source, options.seed)
         self._encoder = EncoderSettings(**given["encoder"])
         self._cause_encoder = EncoderSettings(**given["cause_encoder"])
-        self._registrations = Registrations.load(options.registrations)
+        self._registrations = Registrations.load(options.registrations, self._axes)
         self._models = {
-            name: load_model(path, self._encoder)
+            name: load_model(path, self._encoder, unlike=self._axes)
             for name, path in zip(options.encoders_of, options.encoders, strict=True)
         }
-        self._cause_model = load_model(options.cause_encoder, self._cause_encoder, LABELS)
-        causes = Causes.load(options.causes)
+        self._cause_model = load_model(
+            options.cause_encoder, self._cause_encoder, LABELS, self._axes, step="train_on_causes"
+        )
+        causes = Causes.load(options.causes, self._axes)
         h_S_d = read_embedding(options.cause_embeddings, causes.registrations, "train_on_causes")["embedding"]
         self._seen = _seen(causes, h_S_d, Descriptors.load(options.descriptors, causes.registrations))
-        self._objects = ObjectClouds.load(options.objects)
+        self._objects = ObjectClouds.load(options.objects, options.source)
 
     def experiments(self) -> Iterator[Experiment]:
         """Yield every new concept, in every embedding."""

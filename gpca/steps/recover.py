@@ -86,7 +86,7 @@ def run(options: Namespace) -> None:
         write_csv(options.out, rows)
         write_csv(options.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}
-        save_example(options.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop)
+        save_example(options.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop, axes)
 
 
 def _write_summary(path: Path, content: dict) -> None:

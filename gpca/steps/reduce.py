@@ -34,11 +34,11 @@ def run(options: Namespace) -> None:
     check_settings(options.settings, "reductions", options.reduction)
     for seed, embeddings, out in per_seed(options, "embeddings", "out"):
         with record_provenance([out], [embeddings], options.settings, seed=seed):
-            arrays = load_arrays(embeddings, SHAPES, "python -m gpca embed", KINDS)
+            arrays = load_arrays(embeddings, SHAPES, "python -m gpca embed", KINDS, (options.source, seed))
             h_S_d = arrays["h"]
             train_S = arrays["split"] == "train"
             if not train_S.any():
                 raise InputError(embeddings, "has no training samples", "regenerate it with 'python -m gpca embed'")
             axes = (options.source, seed, "reduction")
             reduced_S_c = reduce(options.reduction, h_S_d[train_S], h_S_d, options.settings, *axes)
-            save_arrays(out, {name: arrays[name] for name in SHAPES} | {"h": reduced_S_c})
+            save_arrays(out, {name: arrays[name] for name in SHAPES} | {"h": reduced_S_c}, (options.source, seed))

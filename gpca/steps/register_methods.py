@@ -36,13 +36,13 @@ def run(options: Namespace) -> None:
     methods = checked_by_name(given["methods"], "methods", options.methods, require_settings)
     for option in ("out", "timings"):
         require_files(options, option, len(methods) * len(options.seeds), "pair(s) of method and seed")
-    objects = ObjectClouds.load(options.objects)
+    objects = ObjectClouds.load(options.objects, options.source)
     for i, (seed, path) in enumerate(per_seed(options, "registrations")):
         of_seed = slice(i, None, len(options.seeds))
         outputs = options.out[of_seed], options.timings[of_seed]
         inputs = [options.objects, path]
         with record_provenance([*outputs[0], *outputs[1]], inputs, options.settings, seed=seed):
-            registrations = Registrations.load(path)
+            registrations = Registrations.load(path, (options.source, seed))
             trials = try_methods(registrations, objects, options.source, seed, methods, settings)
             for rows, out, timings in zip(trials.values(), *outputs, strict=True):
                 write_csv(out, rows.drop(columns="seconds"))

@@ -26,7 +26,7 @@ def run(options: Namespace) -> None:
     """Perturb and align."""
     check_settings(options.settings, "registrations")
     settings = RegistrationSettings.from_dict(options.settings)
-    objects = ObjectClouds.load(options.objects)
+    objects = ObjectClouds.load(options.objects, options.source)
     with record_provenance([options.out, options.timings], [options.objects], options.settings, seed=options.seed):
         registrations, icp_seconds_S = make_registrations(objects, options.source, options.seed, settings)
         registrations.save(options.out)

@@ -39,7 +39,7 @@ def run(options: Namespace) -> None:
     inputs = [options.model, options.registrations, options.embeddings]
     with record_provenance([options.out], inputs, options.settings, seed=options.seed):
         model = Model.load(options.model)
-        registrations = Registrations.load(options.registrations)
+        registrations = Registrations.load(options.registrations, axes)
         embedded = replace(registrations, attached=read_embedding(options.embeddings, registrations))
         settings = ActiveLearningSettings.from_dict(learning)
         task = make_task(embedded, "overlap", settings, *axes)

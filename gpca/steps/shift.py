@@ -10,7 +10,8 @@ import torch
 
 from gpca.arguments import SEED
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import load_model
+from gpca.encoders.weights import load_model
+from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
@@ -45,14 +46,22 @@ def run(options: Namespace) -> None:
     settings = ShiftSettings.from_dicts(**given)
     encoder_settings = EncoderSettings(**given["encoder"])
     options.other_registrations = options.other_registrations or [None] * len(options.seeds)
-    objects = ObjectClouds.load(options.objects)
+    objects = ObjectClouds.load(options.objects, options.source)
     files = ("registrations", "other_registrations", "embeddings", "encoders", "out")
     for seed, own, other, embeddings, weights, out in per_seed(options, *files):
         inputs = [path for path in (options.objects, own, other, embeddings, weights) if path]
         with record_provenance([out], inputs, options.settings, seed=seed):
-            registrations = Registrations.load(own)
+            axes = (options.source, seed)
+            registrations = Registrations.load(own, axes)
             registrations = replace(registrations, attached=read_embedding(embeddings, registrations))
-            others = Registrations.load(other) if other else None
-            model = load_model(weights, encoder_settings)
-            sets = make_sets(objects, registrations, others, model, encoder_settings, options.source, seed, settings)
-            sets.save(out)
+            others = _of_another_source(other, options.source) if other else None
+            model = load_model(weights, encoder_settings, axes=axes)
+            sets = make_sets(objects, registrations, others, model, encoder_settings, *axes, settings)
+            sets.save(out, axes)
+
+
+def _of_another_source(path: Path, own: str) -> Registrations:
+    registrations = Registrations.load(path)
+    if registrations.axes is not None and registrations.axes[0] == own:
+        raise InputError(path, f"is of source '{own}' itself", "give registrations of another source")
+    return registrations

@@ -16,20 +16,23 @@ from gpca.alignment.icp import ICPSettings
 from gpca.arguments import SEED
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.tensor_file import write_tensors
-from gpca.encoders.training import load_model, train_encoder
+from gpca.encoders.training import train_encoder
+from gpca.encoders.weights import load_model, write_weights
 from gpca.errors import InputError
 from gpca.frames.sample_file import read_instances_of
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
-from gpca.steps import checked_with_icp
+from gpca.steps import checked_with_icp, require_files
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` is the encoder's section of the config, with ``icp``."""
     parser.add_argument(
         "--registrations", required=True, type=Path, nargs="+", help="one or more files, trained on together"
+    )
+    parser.add_argument(
+        "--registrations-of", nargs="+", help="source of each of these files, where it is another than --source"
     )
     parser.add_argument("--poses", type=Path, help="CSV of depth frames, whose instances are held out as a whole")
     parser.add_argument("--start", type=Path, help="weights to start from")
@@ -44,7 +47,10 @@ def run(options: Namespace) -> None:
     torch.set_num_threads(options.threads)
     given, of_icp = checked_with_icp(options.settings, "encoders", "*")
     settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
-    registrations = joined([Registrations.load(path) for path in options.registrations])
+    of = options.registrations_of or [options.source]
+    require_files(options, "registrations", len(of), "source(s)")
+    files = zip(options.registrations, of, strict=True)
+    registrations = joined([Registrations.load(path, (source, options.seed)) for path, source in files])
     # Clouds of frames are as small as objects look, so some of their points are drawn twice; others are as configured.
     if options.poses is None and settings.draw_points > (most := int(np.diff(registrations.offsets).max())):
         fault = f"the largest cloud has {most} points, fewer than draw_points, {settings.draw_points}"
@@ -59,6 +65,6 @@ def run(options: Namespace) -> None:
         model, curve = train_encoder(
             seen, options.source, options.seed, settings, checkpoint, start=start, group_S=instance_S
         )
-        write_tensors(options.out, model.state_dict())
+        write_weights(options.out, model, (options.source, options.seed))
         write_csv(options.curve, pd.DataFrame(curve), form="%.6g")
         checkpoint.unlink(missing_ok=True)

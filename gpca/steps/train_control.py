@@ -41,13 +41,13 @@ def run(options: Namespace) -> None:
     settings, encoder = ControlSettings.from_dict(given["controls"]), EncoderSettings(**given["encoder"])
     checkpoint = options.out.with_suffix(".checkpoint")
     with record_provenance([options.out, options.curve], [options.registrations], options.settings, seed=options.seed):
-        registrations = Registrations.load(options.registrations)
+        registrations = Registrations.load(options.registrations, (options.source, options.seed))
         if why := left_out(options.control, registrations, settings, encoder.backbone):
             print(f"control '{options.control}' of {options.source} is skipped: {why}", file=sys.stderr)
             arrays, curve = nothing()
         else:
             axes = (options.source, options.seed, settings, encoder, checkpoint)
             arrays, curve = encode(options.control, registrations, *axes)
-        save_arrays(options.out, arrays)
+        save_arrays(options.out, arrays, registrations.axes)
         write_csv(options.curve, pd.DataFrame(curve, columns=list(CURVE)), form="%.6g")
         checkpoint.unlink(missing_ok=True)

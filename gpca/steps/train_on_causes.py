@@ -16,8 +16,8 @@ from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, with_label
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.tensor_file import write_tensors
 from gpca.encoders.training import embed, train_encoder
+from gpca.encoders.weights import write_weights
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 
@@ -44,16 +44,16 @@ def run(options: Namespace) -> None:
     outputs = [options.weights, options.curve, options.out, options.timings]
     inputs = [options.causes, options.causes_timings]
     with record_provenance(outputs, inputs, options.settings, seed=options.seed):
-        causes = Causes.load(options.causes)
+        causes = Causes.load(options.causes, axes)
         registrations = causes.registrations
         seconds_S, icp_seconds_S = read_timings(options.causes_timings, registrations)
         model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, LABELS)
         started = perf_counter()
         h_S_d, logits_S_C = embed(model, registrations, *axes, settings)
         seconds = (perf_counter() - started) / len(h_S_d)
-        write_tensors(options.weights, model.state_dict())
+        write_weights(options.weights, model, axes)
         write_csv(options.curve, pd.DataFrame(curve), form="%.6g")
         arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
-        save_arrays(options.out, arrays)
+        save_arrays(options.out, arrays, axes)
         write_timings(options.timings, registrations, seconds_S + seconds, icp_seconds_S)
         checkpoint.unlink(missing_ok=True)

@@ -36,9 +36,9 @@ def run(options: Namespace) -> None:
     settings = UncertaintySettings(**given, icp=ICPSettings(**icp))
     for seed, registrations_path, out, table, timings in per_seed(options, "registrations", "out", "tables", "timings"):
         with record_provenance([out, table, timings], [registrations_path], options.settings, seed=seed):
-            registrations = Registrations.load(registrations_path)
+            registrations = Registrations.load(registrations_path, (options.source, seed))
             chosen = registrations.subset(design_rows(registrations, options.design, samples))
             outcomes, *seconds = evaluate_design(options.design, chosen, options.source, seed, settings)
-            outcomes.save(out)
+            outcomes.save(out, (options.source, seed))
             outcomes.write_table(table, DESIGNS[options.design].conditions)
             write_seconds(timings, outcomes, *seconds)

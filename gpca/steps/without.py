@@ -35,7 +35,7 @@ def run(options: Namespace) -> None:
     check_settings(options.settings, "encoders", "*")
     settings = EncoderSettings(**options.settings)
     with record_provenance([options.out], [options.registrations], options.settings, seed=options.seed):
-        registrations = Registrations.load(options.registrations)
+        registrations = Registrations.load(options.registrations, (options.source, options.seed))
         train = registrations.rows("train")
         arrays = {"sample": registrations.sample, "split": registrations.split}
         for held_out in options.concepts:
@@ -43,4 +43,4 @@ def run(options: Namespace) -> None:
             name = f"{options.source} without {held_out}"
             model, _ = train_encoder(seen, name, options.seed, settings)
             arrays[f"h_{held_out}"], _ = embed(model, registrations, name, options.seed, settings)
-        save_arrays(options.out, {name: np.asarray(array) for name, array in arrays.items()})
+        save_arrays(options.out, {name: np.asarray(array) for name, array in arrays.items()}, registrations.axes)

@@ -11,6 +11,7 @@ import numpy as np
 
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.attribution.metrics import source_method_seed
+from gpca.axes import Axes
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 
@@ -96,9 +97,9 @@ class ReferenceSamples:
         """Return the twists (N, 6) of a row."""
         return self.twists[self.offsets[i] : self.offsets[i + 1]].astype(np.float64)
 
-    def save(self, path: str | Path) -> None:
-        """Write the npz described in results/README.md."""
-        save_arrays(path, vars(self))
+    def save(self, path: str | Path, axes: Axes) -> None:
+        """Write the npz described in results/README.md; `axes` are the source and the seed."""
+        save_arrays(path, vars(self), axes)
 
     @classmethod
     def load(cls, path: str | Path) -> ReferenceSamples:

@@ -25,7 +25,7 @@ def row_name(method: str, start: str) -> str:
 
 def read_trials(path: str | Path) -> pd.DataFrame:
     """Read a file of the step ``register_methods``: `success` as booleans, numbers as numbers, the rest as text."""
-    rows = read_csv(path, COLUMNS)
+    rows = read_csv(path, COLUMNS, others=("object", "symmetric", "fitness", "inlier_rmse"))
     for name in (*SEVERITIES, *MEASURED):
         rows[name] = numbers(path, rows, name, least=0)
     if not (rows["concept"].isin(CONCEPTS) & rows["success"].isin(("True", "False"))).all():

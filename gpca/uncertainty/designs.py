@@ -12,7 +12,8 @@ from functools import cache, partial
 
 import numpy as np
 
-from gpca.pairs.dataset import SPLITS, Registrations
+from gpca.names import SPLITS
+from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.axes import Axes
 from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
@@ -38,9 +39,9 @@ class Outcomes:
     degenerate: np.ndarray
     icp_calls: np.ndarray
 
-    def save(self, path: str | Path) -> None:
-        """Write the npz described in results/README.md."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)})
+    def save(self, path: str | Path, axes: Axes) -> None:
+        """Write the npz described in results/README.md; `axes` are the source and the seed."""
+        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, axes)
 
     def write_table(self, path: str | Path, conditions: Sequence[str]) -> None:
         """Write the uncertainties as CSV, in nats, a column for each of the K conditions, for readers and metrics."""
@@ -65,16 +66,16 @@ class Outcomes:
         return replace(chosen, attached={**chosen.attached, **own, **seconds})
 
     @classmethod
-    def load(cls, path: str | Path) -> Outcomes:
-        """Read the npz.
+    def load(cls, path: str | Path, axes: Axes | None = None) -> Outcomes:
+        """Read the npz; `axes` are the source and the seed that it has to be of.
 
         Raises:
-            InputError: the file is missing, damaged, holds wrong shapes, NaN, or no samples.
+            InputError: the file is missing, damaged, of another source or seed, holds wrong shapes, NaN, or no samples.
         """
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys((field.name for field in fields(cls)), ("S", "K"))
         shapes |= {"sample": ("S",), "split": ("S",), "covariance": ("S", "K", 6, 6)}
         kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT, "icp_calls": WHOLE, "degenerate": "b"}
-        arrays = load_arrays(path, shapes, "python -m gpca uncertainty", kinds)
+        arrays = load_arrays(path, shapes, "python -m gpca uncertainty", kinds, axes)
         remedy = "regenerate it with 'python -m gpca uncertainty'"
         if len(arrays["sample"]) == 0:
             raise InputError(path, "has no samples", remedy)

@@ -60,7 +60,7 @@ def test_the_same_answer_twice_is_no_conflict(path):
         ("-3,train,pose\n", r"line 2: no sample '-3'"),
         ("٣,train,pose\n", r"line 2: no sample '٣'"),
         ("3,train,two words\n", r"line 2: 'two words' is not a valid concept name"),
-        ("3,tra", r"line 2: no sample '3' of split 'tra'"),
+        ("3,tra", r"line 2: column 'split' contains a split that is neither train nor test"),
     ],
 )
 def test_a_damaged_file_is_named_with_its_line(path, lines, message):

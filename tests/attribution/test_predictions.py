@@ -6,7 +6,7 @@ import pytest
 
 from gpca.attribution.predictions import read_predictions, read_timings, write_predictions, write_timings
 from gpca.attribution.scores import Attribution
-from gpca.csv_file import read_csv
+from gpca.csv_file import ANY, read_csv
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -156,6 +156,9 @@ def test_a_missing_column_is_named(tmp_path, column):
         (b"sample\n1\n", "column 'seconds' is missing"),
         (b"\xff\xfe\x00", "not a readable CSV"),
         (b'a,b\n"1,2\n3', "not a readable CSV"),
+        (b"sample,seconds,minutes\n1,2,3\n", "column 'minutes' is unknown"),
+        (b"sample,seconds,split\n1,2,tset\n", "column 'split' is unknown"),
+        (b'sample,seconds\n1,"2\n3"\n', "column 'seconds' contains a line break"),
     ],
 )
 def test_unreadable_files_are_refused_in_one_line(tmp_path, content, expected):
@@ -165,3 +168,26 @@ def test_unreadable_files_are_refused_in_one_line(tmp_path, content, expected):
     with pytest.raises(InputError, match=expected) as caught:
         read_csv(path, ("sample", "seconds"))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        ({"object": ["cat", "cat", "", "cat", "cat"]}, "line 4: column 'object' contains an empty name"),
+        ({"object": ["cat", "cat", "c\nat", "cat", "cat"]}, "column 'object' contains a line break"),
+        ({"split": "tset"}, "line 2: column 'split' contains a split that is neither"),
+        ({"score": 0.5}, "column 'score' is unknown"),
+        ({"score_": 0.5}, "column 'score_' is unknown"),
+    ],
+)
+def test_predictions_that_no_explainer_makes_are_refused(tmp_path, columns, expected):
+    path = prediction_file(tmp_path / "seed0.csv", **columns)
+    with pytest.raises(InputError, match=expected) as caught:
+        read_predictions(path)
+    assert str(caught.value).endswith("regenerate it")
+
+
+def test_a_file_may_have_further_columns_where_its_reader_knows_them(tmp_path):
+    (tmp_path / "a.csv").write_text("sample,score_pose,own\n1,2,3\n")
+    assert list(read_csv(tmp_path / "a.csv", ["sample"], ["score_*", "own"])) == ["sample", "score_pose", "own"]
+    assert len(read_csv(tmp_path / "a.csv", ["sample"], ANY)) == 1

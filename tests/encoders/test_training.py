@@ -5,7 +5,8 @@ import torch
 
 from gpca.encoders import training
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import load_model, train_encoder
+from gpca.encoders.training import train_encoder
+from gpca.encoders.weights import load_model, write_weights
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
@@ -118,7 +119,7 @@ def test_weights_survive_the_file_and_others_are_refused(tmp_path, unbroken):
     path = tmp_path / "seed0.pt"
     with pytest.raises(InputError, match="no such weights"):
         load_model(path, SETTINGS)
-    torch.save(unbroken[0].state_dict(), path)
+    write_weights(path, unbroken[0], ("tiny", 0))
     assert same_weights(load_model(path, SETTINGS), unbroken[0])
     for damage in (truncate, lambda path: torch.save(torch.nn.Linear(3, 3).state_dict(), path)):
         damage(path)

@@ -81,7 +81,7 @@ ARRAYS = {
 def test_instances_that_cannot_be(tiny, folder, name):
     array, change, words = ARRAYS[name]
     arrays = {field.name: getattr(tiny[0], field.name) for field in fields(Instances)}
-    save_arrays(folder / "instances.npz", arrays | {array: change(arrays[array])})
+    save_arrays(folder / "instances.npz", arrays | {array: change(arrays[array])}, ("tiny", None))
     refusal(CALL, folder, words)
 
 
@@ -97,6 +97,8 @@ def test_no_file_of_instances(folder):
 
 
 def test_instances_beside_the_objects_of_another_source(tiny, objects, folder):
-    tiny[0].save(folder / "instances.npz")
+    tiny[0].save(folder / "instances.npz", "tiny")
     objects.save(folder / "objects.npz", "other")
+    refusal(CALL, folder, "objects.npz: is of source 'other', not of source 'tiny'")
+    objects.save(folder / "objects.npz", "tiny")
     refusal(CALL, folder, "instances.npz", "regenerate both files")

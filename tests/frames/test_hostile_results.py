@@ -84,7 +84,7 @@ ROWS = {
     "score infinite": (one(3, "-inf"), "line 4: score contains values that are not finite numbers"),
     "score missing": (one(3, ""), "line 4: score has 0 entries, not 1"),
     "score a word": (one(3, "high"), "line 4: score contains values that are not"),
-    "score with NUL": (one(3, "1\0"), "line 4: score contains values that are not"),
+    "score with NUL": (one(3, "1\0"), "line 4: column 'score' contains a line break or another control"),
     "object unknown": (one(2, "77"), "line 4: the dataset has no object 77"),
     "object negative": (one(2, "-1"), "line 4: obj_id is '-1', not a whole number"),
     "object a fraction": (one(2, "1.5"), "line 4: obj_id is '1.5'"),

@@ -44,7 +44,7 @@ def test_frames_of_one_scene_cannot_be_split(tiny):
 
 def test_instances_survive_their_file(tiny, tmp_path):
     instances, _ = tiny
-    instances.save(tmp_path / "instances.npz")
+    instances.save(tmp_path / "instances.npz", "tiny")
     loaded = Instances.load(tmp_path / "instances.npz")
     for field in fields(Instances):
         assert np.array_equal(getattr(loaded, field.name), getattr(instances, field.name))

@@ -100,7 +100,7 @@ def test_a_flipped_bit_anywhere_is_found_or_harmless(saved, tmp_path):
 
 
 SETTINGS = '{"draw_points": 64, "draws": 2, "options": {"k": 8, "point_features": 16}}'
-EMBED = ["embed", "--source", "s", "--seed", 0, "--registrations", "registrations.npz", "--registration-timings",
+EMBED = ["embed", "--source", "tiny", "--seed", 0, "--registrations", "registrations.npz", "--registration-timings",
          "seconds.csv", "--encoder", "weights.pt", "--out", "new.npz", "--timings", "new.csv",
          "--settings", SETTINGS]  # fmt: skip
 
@@ -109,6 +109,7 @@ EMBED = ["embed", "--source", "s", "--seed", 0, "--registrations", "registration
 def trained(registrations, tmp_path_factory):
     from gpca.encoders.settings import EncoderSettings
     from gpca.encoders.training import make_model
+    from gpca.encoders.weights import write_weights
 
     folder = tmp_path_factory.mktemp("trained")
     registrations.save(folder / "registrations.npz")
@@ -116,15 +117,15 @@ def trained(registrations, tmp_path_factory):
     lines = [f"{sample},{split},0.5,0.5" for sample, split in rows]
     (folder / "seconds.csv").write_text("\n".join(["sample,split,seconds,icp_seconds", *lines, ""]))
     settings = EncoderSettings(draw_points=64, draws=2, options={"k": 8, "point_features": 16})
-    torch.save(make_model(settings).state_dict(), folder / "weights.pt")
+    write_weights(folder / "weights.pt", make_model(settings), registrations.axes)
     return folder
 
 
 def of_weights(spoil):
     def change(path):
-        state = torch.load(path, weights_only=True)
-        spoil(state)
-        torch.save(state, path)
+        content = torch.load(path, weights_only=True)
+        spoil(content["weights"])
+        torch.save(content, path)
 
     return change
 

@@ -33,7 +33,9 @@ def lessons(n, seed, shift=3.0):
 def test_lessons_are_those_of_the_truth(causes):
     random = np.random.default_rng(0)
     groups = {name: random.normal(size=(len(causes), width)) for name, width in WIDTHS.items()}
-    descriptors = Descriptors(causes.registrations.sample, causes.registrations.split, groups)
+    descriptors = Descriptors(
+        causes.registrations.sample, causes.registrations.split, groups, causes.registrations.axes
+    )
     found = Lessons.of(causes, descriptors)
     assert found.features_N_F.shape == (len(causes), FEATURES)
     np.testing.assert_array_equal(found.error_N, causes.truth.error[:, ALL])

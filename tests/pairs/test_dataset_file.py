@@ -30,7 +30,7 @@ def changed(array, index, value):
     [
         ("concept", lambda a: a.astype(object), "pickled"),
         ("concept", lambda a: changed(a, 3, "dust"), "unknown concept 'dust'; expected one of noise, pose, overlap"),
-        ("split", lambda a: changed(a.astype("U9"), 0, "validate"), "unknown split"),
+        ("split", lambda a: changed(a.astype("U9"), 0, "validate"), "neither train nor test"),
         ("points", lambda a: a[:, :2], r"'points' is \d+×2, not \d+×3"),
         ("points", lambda a: changed(a, 5, np.nan), "'points' contains NaN"),
         ("points", lambda a: a[:-1], "'offsets' do not match"),
@@ -47,7 +47,11 @@ def changed(array, index, value):
 )
 def test_faulty_files_are_refused_with_their_name(tmp_path, registrations, name, damage, expected):
     path = tmp_path / "seed0.npz"
-    arrays = arrays_of(registrations) | {name: damage(getattr(registrations, name))}
+    arrays = (
+        arrays_of(registrations)
+        | {"source": np.array("tiny"), "seed": np.array(0)}
+        | {name: damage(getattr(registrations, name))}
+    )
     np.savez(path, **{key: array for key, array in arrays.items() if array is not None})
     with pytest.raises(InputError, match=expected) as caught:
         Registrations.load(path)

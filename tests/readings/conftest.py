@@ -50,14 +50,14 @@ def given(embedded, tmp_path_factory):
     columns = {name: getattr(embedded, name) for name in ("split", "sample", "concept", "object_name")}
     distance = np.linspace(0, 1, len(embedded))[:, None] * np.ones(len(DISTANCES))
     ShiftedSets(set=np.full(len(embedded), "in_distribution"), h=embedded.embedding, distance=distance, **columns).save(
-        paths["sets"]
+        paths["sets"], embedded.axes
     )
     # Right but for the first test sample of each concept.
     scores_S_3 = 0.8 * (embedded.concept[:, None] == np.array(CONCEPTS)) + 0.1
     scores_S_3[embedded.rows("test")[:3]] = np.roll(scores_S_3[embedded.rows("test")[:3]], 1, axis=1)
     write_predictions(paths["predictions"], embedded, Attribution.of_scores(CONCEPTS, scores_S_3, seconds=0.0))
     arrays = {"h": embedded.embedding, "sample": embedded.sample, "split": embedded.split}
-    save_arrays(paths["embeddings"], arrays)
+    save_arrays(paths["embeddings"], arrays, embedded.axes)
     return Given(
         registrations={("tiny", 0): paths["registrations"]},
         sets={("tiny", 0): paths["sets"]},

@@ -129,8 +129,16 @@ def test_epochs_fall_with_the_rate(given, monkeypatch):
     assert fast < slow <= labels.MOST
 
 
-def test_repeats_on_frames_vary_in_what_they_say(given):
-    five = {("tiny", seed): given.registrations["tiny", 0] for seed in range(3)}
+def saved_as(registrations, axes, folder):
+    """The path of the same registrations as if they were of this source and seed."""
+    path = folder / f"registrations/{axes[0]}/seed{axes[1]}.npz"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    replace(registrations, axes=axes).save(path)
+    return path
+
+
+def test_repeats_on_frames_vary_in_what_they_say(given, embedded, tmp_path):
+    five = {("tiny", seed): saved_as(embedded, ("tiny", seed), tmp_path) for seed in range(3)}
     predictions = {("tiny", "dgcnn-none", seed): given.predictions["tiny", "gpca_paper", 0] for seed in range(3)}
     shown = replace(given, registrations=five, predictions=predictions)
     rows = list(
@@ -166,7 +174,7 @@ def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(given, e
     monkeypatch.setattr(frame_input, "train_encoder", train)
     shown = replace(
         given,
-        registrations=given.registrations | {("other", 0): given.registrations["tiny", 0]},
+        registrations=given.registrations | {("other", 0): saved_as(embedded, ("other", 0), tmp_path)},
         poses={("tiny", 0): poses},
         sections=SECTIONS | {"pretraining": {"epochs": 1}, "training": {"validation_share": 0.2}},
     )

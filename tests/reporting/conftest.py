@@ -50,7 +50,7 @@ def stage_files(registrations, tmp_path_factory):
     place_S = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
     h_S_d = random.normal(size=(len(registrations), 12)) + 8 * np.eye(3, 12)[place_S]
     names = {"sample": registrations.sample, "split": registrations.split}
-    save_arrays(folder / "embeddings.npz", {"h": h_S_d.astype(np.float32), **names})
+    save_arrays(folder / "embeddings.npz", {"h": h_S_d.astype(np.float32), **names}, registrations.axes)
     score_S = 0.5 + registrations.sample / 100
     rows = ["sample,split,object,concept_true,concept_predicted,score_noise,score_pose,score_overlap,"]
     rows[0] += "variance_noise,variance_pose,variance_overlap,bald,entropy,abstained,icp_calls"

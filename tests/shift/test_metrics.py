@@ -19,7 +19,7 @@ def files(tmp_path):
     predictions, set_files = [], []
     for seed in (0, 1):
         (path := tmp_path / "shifted/cups" / f"seed{seed}.npz").parent.mkdir(parents=True, exist_ok=True)
-        sets().save(path)
+        sets().save(path, ("tiny", 0))
         set_files.append(path)
         predictions.append(tmp_path / "learners/cups/gpca" / f"seed{seed}.csv")
         write_csv(predictions[-1], predict_sets(quick, sets()))

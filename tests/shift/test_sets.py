@@ -19,7 +19,7 @@ def sets(n=12):
 
 
 def test_a_file_gives_back_what_was_saved(tmp_path):
-    sets().save(tmp_path / "seed0.npz")
+    sets().save(tmp_path / "seed0.npz", ("tiny", 0))
     loaded = ShiftedSets.load(tmp_path / "seed0.npz")
     for name, array in vars(sets()).items():
         assert np.array_equal(getattr(loaded, name), array)
@@ -29,7 +29,7 @@ def test_a_file_gives_back_what_was_saved(tmp_path):
     ("change", "message"),
     [
         ({"set": "space"}, "unknown set 'space'; expected one of in_distribution"),
-        ({"split": "valid"}, "unknown split 'valid'"),
+        ({"split": "valid"}, "the split 'valid', which is neither train nor test"),
         ({"concept": "blur"}, "unknown concept 'blur'"),
         ({"h": np.nan}, "array 'h' contains NaN"),
         ({"split": "test"}, "set 'in_distribution' has no training samples"),
@@ -38,7 +38,7 @@ def test_a_file_gives_back_what_was_saved(tmp_path):
 def test_bad_files_are_one_line(tmp_path, change, message):
     [(name, value)] = change.items()
     array = getattr(sets(), name)
-    replace(sets(), **{name: np.full(array.shape, value)}).save(tmp_path / "seed0.npz")
+    replace(sets(), **{name: np.full(array.shape, value)}).save(tmp_path / "seed0.npz", ("tiny", 0))
     with pytest.raises(InputError, match=message):
         ShiftedSets.load(tmp_path / "seed0.npz")
 

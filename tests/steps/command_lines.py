@@ -41,11 +41,11 @@ STEP_OPTIONS = {
         "--out": "registrations.npz", "--timings": "icp.csv",
     },
     "causes": COMMON | {
-        "--settings": CAUSES | {"icp": {"max_iterations": 30}}, "--seed": 100, "--objects": "objects.npz",
+        "--settings": CAUSES | {"icp": {"max_iterations": 30}}, "--seed": 0, "--objects": "objects.npz",
         "--out": "causes.npz", "--candidates": "candidates.csv", "--timings": "causes_timings.csv",
     },
     "describe": COMMON | {
-        "--settings": {"starts": 1, "restarts": 2, "icp_points": 64, "icp": {"max_iterations": 30}}, "--seed": 100,
+        "--settings": {"starts": 1, "restarts": 2, "icp_points": 64, "icp": {"max_iterations": 30}}, "--seed": 0,
         "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--out": "descriptors.npz",
         "--timings": "descriptors.csv",
     },
@@ -56,17 +56,17 @@ STEP_OPTIONS = {
             },
             "estimators": {"brossard": {}, "cello": {"steps": 2}},
         },
-        "--seeds": 100, "--estimators": ["brossard", "cello"], "--objects": "objects.npz", "--causes": "causes.npz",
+        "--seeds": 0, "--estimators": ["brossard", "cello"], "--objects": "objects.npz", "--causes": "causes.npz",
         "--samples": "reference_samples.npz", "--out": ["reference_said.csv", "brossard_said.csv", "cello_said.csv"],
         "--timings": ["reference_seconds.csv", "brossard_seconds.csv", "cello_seconds.csv"],
     },
     "train_on_causes": COMMON | {
-        "--settings": ENCODER, "--seed": 100, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
+        "--settings": ENCODER, "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
         "--weights": "cause_weights.pt", "--curve": "cause_curve.csv", "--out": "cause_embeddings.npz",
         "--timings": "cause_embeddings.csv",
     },
     "diagnose": COMMON | {
-        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 100,
+        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 0,
         "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
         "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
     },
@@ -95,7 +95,7 @@ STEP_OPTIONS = {
                        "explainers": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "residuals_logistic": {}}},
         "--seed": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoder": "weights.pt",
         "--embeddings": "embeddings.npz", "--retrained": "density", "--retrained-embeddings": "control.npz",
-        "--others": "other", "--other-registrations": "registrations.npz", "--out": "controls.csv",
+        "--others": "other", "--other-registrations": "other.npz", "--out": "controls.csv",
         "--samples": "control_samples.csv", "--timings": "control_seconds.csv",
     },
     "exchange": COMMON | {
@@ -151,7 +151,7 @@ STEP_OPTIONS = {
             "causes": CAUSES, "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
             "icp": {"max_iterations": 30},
         },
-        "--seed": 100, "--registrations": "registrations.npz", "--encoders": "weights.pt",
+        "--seed": 0, "--registrations": "registrations.npz", "--encoders": "other.pt",
         "--encoders-of": "other_source", "--objects": "objects.npz", "--causes": "causes.npz",
         "--descriptors": "descriptors.npz", "--cause-encoder": "cause_weights.pt",
         "--cause-embeddings": "cause_embeddings.npz", "--strategies": ["bald_kmeans", "all_labels"],
@@ -169,7 +169,7 @@ STEP_OPTIONS = {
     "shift": COMMON | {
         "--settings": {"shift": SHIFT, "registrations": {"cloud_points": 128}, "encoder": ENCODER}, "--seeds": 0,
         "--objects": "objects.npz", "--registrations": "registrations.npz",
-        "--other-registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--encoders": "weights.pt",
+        "--other-registrations": "other.npz", "--embeddings": "embeddings.npz", "--encoders": "weights.pt",
         "--out": "shifted.npz",
     },
     "learners": COMMON | {

@@ -8,6 +8,13 @@ from gpca.__main__ import main
 
 from .command_lines import STEP_OPTIONS, arguments
 
+# The files of a second source that some steps read besides.
+OF_ANOTHER_SOURCE = {
+    "objects": {"--out": "objects_other.npz"},
+    "registrations": {"--objects": "objects_other.npz", "--out": "other.npz", "--timings": "other_icp.csv"},
+    "train": {"--registrations": "other.npz", "--out": "other.pt", "--curve": "other_curve.csv"},
+}
+
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory):
@@ -23,6 +30,8 @@ def made(tmp_path_factory):
         patch.chdir(folder)
         for step in STEP_OPTIONS:
             assert main(arguments(step)) == 0
+            if step in OF_ANOTHER_SOURCE:
+                assert main(arguments(step, {"--source": "other", **OF_ANOTHER_SOURCE[step]})) == 0
     return folder
 
 

@@ -29,7 +29,7 @@ SETTINGS = {
 def call(made, tiny, scenes, tmp_path_factory):
     """A folder with what the step reads, and its command line there."""
     folder = tmp_path_factory.mktemp("frames")
-    tiny[0].save(folder / "instances.npz")
+    tiny[0].save(folder / "instances.npz", "tiny")
     tiny[1].save(folder / "objects.npz", "tiny")
     lessons = {"causes": "causes", "descriptors": "descriptors", "cause_embeddings": "embeddings"}
     datasets = {"tiny": {"location": str(scenes)}}

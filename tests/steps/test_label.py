@@ -19,7 +19,9 @@ def label(registrations, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     registrations.save("registrations.npz")
     apart = 3 * np.eye(3)[[CONCEPTS.index(concept) for concept in registrations.concept]]
-    save_arrays("embeddings.npz", {"h": apart, "sample": registrations.sample, "split": registrations.split})
+    save_arrays(
+        "embeddings.npz", {"h": apart, "sample": registrations.sample, "split": registrations.split}, registrations.axes
+    )
     settings = '{"iterations": 5, "inducing": 6, "draws": 20}'
     given = ["registrations.npz", "--embeddings", "embeddings.npz", "--labels", "labels.csv", "--settings", settings]
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.__main__ import main
+from gpca.arrays import save_arrays
 
 from .command_lines import arguments, arrays_changed, refused, removed, settings, untouched
 
@@ -34,7 +35,9 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
 
 
 def test_reduced_embeddings_are_of_the_same_samples_and_each_seed_has_its_own(folder):
-    given = {"--seeds": [0, 1], "--embeddings": ["embeddings.npz"] * 2, "--out": ["reduced.npz", "other.npz"]}
+    with np.load(folder / "embeddings.npz") as archive:
+        save_arrays(folder / "seed1.npz", dict(archive) | {"seed": np.array(1)})
+    given = {"--seeds": [0, 1], "--embeddings": ["embeddings.npz", "seed1.npz"], "--out": ["reduced.npz", "other.npz"]}
     assert main(arguments("reduce", given)) == 0
     whole, reduced, other = (np.load(folder / name) for name in ("embeddings.npz", "reduced.npz", "other.npz"))
     assert reduced["h"].shape == (24, 4)

@@ -136,7 +136,7 @@ SAMPLES = ReferenceSamples(
 
 
 def test_samples_survive_the_file(tmp_path):
-    SAMPLES.save(tmp_path / "a.npz")
+    SAMPLES.save(tmp_path / "a.npz", ("cups", 0))
     loaded = ReferenceSamples.load(tmp_path / "a.npz")
     assert loaded.twists_of(1).shape == (2, 6)
     assert loaded.sample.tolist() == [4, 5]
@@ -144,6 +144,6 @@ def test_samples_survive_the_file(tmp_path):
 
 @pytest.mark.parametrize("offsets", [[0, 3], [0, 3, 6], [1, 3, 5], [0, 6, 5]])
 def test_offsets_that_do_not_fit_are_refused(tmp_path, offsets):
-    ReferenceSamples(**(vars(SAMPLES) | {"offsets": np.array(offsets)})).save(tmp_path / "a.npz")
+    ReferenceSamples(**(vars(SAMPLES) | {"offsets": np.array(offsets)})).save(tmp_path / "a.npz", ("cups", 0))
     with pytest.raises(InputError, match="'offsets' do not match 'twists' and 'sample'"):
         ReferenceSamples.load(tmp_path / "a.npz")

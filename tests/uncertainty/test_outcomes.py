@@ -40,13 +40,13 @@ def test_every_design_has_its_number_of_conditions():
 
 def test_outcomes_survive_the_file_and_give_the_same_bytes(tmp_path):
     outcomes = made()
-    outcomes.save(tmp_path / "deep" / "a.npz")
+    outcomes.save(tmp_path / "deep" / "a.npz", ("tiny", 0))
     loaded = Outcomes.load(tmp_path / "deep" / "a.npz")
     for name in COLUMNS:
         assert getattr(loaded, name).dtype == getattr(outcomes, name).dtype
         assert np.array_equal(getattr(loaded, name), getattr(outcomes, name))
-    loaded.save(tmp_path / "b.npz")
-    made(seed=1).save(tmp_path / "c.npz")
+    loaded.save(tmp_path / "b.npz", ("tiny", 0))
+    made(seed=1).save(tmp_path / "c.npz", ("tiny", 0))
     first, again, other = ((tmp_path / name).read_bytes() for name in ("deep/a.npz", "b.npz", "c.npz"))
     assert first == again != other
 
@@ -92,7 +92,7 @@ def test_a_missing_file_names_the_step_that_makes_it(tmp_path):
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 def test_a_truncated_file_is_refused(tmp_path, share):
     path = tmp_path / "seed0.npz"
-    made().save(path)
+    made().save(path, ("tiny", 0))
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
     with pytest.raises(InputError, match="not a readable npz" if share else "is empty"):
@@ -100,7 +100,7 @@ def test_a_truncated_file_is_refused(tmp_path, share):
 
 
 def test_a_file_of_no_samples_is_refused(tmp_path):
-    made([], np.array([], "U5")).save(tmp_path / "seed0.npz")
+    made([], np.array([], "U5")).save(tmp_path / "seed0.npz", ("tiny", 0))
     with pytest.raises(InputError, match="has no samples"):
         Outcomes.load(tmp_path / "seed0.npz")
 
@@ -160,7 +160,7 @@ def test_what_was_attached_before_stays_with_its_rows(registrations, of_registra
 
 def test_outcomes_survive_file_and_attaching_together(tmp_path, registrations, of_registrations):
     rows, outcomes, seconds, icp_seconds = of_registrations
-    outcomes.save(tmp_path / "seed0.npz")
+    outcomes.save(tmp_path / "seed0.npz", ("tiny", 0))
     write_seconds(tmp_path / "seed0.csv", outcomes, seconds, icp_seconds)
     loaded = Outcomes.load(tmp_path / "seed0.npz")
     attached = loaded.attach_to(registrations, *read_seconds(tmp_path / "seed0.csv", loaded))

@@ -81,9 +81,10 @@ rule pretrain_encoder:
             wildcards, REAL_WORLD["pretraining"]
         ),
         seed=SEEDS[0],
+        sources=PRETRAINING_SOURCES,
     shell:
         "python -m gpca train --threads {threads} --registrations {input.registrations} "
-        "--source pretraining --seed {params.seed} --settings {params.settings:q} "
+        "--registrations-of {params.sources} --source pretraining --seed {params.seed} --settings {params.settings:q} "
         "--out {output.weights} --curve {output.curve} 2> {log}"
 
 
@@ -149,9 +150,12 @@ rule embed:
         runtime=60,
     params:
         settings=encoder_settings,
+        encoder_of=lambda wildcards: (
+            FRAMES if wildcards.source in NAMES["condition"] else wildcards.source
+        ),
     shell:
         "python -m gpca embed --threads {threads} --registrations {input.registrations} "
-        "--registration-timings {input.timings} --encoder {input.weights} "
+        "--registration-timings {input.timings} --encoder {input.weights} --encoder-of {params.encoder_of} "
         "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
         "--out {output.embeddings} --timings {output.timings} 2> {log}"
 

@@ -52,6 +52,11 @@ rule attribute:
         explainer=lambda wildcards: explainer_of(wildcards.explainer, NAMES),
         settings=lambda wildcards: as_json(explainer_settings(wildcards)),
         seeds=SEEDS,
+        files_of=lambda wildcards: (
+            ["--files-of", FRAMES, "--files-seed", SEEDS[0]]
+            if wildcards.source == ONE_ENCODER
+            else []
+        ),
         attached=lambda wildcards, input: [
             word
             for option in files_behind(wildcards.explainer, NAMES)
@@ -60,7 +65,7 @@ rule attribute:
     shell:
         "python -m gpca attribute --threads {threads} --explainer {params.explainer} "
         "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
-        "--registrations {input.registrations} {params.attached} "
+        "--registrations {input.registrations} {params.files_of} {params.attached} "
         "--predictions {output.predictions} --timings {output.timings} 2> {log}"
 
 

@@ -84,6 +84,7 @@ rule instances:
             }
         ),
         source=FRAMES,
+        name="{frames}",
         frames=lambda wildcards, input: (
             ["--scenes", input.scenes]
             if input.get("scenes")
@@ -91,7 +92,7 @@ rule instances:
         ),
         surface_points=config["objects"]["surface_points"],
     shell:
-        "python -m gpca instances --threads {threads} --source {params.source} --settings {params.settings:q} "
+        "python -m gpca instances --threads {threads} --source {params.source} --name {params.name} --settings {params.settings:q} "
         "{params.frames:q} --surface-points {params.surface_points} --out {output.instances} --objects {output.objects} 2> {log}"
 
 
@@ -124,9 +125,10 @@ rule register_frames:
             }
         ),
         source=FRAMES,  # conditions have its splits and draws
+        name="{frames}",
     shell:
         "python -m gpca frame_registrations --threads {threads} --instances {input.instances} "
-        "--objects {input.objects} --source {params.source} --seed {wildcards.seed} --settings {params.settings:q} "
+        "--objects {input.objects} --source {params.source} --name {params.name} --seed {wildcards.seed} --settings {params.settings:q} "
         "--out {output.registrations} --poses {output.poses} --timings {output.timings} 2> {log}"
 
 

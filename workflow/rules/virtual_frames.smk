@@ -3,9 +3,10 @@ from gpca.frames.source import VIRTUAL
 
 SCENES = REAL_WORLD["scenes"]
 TABLES = {name: (REAL_WORLD["virtual"] or SCENES)[name] for name in ("count", "views")}
+PRETRAINING_SOURCES = [*SOURCES, *([VIRTUAL] if REAL_WORLD["virtual"] else [])]
 PRETRAINED_ON = [
     f"<results>/registrations/{source}/seed{SEEDS[0]}.npz"
-    for source in (*SOURCES, *([VIRTUAL] if REAL_WORLD["virtual"] else []))
+    for source in PRETRAINING_SOURCES
 ]
 
 
@@ -39,6 +40,7 @@ use rule instances as virtual_instances with:
     params:
         settings=as_json({"initial_pose": {"form": "true_pose"}}),
         source=VIRTUAL,
+        name=VIRTUAL,
         frames=lambda wildcards, input: ["--scenes", input.scenes],
         surface_points=config["objects"]["surface_points"],
 
@@ -67,3 +69,4 @@ use rule register_frames as register_virtual_frames with:
             }
         ),
         source=VIRTUAL,
+        name=VIRTUAL,

@@ -11,6 +11,7 @@ import numpy as np
 from gpca.attribution.predictions import read_predictions
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
+from gpca.frames.sample_file import FRAME_COLUMNS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds
 from gpca.reporting.figures.style import CONCEPT_COLOURS, SMALL_PT
@@ -27,7 +28,7 @@ def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataF
     Raises:
         InputError: an unusable file, or files of different samples.
     """
-    poses = read_csv(poses_csv, POSE_COLUMNS)
+    poses = read_csv(poses_csv, POSE_COLUMNS, others=FRAME_COLUMNS)
     predictions = read_predictions(predictions_csv)
     if not (poses[["split", "sample"]].to_numpy() == predictions[["split", "sample"]].to_numpy()).all():
         raise InputError(

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from gpca.comparison.verdicts import CLOSE, NOT_REPRODUCED, REPRODUCED
+from gpca.comparison.verdicts import CLOSE, COMPARISON_COLUMNS, NOT_REPRODUCED, REPRODUCED
 from gpca.csv_file import read_csv
 from gpca.errors import InputError
 
@@ -46,13 +46,13 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
     """
     if not Path(path).is_file():
         return None
-    rows = read_csv(path, _COLUMNS)
+    rows = read_csv(path, _COLUMNS, others=COMPARISON_COLUMNS)
     words = [_words(path, row) for row in rows.to_dict("records")]
     of_reference = False
     if reference is not None and not set(TONES) & set(rows["verdict"]):
         of_reference = True
         here = {_key(row): row["reproduced"] for row in words}
-        rows = read_csv(reference, _COLUMNS)
+        rows = read_csv(reference, _COLUMNS, others=COMPARISON_COLUMNS)
         words = [_words(reference, row) for row in rows.to_dict("records")]
         words = [row | {"this_run": here.get(_key(row), "")} for row in words]
     counts = Counter(row["group"] for row in words)

@@ -79,6 +79,7 @@ def files(clouds, tmp_path_factory):
         T_target_source_icp=np.tile(T_icp, (24, 1, 1)),
         fitness=np.ones(24),
         inlier_rmse=np.zeros(24),
+        axes=("bricks", 0),
     )
     registrations.save(folder / "registrations.npz")
     return folder, registrations, sources

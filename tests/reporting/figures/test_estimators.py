@@ -36,7 +36,7 @@ def files(tmp_path):
         0.01 * np.ones((8, 6)),
     )  # fmt: skip
     (tmp_path / "samples" / "cups").mkdir(parents=True)
-    samples.save(tmp_path / "samples/cups/seed0.npz")
+    samples.save(tmp_path / "samples/cups/seed0.npz", ("cups", 0))
     return paths, tmp_path / "samples/cups/seed0.npz"
 
 

@@ -33,7 +33,7 @@ def learned(tmp_path_factory):
     for source in SOURCES:
         path = folder / "shifted" / source / "seed0.npz"
         path.parent.mkdir(parents=True)
-        sets().save(path)
+        sets().save(path, ("tiny", 0))
         set_files.append(path)
         for name, make in MAKE.items():
             predictions.append(folder / "learners" / source / name / "seed0.csv")

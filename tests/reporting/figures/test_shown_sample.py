@@ -75,7 +75,8 @@ def test_uncertainties_of_other_samples_are_refused(stage_files, tmp_path):
     ("old", "new", "message"),
     [
         ("\n0,test,", "\n99,test,", "its samples differ from"),
-        ("bald", "doubt", "column 'bald' is missing"),
+        ("bald", "entropy_", "column 'entropy_' is unknown"),
+        ("bald,entropy", "entropy,variance_own", "column 'bald' is missing"),
         ("0.0144", "", "not finite numbers"),
         ("score_noise", "score_blur", "unknown concept|does not score"),
     ],

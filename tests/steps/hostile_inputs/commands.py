@@ -1,6 +1,6 @@
 """The step that reads each kind of file."""
 
-COMMON = ["--source", "s"]
+COMMON = ["--source", "tiny"]
 COMMANDS = {
     "objects.npz": ["registrations", *COMMON, "--seed", 0, "--objects", "objects.npz", "--out", "new.npz",
                     "--timings", "new.csv"],

@@ -23,17 +23,17 @@ def made(objects, registrations, tmp_path_factory):
     }
     offsets = np.cumsum([0, *(len(cloud) for cloud, _ in objects.clouds)])
     names = {"names": np.array(objects.names), "diameters_m": objects.diameters_m}
-    save_arrays(folder / "objects.npz", names | points | {"offsets": offsets})
+    save_arrays(folder / "objects.npz", names | points | {"offsets": offsets}, ("tiny", None))
     registrations.save(folder / "registrations.npz")
     of_samples = {"sample": registrations.sample, "split": registrations.split}
     embeddings = {"h": random.normal(size=(n, 8)), "head_logits": random.normal(size=(n, 3))}
-    save_arrays(folder / "embeddings.npz", embeddings | of_samples)
+    save_arrays(folder / "embeddings.npz", embeddings | of_samples, registrations.axes)
     outcomes = {"covariance": np.tile(np.eye(6), (n, K, 1, 1)), "uncertainty": random.normal(size=(n, K))}
     outcomes |= {"residual": np.ones((n, K)), "degenerate": np.zeros((n, K), bool), "icp_calls": np.ones((n, K), int)}
-    save_arrays(folder / "uncertainty.npz", outcomes | of_samples)
+    save_arrays(folder / "uncertainty.npz", outcomes | of_samples, registrations.axes)
     sets = {"set": np.full(n, "in_distribution"), "concept": registrations.concept, "h": embeddings["h"]}
     sets |= {"object_name": registrations.object_name, "distance": np.ones((n, len(DISTANCES)))}
-    save_arrays(folder / "shifted.npz", sets | of_samples)
+    save_arrays(folder / "shifted.npz", sets | of_samples, registrations.axes)
     lines = [f"{s},{split},0.5,0.5" for s, split in zip(registrations.sample, registrations.split, strict=True)]
     (folder / "seconds.csv").write_text("\n".join(["sample,split,seconds,icp_seconds", *lines, ""]))
     lines = [f"{s},{split},{k},0.5,0.5" for s, split in zip(*of_samples.values(), strict=True) for k in range(K)]

@@ -18,6 +18,8 @@ LINES = {
     "empty": cell(""),
     "complex": cell("0.5+1j"),
     "missing column": lambda lines: [line.rsplit(",", 1)[0] for line in lines],
+    "unknown column": lambda lines: [f"{line},{i}" for i, line in enumerate(lines)],
+    "unknown split": lambda lines: [*lines[:3], lines[3].replace("train", "tset"), *lines[4:]],
     "missing row": lambda lines: lines[:-1],
     "row twice": lambda lines: [*lines, lines[-1]],
     "too wide": lambda lines: [lines[0], *(f"7,{line}" for line in lines[1:])],

@@ -42,6 +42,11 @@ VALUES = {
     ("objects.npz", "complex points", "complex"): {"points_m": lambda p: p + 1j},
     ("objects.npz", "points of text", "type <U"): {"points_m": lambda p: p.astype(str)},
     ("objects.npz", "points of dates", "type datetime"): {"points_m": lambda p: p.astype("datetime64[s]")},
+    ("objects.npz", "points of half precision", "float16, not float32 or float64"): {
+        "points_m": lambda p: p.astype(np.float16)
+    },
+    ("objects.npz", "an empty name", "a name that is empty"): {"names": at(1, value="")},
+    ("objects.npz", "a name of two lines", "does not fit on one line"): {"names": at(1, value="a\nb")},
     ("objects.npz", "points far from the origin", "centered"): {"points_m": lambda p: p + 5},
     ("objects.npz", "normals of no length", "normal"): {"normals": lambda n: 0 * n},
     ("objects.npz", "long normals", "normal"): {"normals": lambda n: 2 * n},
@@ -69,7 +74,16 @@ VALUES = {
     ("registrations.npz", "a negative severity", "severity_noise"): {"severity_noise": lambda s: s - 1},
     ("registrations.npz", "names of numbers", "concept"): {"concept": lambda c: np.arange(len(c))},
     ("registrations.npz", "offsets of halves", "offsets"): {"offsets": lambda o: o + 0.5},
+    ("registrations.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(3, value="tset")},
+    ("registrations.npz", "an object without a name", "a name that is empty"): {"object_name": at(3, value=" ")},
+    ("registrations.npz", "poses of long doubles", "type float128, not float32 or float64"): {
+        "T_target_source_icp": lambda T: T.astype(np.longdouble)
+    },
     # of embeddings
+    ("embeddings.npz", "half precision", "float16"): {"h": lambda h: h.astype(np.float16)},
+    ("embeddings.npz", "long doubles", "float128"): {"h": lambda h: h.astype(np.longdouble)},
+    ("embeddings.npz", "bytes of another order", "type >f8"): {"h": lambda h: h.astype(">f8")},
+    ("embeddings.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(3, value="tset")},
     ("embeddings.npz", "complex numbers", "complex"): {"h": lambda h: h + 1j},
     ("embeddings.npz", "huge numbers", "above 1e+15"): {"h": lambda h: h * 1e200},
     ("embeddings.npz", "infinity", "infinity"): {"h": at(3, 3, value=np.inf)},
@@ -86,7 +100,11 @@ VALUES = {
     ("uncertainty.npz", "other conditions", "conditions"): {
         name: lambda a: a[:, :2] for name in ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
     },
+    ("uncertainty.npz", "long doubles", "float128"): {"covariance": lambda c: c.astype(np.longdouble)},
+    ("uncertainty.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(-1, value="tset")},
     # of shifted sets
+    ("shifted.npz", "half precision", "float16"): {"h": lambda h: h.astype(np.float16)},
+    ("shifted.npz", "an unknown split", "the split 'tset', which is neither"): {"split": at(-1, value="tset")},
     ("shifted.npz", "negative distances", "negative"): {"distance": lambda d: -d},
     ("shifted.npz", "unknown sets", "unknown set"): {"set": lambda s: np.full_like(s, "x")},
     ("shifted.npz", "no training samples", "training"): {"split": lambda s: np.full_like(s, "test")},

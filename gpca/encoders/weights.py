@@ -1,0 +1,70 @@
+"""Files of weights: an encoder with its head, and the source and the seed that it was trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from gpca.axes import Axes, require_axes
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import read_tensors, require_like, write_tensors
+from gpca.encoders.training import Classifier, make_model
+from gpca.errors import InputError
+from gpca.limits import require_file
+from gpca.pairs.perturbation import CONCEPTS
+
+
+def write_weights(path: str | Path, model: Classifier, axes: Axes) -> None:
+    """Write what :func:`load_model` reads; `axes` are the source and the seed of the training samples."""
+    source, seed = axes
+    write_tensors(path, {"weights": model.state_dict(), "source": source, "seed": seed})
+
+
+def load_model(
+    path: Path,
+    settings: EncoderSettings,
+    classes: tuple[str, ...] = CONCEPTS,
+    axes: Axes | None = None,
+    unlike: Axes | None = None,
+    step: str = "train",
+) -> Classifier:
+    """Load encoder and head as the steps that train wrote them, ready for inference.
+
+    Args:
+        path: the file.
+        settings: those that it was trained with.
+        classes: those of its head.
+        axes: the source and the seed that it has to be of; it may be of any where this is None.
+        unlike: the source and the seed that it must not be of.
+        step: that writes it.
+
+    Raises:
+        InputError: missing, damaged, pickled or another encoder's weights, or those of another source or seed.
+    """
+    model = make_model(settings, classes)
+    made_by = f"python -m gpca {step}"
+    remedy = f"regenerate them with '{made_by}'"
+    require_file(path, "no such weights", remedy)
+    wrong = f"not the weights of backbone '{settings.backbone}'"
+    try:
+        content = read_tensors(path)
+        state, found = _parts(content)
+        require_like(state, model.state_dict(), "network")
+    except ValueError as fault:
+        raise InputError(path, f"{wrong}, or damaged ({fault})", remedy) from fault
+    except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
+        raise InputError(path, wrong, remedy) from fault
+    require_axes(path, found, axes, made_by)
+    if found == unlike:
+        raise InputError(path, "was trained on the same samples", "give weights of another source or seed")
+    model.load_state_dict(state)
+    return model.eval()
+
+
+def _parts(content: object) -> tuple[Mapping, Axes]:
+    if not isinstance(content, Mapping) or set(content) != {"weights", "source", "seed"}:
+        raise ValueError("it does not say of which source and seed it is")
+    source, seed = content["source"], content["seed"]
+    if type(source) is not str or type(seed) is not int:
+        raise ValueError("its source or seed is none")
+    return content["weights"], (source, seed)
