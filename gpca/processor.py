@@ -3,6 +3,11 @@
 OpenBLAS, MKL, NumPy, torch, oneDNN and numba choose their code by the processor that they find, and each choice rounds
 in its own way; ICP then turns a last digit into another pose. So all are held to one level that every x86-64 machine of
 the last ten years has, x86-64-v3 (AVX2 and FMA), and MKL to the only code that it runs on any vendor's processor.
+
+Pins choose the code, but not what an instruction does. ``rsqrtps`` and ``rcpps`` are estimates that each vendor defines
+by a table of its own, and MKL starts some of its functions from them at every level. So `gpca.elementary` stands in for
+those, Adam is fused, and ``tests/vendor_guard.py`` fails where a step calls one of them. Nor do pins reach Open3D,
+small_gicp and other libraries that are compiled for one level, or whatever a plugin brings along.
 """
 
 from __future__ import annotations

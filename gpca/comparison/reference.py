@@ -1,8 +1,9 @@
 """Whether a run's numbers are a reference run's: CSV by CSV, to the byte, within what rounding does, or not at all.
 
-Another processor, or other libraries, round otherwise. A trained encoder then decides some samples otherwise: of n
-samples on which the two runs differ with probability d, the difference of two shares has the standard deviation
-√(d / n), so what is allowed follows from n (docs/comparison.md).
+Other libraries, or a processor below the common level, round otherwise. A trained encoder then decides some samples
+otherwise: of n samples on which the two runs differ with probability d, the difference of two shares has the standard
+deviation √(d / n), so what is allowed follows from n (docs/comparison.md). Every value is judged by itself: one that
+differs by more makes its file different, however many agree.
 """
 
 from __future__ import annotations
@@ -30,11 +31,10 @@ class Allowance:
 
     Attributes:
         tolerances: the largest difference, for each kind in `KINDS`.
-        half_widths: or so many half-widths of the reference's 95 % interval.
-        flipped: or what follows from the share of samples that another rounding may decide otherwise,
-        deviations: and so many standard deviations of their balance;
+        flipped: of a share of samples, or what follows from the share that another rounding may decide otherwise,
+        deviations: and so many standard deviations of their balance.
+        half_widths: of anything else, or so many half-widths of the reference's 95 % interval.
         ratio: or so much of a number of labels or epochs, which a target reached one step later changes.
-        beyond: the share of a file's values that may differ by more, as a learning curve that reaches its target does.
     """
 
     tolerances: Mapping[str, float]
@@ -42,19 +42,19 @@ class Allowance:
     flipped: float
     deviations: float
     ratio: float
-    beyond: float
 
     def of(self, file: str, mean: Mean) -> float:
         """Return the largest difference from a mean of the reference's file that rounding explains."""
         kind = kind_of(file, mean.quantity)
         if kind not in self.tolerances:
             raise InputError("config key reference.tolerances", f"has no kind '{kind}'", "add its tolerance")
-        allowed = max(self.tolerances[kind], self.half_widths * mean.half_width)
+        allowed = self.tolerances[kind]
+        if mean.samples and mean.unit:
+            # Not its interval: that of a few seeds is wider than anything that the samples can explain.
+            return max(allowed, mean.unit * self.deviations * math.sqrt(self.flipped / mean.samples))
         if kind == "count" and not mean.unit:
             allowed = max(allowed, self.ratio * abs(mean.value))
-        if mean.samples and mean.unit:
-            allowed = max(allowed, mean.unit * self.deviations * math.sqrt(self.flipped / mean.samples))
-        return allowed
+        return max(allowed, self.half_widths * mean.half_width)
 
 
 @dataclass(frozen=True)
@@ -115,11 +115,10 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
     beyond = [key for key in differing if excess[key] > 1]
     worst = max(differing, key=lambda key: excess[key])
     largest = _difference(here[worst].value - there[worst].value, allowance.of(file, there[worst]), there[worst])
-    told = f"{len(differing)} of {len(there)} values differ"
+    counts = f"{len(differing)} of {len(there)} values differ"
     if beyond:
-        told = f"{told}, {len(beyond)} by more than rounding usually explains"
-    too_many = len(beyond) > allowance.beyond * len(there)
-    return FileCheck(file, DIFFERENT if too_many else ROUNDING, f"{told}; at most, {_named(worst)}: {largest}")
+        counts = f"{counts}, {len(beyond)} by more than rounding explains"
+    return FileCheck(file, DIFFERENT if beyond else ROUNDING, f"{counts}; the worst, {_named(worst)}: {largest}")
 
 
 def _excess(difference: float, allowed: float) -> float:

@@ -137,5 +137,4 @@ class Reference:
     flipped: Annotated[float, Bounds(minimum=0, maximum=1)]
     deviations: NotNegative
     ratio: Annotated[float, Bounds(minimum=0, maximum=1)]
-    beyond: Annotated[float, Bounds(minimum=0, maximum=1)]
     tolerances: ReferenceTolerances

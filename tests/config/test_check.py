@@ -21,7 +21,7 @@ def test_the_shipped_configs_are_sound(name):
 def test_local_data_comes_before_the_download(tmp_path):
     (tmp_path / "bop/lm/models").mkdir(parents=True)
     for number in range(1, 16):
-        (tmp_path / f"bop/lm/models/obj_{number:06d}.ply").touch()
+        (tmp_path / f"bop/lm/models/obj_{number:06d}.ply").write_text("ply")
     linemod, ycb = map(run_config.check(load("real") | {"data_dir": str(tmp_path)}).get, ("linemod", "ycb"))
     assert (linemod["origin"], linemod["location"], ycb["origin"]) == ("local", str(tmp_path / "bop/lm"), "download")
 

@@ -255,7 +255,7 @@ VALUES = [
 def test_a_value_that_cannot_be(tmp_path, config, words):
     for name in ("parts/models/obj_000001.ply", "parts/parts/000001/scene_gt.json"):
         (tmp_path / name).parent.mkdir(parents=True)
-        (tmp_path / name).touch()
+        (tmp_path / name).write_text("ply")
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "link").symlink_to("/dev")
     os.mkfifo(tmp_path / "fifo")
