@@ -9,7 +9,7 @@ import pytest
 from gpca.arrays import load_arrays
 from gpca.csv_file import read_csv
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import load_model
+from gpca.encoders.weights import load_model
 from gpca.errors import InputError
 from gpca.files import read_image
 from gpca.json_file import read_json

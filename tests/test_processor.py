@@ -79,9 +79,9 @@ def chain() -> list[list[str]]:
         words("frame_registrations", source="frames", seed=0, settings={"train": 9, "test": 6, "cloud_points": 128,
               "test_share": 0.4}, instances="instances.npz", objects="seen.npz", out="frames.npz", poses="poses.csv",
               timings="frame_icp.csv"),
-        words("objects", source="linemod", settings={"kind": "procedural", "family": "linemod"}, surface_points=400,
+        words("objects", source="other", settings={"kind": "procedural", "family": "linemod"}, surface_points=400,
               out="procedural.npz"),
-        words("registrations", source="linemod", seed=0, settings={"train": 12, "test": 6, "cloud_points": 128},
+        words("registrations", source="other", seed=0, settings={"train": 12, "test": 6, "cloud_points": 128},
               objects="procedural.npz", out="other.npz", timings="other_icp.csv"),
         *(arguments(step) for step in STEP_OPTIONS if step not in LEFT_OUT),
     ]  # fmt: skip
