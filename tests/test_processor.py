@@ -13,7 +13,7 @@ from gpca import processor
 from gpca.code_files import ROOT
 from gpca.processor import COMMON_LEVEL, INSTRUCTIONS_VARIABLE, describe, instructions, pin_instructions, prepare
 
-from .steps.command_lines import STEP_OPTIONS, arguments
+from .steps.command_lines import arguments, every_step
 
 # Each says of one library that it runs on another processor: without AVX, with AVX-512, or one of the other vendor.
 OTHER_PROCESSOR = {
@@ -79,11 +79,9 @@ def chain() -> list[list[str]]:
         words("frame_registrations", source="frames", seed=0, settings={"train": 9, "test": 6, "cloud_points": 128,
               "test_share": 0.4}, instances="instances.npz", objects="seen.npz", out="frames.npz", poses="poses.csv",
               timings="frame_icp.csv"),
-        words("objects", source="other", settings={"kind": "procedural", "family": "linemod"}, surface_points=400,
+        words("objects", source="linemod", settings={"kind": "procedural", "family": "linemod"}, surface_points=400,
               out="procedural.npz"),
-        words("registrations", source="other", seed=0, settings={"train": 12, "test": 6, "cloud_points": 128},
-              objects="procedural.npz", out="other.npz", timings="other_icp.csv"),
-        *(arguments(step) for step in STEP_OPTIONS if step not in LEFT_OUT),
+        *every_step(LEFT_OUT),
     ]  # fmt: skip
     settings = {"backbone": "pointnext", "draw_points": 64, "draws": 1, "epochs": 1, "batch_size": 6}
     lines.append(words("train", **tiny, settings=settings, registrations="registrations.npz", out="pointnext.pt",
@@ -138,7 +136,7 @@ def test_two_processors_give_the_same_bytes_and_would_not_without_the_pins(here,
     there, _ = made_on(tmp_path / "there", chain(), **OTHER_PROCESSOR)
     assert [name for name in own if own[name] != there.get(name)] == []
     assert len(own) == len(there)
-    few = [line for line in chain() if line[0] in ("objects", "registrations", "train", "embed", "attribute")][:7]
+    few = [line for line in chain() if line[0] in ("objects", "registrations", "train", "embed", "attribute")][:9]
     compiled = {name: "" for name in OTHER_PROCESSOR if name.startswith("NUMBA")}  # again, for nothing else
     native, _ = made_on(tmp_path / "native", few, **OTHER_PROCESSOR | compiled, **{INSTRUCTIONS_VARIABLE: "native"})
     different = {name for name in native if own[name] != native[name]}

@@ -198,6 +198,14 @@ STEP_OPTIONS = {
 }  # fmt: skip
 
 
+# The files of a second source that some steps read besides.
+OF_ANOTHER_SOURCE = {
+    "objects": {"--out": "objects_other.npz"},
+    "registrations": {"--objects": "objects_other.npz", "--out": "other.npz", "--timings": "other_icp.csv"},
+    "train": {"--registrations": "other.npz", "--out": "other.pt", "--curve": "other_curve.csv"},
+}
+
+
 def arguments(step, changes=()):
     """The command line of a step, with some options changed and those that are None left out."""
     words = [step]
@@ -206,6 +214,17 @@ def arguments(step, changes=()):
             values = value if isinstance(value, list) else [json.dumps(value) if isinstance(value, dict) else value]
             words += [name, *map(str, values)]
     return words
+
+
+def every_step(left_out=()):
+    """The words of every step, one after the other, but for those left out; some are run for a second source, too."""
+    lines = []
+    for step in STEP_OPTIONS:
+        if step not in left_out:
+            lines.append(arguments(step))
+            if step in OF_ANOTHER_SOURCE:
+                lines.append(arguments(step, {"--source": "other", **OF_ANOTHER_SOURCE[step]}))
+    return lines
 
 
 def content(folder):

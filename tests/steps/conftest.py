@@ -6,14 +6,7 @@ import pytest
 
 from gpca.__main__ import main
 
-from .command_lines import STEP_OPTIONS, arguments
-
-# The files of a second source that some steps read besides.
-OF_ANOTHER_SOURCE = {
-    "objects": {"--out": "objects_other.npz"},
-    "registrations": {"--objects": "objects_other.npz", "--out": "other.npz", "--timings": "other_icp.csv"},
-    "train": {"--registrations": "other.npz", "--out": "other.pt", "--curve": "other_curve.csv"},
-}
+from .command_lines import every_step
 
 
 @pytest.fixture(scope="session")
@@ -28,10 +21,8 @@ def made(tmp_path_factory):
     (folder / "answers.txt").write_text("overlap\nocclusion\n/skip\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        for step in STEP_OPTIONS:
-            assert main(arguments(step)) == 0
-            if step in OF_ANOTHER_SOURCE:
-                assert main(arguments(step, {"--source": "other", **OF_ANOTHER_SOURCE[step]})) == 0
+        for words in every_step():
+            assert main(words) == 0
     return folder
 
 
