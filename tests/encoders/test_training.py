@@ -133,7 +133,7 @@ def test_weights_survive_the_file_and_others_are_refused(tmp_path, unbroken):
     [
         ({"backbone": "dgcn"}, "backbone 'dgcn': unknown; choose one of .*dgcnn"),
         ({"options": {"neighbours": 8}}, "backbone 'dgcnn': .*neighbours"),
-        ({"draw_points": 16, "options": {"k": 20}}, "cloud of 16 points: has fewer than 20 neigh"),
+        ({"draw_points": 16, "options": {"k": 20}}, "20 neighbors are too many for draws of 16 points"),
     ],
 )
 def test_wrong_settings_are_refused(registrations, changed, expected):
