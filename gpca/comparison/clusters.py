@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.attribution.bootstrap import bounds, pigeonhole_weights
+from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.metrics import ALL, PREDICTED_AS, source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import Counterpart, Number
