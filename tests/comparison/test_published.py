@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from gpca.active_learning.acquisition import STRATEGIES
-from gpca.classifier.kernel_metrics import setting_name
+from gpca.classifier.kernel_grid import setting_name
 from gpca.code_files import ROOT
 from gpca.comparison import published
 from gpca.comparison.published import PUBLISHED, TABLES, TEXT, UNITS, printed_seconds, read_lines, read_published
