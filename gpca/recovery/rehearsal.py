@@ -13,10 +13,10 @@ from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.recovery.chances import Trial
 from gpca.recovery.episodes import Episode, is_right
 from gpca.recovery.policy import NOTHING, RecoveryPolicy
+from gpca.recovery.settings import LoopSettings
 
 if TYPE_CHECKING:
     from gpca.recovery.loop_explainers import LoopExplainers
-from gpca.recovery.settings import LoopSettings
 
 
 @dataclass(frozen=True)
