@@ -20,6 +20,7 @@ TOP = {
         "code_files",
         "compilation",
         "csv_file",
+        "elementary",
         "environment",
         "errors",
         "files",

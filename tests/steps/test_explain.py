@@ -25,7 +25,7 @@ FAULTS = [
     (untouched, {"--method": "icp"}, r"explain: registration method 'icp': unknown; choose one of fgr, "),
     (untouched, {"--uncertainty": "gauss"}, r"explain: estimator 'gauss': unknown; choose one of .*brossard"),
     (untouched, {"--uncertainty": "cello"}, r"explain: estimator 'cello': learns from registrations"),
-    (untouched, {"--uncertainty": ""}, r"estimator '': unknown"),
+    (untouched, {"--uncertainty": ""}, r"--uncertainty: '' is empty or does not fit on one line"),
     (untouched, {"meshes/cone.ply": ["meshes/cone.ply"]}, r"explain: 2 sources need one line each; add --json-lines"),
     (untouched, {"--settings": {"draws": 3}}, r"--settings: is not used by explain"),
 ]

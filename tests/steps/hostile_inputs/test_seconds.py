@@ -35,4 +35,4 @@ def test_seconds_that_cannot_be_are_refused(fault, name, folder):
     lines = (folder / name).read_text().splitlines()
     text = "".join(f"{line}\n" for line in LINES[fault](lines))
     (folder / name).write_bytes(text.encode("utf-8", "surrogateescape"))
-    refusal(COMMANDS[name], folder, name, "regenerate it")
+    refusal(COMMANDS[name], folder, name, "make it with snakemake" if fault == "nothing" else "regenerate it")
