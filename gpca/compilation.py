@@ -74,7 +74,9 @@ def njit(**options: Any) -> Callable[[Callable], Any]:
     def decorate(function: Callable) -> Any:
         compiled = numba.njit(**options)(function)
         if options.get("cache") and compiled is not function:  # as it is where NUMBA_DISABLE_JIT is set
-            compiled._cache._cache_file._source_stamp = _stamp(function.__module__)
+            # Numba has no public name for it. It is read first, so that a numba which keeps it elsewhere fails here.
+            index = compiled._cache._cache_file
+            index._source_stamp = (index._source_stamp, _stamp(function.__module__))
         return compiled
 
     return decorate

@@ -8,7 +8,6 @@ SystemError instead. So the signal is remembered besides, and :func:`raise_if_in
 from __future__ import annotations
 
 import signal
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -19,12 +18,11 @@ _interrupted = False
 def certain_interrupts() -> Iterator[None]:
     """Let the block end with KeyboardInterrupt if Ctrl-C falls into it, whatever became of the exception then.
 
-    Where SIGINT is ignored, as in the background of a shell, or handled by somebody else, or where this is not the
-    main thread, which alone may handle signals, the block runs as it would without.
+    Where SIGINT is ignored, as in the background of a shell, or handled by somebody else, the block runs as it would
+    without.
     """
     global _interrupted
-    main_thread = threading.current_thread() is threading.main_thread()
-    if not main_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
     _interrupted = False

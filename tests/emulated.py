@@ -24,7 +24,7 @@ def fits() -> dict[str, str]:
 
     random = np.random.default_rng(0)
     weights = torch.from_numpy(random.normal(size=5000).astype(np.float32)).requires_grad_()
-    optimizer = Adam([weights], 0.01, weight_decay=0.01)
+    optimizer = Adam([weights], 0.01)
     for _ in range(5):
         optimizer.zero_grad()
         (weights * torch.from_numpy(random.normal(size=5000).astype(np.float32))).square().sum().backward()

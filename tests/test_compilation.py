@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from gpca.compilation import NOTICE
+from gpca.compilation import NOTICE, njit
 
 from .documents import ROOT
 
@@ -92,3 +92,9 @@ def test_a_loop_is_compiled_anew_when_a_module_beneath_its_own_has_changed(tmp_p
         assert done.returncode == 0, done.stderr[-2000:]
         said.append(done.stdout.strip())
     assert said == ["20", "20 1", "30"]
+
+
+def test_a_numba_that_keeps_its_stamp_elsewhere_fails_at_once(monkeypatch):
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile", lambda **_: type("Renamed", (), {})())
+    with pytest.raises(AttributeError, match="_source_stamp"):
+        njit(cache=True)(lambda x: x)

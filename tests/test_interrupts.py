@@ -2,7 +2,6 @@
 
 import ctypes
 import signal
-import threading
 import weakref
 
 import pytest
@@ -135,16 +134,3 @@ def test_who_ignores_or_handles_the_signal_keeps_doing_so(handler):
         ctrl_c()
         assert list(progress(range(3), "items")) == [0, 1, 2]
     assert signal.getsignal(signal.SIGINT) is handler
-
-
-def test_another_thread_than_the_main_one_runs_as_it_would_without():
-    done = []
-
-    def work():
-        with certain_interrupts():
-            done.extend(progress(range(3), "items"))
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert done == [0, 1, 2]

@@ -144,7 +144,7 @@ from gpca.provenance import record_provenance
 from gpca.reporting.figures.style import MATPLOTLIBRC
 from gpca.reporting.page.page import TEMPLATES
 from gpca.settings import SCHEMA, load_schema
-assert load_schema() and len(read_published(PUBLISHED))
+assert load_schema() and len(read_published())
 files = [PUBLISHED, REASONS, MATPLOTLIBRC, TEMPLATES / "index.html.jinja", SCHEMA, *code_files("gpca.steps.attribute")]
 for file in files:
     assert Path(file).is_file(), file

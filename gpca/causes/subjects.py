@@ -15,8 +15,8 @@ from gpca.causes.shapley import NONE
 from gpca.errors import InputError
 from gpca.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
+from gpca.objects.surface import instance_of
 from gpca.objects.symmetry import find_symmetries
-from gpca.objects.views import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.seeds import generator

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
-from gpca.attribution.metrics import source_method_seed
+from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.classifier.settings import Draws, Kernel, LearningRate
 from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gpca.pairs.dataset import Registrations
 
 MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
+TABLE = "kernels"  # `table` of the tidy rows reads this
 GRID_COLUMNS = ("kernel", "learning_rate", "iterations", *MEASURES)
 
 
@@ -104,3 +105,25 @@ def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
     if not parts:
         raise InputError("kernels", "no files were given", "name a source in kernel_grid.sources")
     return pd.concat(parts, ignore_index=True)
+
+
+def collect_grids(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return the tidy metrics (`MEASURES`) of files named `…/{source}/seed{seed}.csv`.
+
+    Their `method` is as :func:`setting_name` has it.
+
+    Raises:
+        InputError: where :func:`read_grids` raises one.
+    """
+    records = [
+        (TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations), measure, ALL, row.seed, value)
+        for row in read_grids(files).itertuples()
+        for measure in MEASURES
+        for value in [float(getattr(row, measure))]
+    ]
+    return tidy(records, "kernels")
+
+
+def setting_name(kernel: str, learning_rate: float, iterations: int) -> str:
+    """Return e.g. ``rbf-0.01-100``."""
+    return f"{kernel}-{learning_rate:g}-{iterations}"

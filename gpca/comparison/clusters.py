@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.attribution.bootstrap import bounds, pigeonhole_weights
+from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.metrics import ALL, PREDICTED_AS, source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import Counterpart, Number
-from gpca.objects.views import instance_of
+from gpca.objects.surface import instance_of
 from gpca.seeds import generator
 
 FOLDERS = {"metrics.csv": "predictions", "real_world.csv": "predictions", "diagnostics.csv": "learners"}

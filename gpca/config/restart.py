@@ -11,7 +11,7 @@ import os
 import shutil
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
@@ -76,35 +76,23 @@ def _clear(folder: Path, recorded: list[str], own: list[Path]) -> None:
 
 
 def _wait_for_jobs() -> None:
-    told = False
-    while jobs := " ".join(map(str, _living_jobs())):
-        if not told:
-            print(f"gpca: waiting for jobs of a killed run to end; 'kill {jobs}' ends them at once", file=sys.stderr)
-            told = True
+    if jobs := " ".join(map(str, _living_jobs())):
+        print(f"gpca: waiting for jobs of a killed run to end; 'kill {jobs}' ends them at once", file=sys.stderr)
+    while _living_jobs():
         time.sleep(1)
 
 
 def _living_jobs() -> list[int]:
-    """Processes in the working directory with the variable that the Snakefile sets for its jobs.
-
-    This process is none, nor are those that started it: a job may itself run a workflow.
-    """
-    found = []
-    here, variable = os.stat("."), f"{CONFIG_VARIABLE}=".encode()
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            inherited = (process / "environ").read_bytes().split(b"\0")
-            if any(entry.startswith(variable) for entry in inherited) and os.path.samestat(
-                (process / "cwd").stat(), here
-            ):
-                found.append(int(process.name))
-        except OSError:  # it ended meanwhile, or is somebody else's
-            continue
-    return sorted(set(found) - set(_line_of(os.getpid())))
+    """Return the processes that are jobs of this folder; none where this one is, as a job may run a workflow."""
+    jobs = [int(process.name) for process in Path("/proc").glob("[0-9]*") if _is_job(process)]
+    return [] if os.getpid() in jobs else sorted(jobs)
 
 
-def _line_of(process: int) -> Iterator[int]:
-    """Yield a process, its parent, and so on."""
-    while process > 0:
-        yield process
-        process = int(Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[1])
+def _is_job(process: Path) -> bool:
+    """Return whether a process runs in the working directory with the variable that the Snakefile sets for jobs."""
+    try:
+        variables = (process / "environ").read_bytes().split(b"\0")
+        marked = any(variable.startswith(f"{CONFIG_VARIABLE}=".encode()) for variable in variables)
+        return marked and (process / "cwd").samefile(".")
+    except OSError:  # it ended meanwhile, or is somebody else's
+        return False

@@ -1,6 +1,6 @@
 """Intervals of accuracies under the controls, and of what they lose against the paper's protocol.
 
-By the bootstrap over objects and seeds of :mod:`gpca.attribution.bootstrap`. A draw of objects and seeds is the same
+By the bootstrap over objects and seeds of :mod:`gpca.attribution.confidence`. A draw of objects and seeds is the same
 for all explainers and controls of a source, so that differences are paired, also where a control has other samples.
 """
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.bootstrap import bounds, pigeonhole_weights
+from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.controls.judged import read_controls
 from gpca.controls.metrics import auroc_error
 from gpca.controls.settings import PAPER, TRANSFER, plain_of

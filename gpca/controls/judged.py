@@ -12,7 +12,7 @@ from gpca.controls.experiment import LABELS
 from gpca.controls.settings import CONTROLS, PAPER, SEEN
 from gpca.csv_file import numbers
 from gpca.errors import InputError
-from gpca.objects.views import instance_of
+from gpca.objects.surface import instance_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.controls.settings import TRAININGS, UNSEEN, WRONG_LABELS, ControlSettings
 from gpca.encoders.settings import OF_ANY_SIZE
-from gpca.objects.views import instance_of
+from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.reading import registered_backwards

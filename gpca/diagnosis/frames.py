@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.bootstrap import pigeonhole_weights
+from gpca.attribution.confidence import pigeonhole_weights
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, labels_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.bootstrap import bounds, pigeonhole_weights
+from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.csv_file import numbers, read_csv
 from gpca.diagnosis.judged import CEILING, Judged, joined, read_judged
 from gpca.diagnosis.measures import MEASURES, SMALLER_IS_BETTER, counted, measure

@@ -15,7 +15,7 @@ from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, labels_of
 from gpca.causes.truth import NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.objects.views import instance_of
+from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of_file
 

@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from gpca.encoders.edge_conv import NEGATIVE_SLOPE, EdgeConv
-from gpca.encoders.linear import PointLinear
+from gpca.encoders.layers import PointLinear
 
 
 class DGCNN(nn.Module):

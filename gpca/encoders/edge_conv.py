@@ -22,8 +22,7 @@ import torch
 from torch import nn
 
 from gpca.encoders import edge_kernels
-from gpca.encoders.batch_norm import BatchNorm
-from gpca.encoders.linear import linear, product
+from gpca.encoders.layers import BatchNorm, linear, product
 from gpca.errors import InputError
 
 NEGATIVE_SLOPE = 0.2

@@ -21,9 +21,8 @@ import torch
 from torch import nn
 
 from gpca.encoders import group_mlp_kernels as kernels
-from gpca.encoders.batch_norm import BatchNorm
 from gpca.encoders.grouping import Groups, take
-from gpca.encoders.linear import linear
+from gpca.encoders.layers import BatchNorm, linear
 
 
 class GroupMLP(nn.Module):

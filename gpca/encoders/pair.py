@@ -11,7 +11,7 @@ from torch import nn
 
 from gpca.encoders.dgcnn import DGCNN
 from gpca.encoders.edge_conv import NEGATIVE_SLOPE
-from gpca.encoders.linear import PointLinear, stacked_product
+from gpca.encoders.layers import PointLinear, stacked_product
 
 CHANNELS, MOTION = 7, 5  # numbers of a point, and of the motion
 SCALE = 0.1  # of all but the coordinates, so that neighbours in the first graph are neighbours on the surface

@@ -7,7 +7,7 @@ from torch import nn
 
 from gpca.encoders.group_mlp import GroupMLP
 from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
-from gpca.encoders.linear import PointLinear
+from gpca.encoders.layers import PointLinear
 
 STAGES = 4
 

@@ -12,9 +12,8 @@ from gpca.active_learning.rounds import Task, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
-from gpca.model.labelling_times import time_labelling
 from gpca.model.runtime_file import COMPONENTS, RUNTIME_COLUMNS
-from gpca.model.stage_times import CloudPair, time_explanations, time_stages
+from gpca.model.stage_times import CloudPair, time_explanations, time_labelling, time_stages
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.dataset import Registrations
 from gpca.processor import cpu_name

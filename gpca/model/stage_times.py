@@ -1,22 +1,29 @@
-"""The seconds of the stages of one explanation, each measured by itself, and those of whole explanations."""
+"""The seconds of the stages of one explanation, of whole explanations, and of one round of active learning."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from copy import copy
 from functools import partial
 from time import perf_counter
 from typing import TypeVar
 
 import numpy as np
 
+from gpca.active_learning.acquisition import select
+from gpca.active_learning.rounds import Task, pool_of
+from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.icp import ICP
 from gpca.alignment.rigid import transform
 from gpca.attribution.scores import summarise_draws
+from gpca.classifier.gpc import GPC
+from gpca.classifier.latents import Projection
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 
+STRATEGY = "bald_kmeans"  # of active learning, the paper's
 Result = TypeVar("Result")
 CloudPair = tuple[np.ndarray, np.ndarray]  # source and target (N, 3), in diameters
 Times = Iterator[tuple[tuple[str, str], float]]  # (component, device) and its seconds
@@ -65,3 +72,20 @@ def _draws(model: Model, h_1_d: np.ndarray, random: np.random.Generator) -> np.n
     mean_1_C, deviation_1_C = model.gpc.posterior(h_1_d)
     shape = (model.gpc.settings.draws, 1, mean_1_C.shape[1])
     return mean_1_C + deviation_1_C * random.normal(size=shape)
+
+
+def time_labelling(
+    task: Task[Projection], gpc: GPC, settings: ActiveLearningSettings, random: np.random.Generator
+) -> Times:
+    """Measure BALD selection from the whole pool, and the update of a copy of the classifier.
+
+    Args:
+        task: projected by `gpc`.
+    """
+    left = np.arange(len(task.pool))
+    chosen, elapsed = timed(lambda: select(STRATEGY, pool_of(task, gpc, left, []), settings.batch, random))
+    yield ("bald", "CPU"), elapsed
+    more = task.pool.h[chosen]
+    labels = task.pool.concept_N[chosen]
+    known = copy(gpc)
+    yield ("retraining", "CPU"), timed(lambda: known.update(more, labels, settings.iterations, settings.tolerance))[1]

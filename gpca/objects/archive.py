@@ -13,12 +13,12 @@ import tarfile
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PureWindowsPath
-from typing import IO
+from typing import IO, Any
 
 from gpca.errors import InputError
 from gpca.files import sha256_of_file, whole_file
@@ -28,13 +28,6 @@ from gpca.limits import LARGEST_FILE_BYTES, is_bounded, require_file
 LARGEST_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
 LONGEST_HEADER = 2**20  # bytes of what comes before a member, such as its long name; tarfile reads it as a whole
 REMEDY = "delete it and fetch it again, or check the url"
-_HEADERS = (
-    tarfile.XHDTYPE,
-    tarfile.XGLTYPE,
-    tarfile.SOLARIS_XHDTYPE,
-    tarfile.GNUTYPE_LONGNAME,
-    tarfile.GNUTYPE_LONGLINK,
-)
 _DAMAGE = (tarfile.TarError, zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zlib.error, NotImplementedError)
 
 
@@ -67,10 +60,12 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterat
     path = Path(path)
     require_file(path, "no such file", "check url or files in the config", math.inf)
     with _damage_named(path):
-        archive, list_members = _open(path)
+        archive = _open(path)
     with archive:
         with _damage_named(path):
-            members = list_members(archive, path, largest_bytes)
+            members = _checked(
+                path, largest_bytes, _zipped(archive) if isinstance(archive, zipfile.ZipFile) else _tarred(archive)
+            )
         yield members
 
 
@@ -155,14 +150,12 @@ def _damage_named(path: Path) -> Iterator[None]:
         raise InputError(path, f"is a truncated or damaged archive ({fault})", REMEDY) from fault
 
 
-def _open(path: Path):
+def _open(path: Path) -> zipfile.ZipFile | tarfile.TarFile:
     with path.open("rb") as file:
         magic = file.read(2)
     if magic == b"PK":
-        return zipfile.ZipFile(path), _zip_members
-    if magic == b"\x1f\x8b":
-        return tarfile.open(path, "r:gz", tarinfo=_TarInfo), _tar_members
-    return tarfile.open(path, "r:", tarinfo=_TarInfo), _tar_members
+        return zipfile.ZipFile(path)
+    return tarfile.open(path, "r:gz" if magic == b"\x1f\x8b" else "r:", tarinfo=_TarInfo)
 
 
 class _TarInfo(tarfile.TarInfo):
@@ -171,58 +164,50 @@ class _TarInfo(tarfile.TarInfo):
     @classmethod
     def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _TarInfo:
         info = super().frombuf(buf, encoding, errors)
-        if info.type in _HEADERS and info.size > LONGEST_HEADER:
+        if info.type not in tarfile.REGULAR_TYPES and info.size > LONGEST_HEADER:
             raise tarfile.ReadError(f"a header of {info.size} bytes")
         return info
 
 
-def _zip_members(archive: zipfile.ZipFile, path: Path, largest_bytes: int) -> list[Member]:
-    members = []
-    for info in archive.infolist():
-        _check(info.filename, path)
-        if stat.S_ISLNK(info.external_attr >> 16) or info.flag_bits & 1:
-            raise InputError(path, f"member '{info.filename}' is a link or encrypted", REMEDY)
-        if not is_bounded(info):
-            raise InputError(path, f"member '{info.filename}' is compressed by a method other than deflate", REMEDY)
-        if not info.is_dir():
-            members.append(Member(path, info.filename, info.file_size, partial(archive.open, info)))
-    _check_size(sum(member.size for member in members), path, largest_bytes)
+Entry = tuple[str, int, str, Callable[[], Any] | None]  # name, bytes, fault of its kind, opener unless a folder
+
+
+def _checked(path: Path, largest_bytes: int, entries: Iterable[Entry]) -> list[Member]:
+    """Return the members, each checked before the next is looked for: to find it, a bomb may have to be decompressed.
+
+    The filters of the standard library would not do: tarfile's lets links pass and, as zipfile does, strips a leading
+    slash in silence.
+    """
+    members, total = [], 0
+    for name, size, fault, open_it in entries:
+        relative = PureWindowsPath(name)  # takes / and \\ for separators and knows drives: nothing absolute escapes it
+        if relative.anchor or ".." in relative.parts:
+            raise InputError(path, f"member '{name}' would leave the folder it is unpacked into", REMEDY)
+        if fault:
+            raise InputError(path, f"member '{name}' is {fault}", REMEDY)
+        total += size
+        if total > largest_bytes:
+            raise InputError(path, f"would unpack to more than {largest_bytes / 1e9:.3g} GB", REMEDY)
+        if open_it:
+            members.append(Member(path, name, size, open_it))
     return members
 
 
-def _stream(archive: tarfile.TarFile, info: tarfile.TarInfo) -> IO[bytes]:
-    stream = archive.extractfile(info)
-    assert stream is not None  # only links and folders have none
-    return stream
+def _zipped(archive: zipfile.ZipFile) -> Iterator[Entry]:
+    for info in archive.infolist():
+        fault = "" if is_bounded(info) else "compressed by a method other than deflate"
+        if stat.S_ISLNK(info.external_attr >> 16) or info.flag_bits & 1:
+            fault = "a link or encrypted"
+        yield info.filename, info.file_size, fault, None if info.is_dir() else partial(archive.open, info)
 
 
-def _tar_members(archive: tarfile.TarFile, path: Path, largest_bytes: int) -> list[Member]:
-    members = []
-    total = 0
+def _tarred(archive: tarfile.TarFile) -> Iterator[Entry]:
     for info in archive:
-        _check(info.name, path)
-        if not (info.isreg() or info.isdir()):
-            raise InputError(path, f"member '{info.name}' is a link or a device", REMEDY)
-        total += info.size
-        _check_size(total, path, largest_bytes)  # now, before more of a bomb is decompressed to find the next header
-        if info.isreg():
-            members.append(Member(path, info.name, info.size, partial(_stream, archive, info)))
+        fault = "" if info.isreg() or info.isdir() else "a link or a device"
+        yield info.name, info.size, fault, partial(archive.extractfile, info) if info.isreg() else None
     # tarfile takes a tar that is cut between two members, or a damaged header, for the end: a whole one ends in zeros.
     archive.fileobj.seek(archive.offset)
     if archive.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
         raise tarfile.ReadError("no end marker")
     while rest := archive.fileobj.read(1 << 20):  # read on to the end, where gzip keeps the checksum of all
-        total += len(rest)
-        _check_size(total, path, largest_bytes)
-    return members
-
-
-def _check(name: str, path: Path) -> None:
-    relative = PureWindowsPath(name)  # takes / and \\ for separators and knows drives, so nothing absolute escapes it
-    if relative.anchor or ".." in relative.parts:
-        raise InputError(path, f"member '{name}' would leave the folder it is unpacked into", REMEDY)
-
-
-def _check_size(total: int, path: Path, largest_bytes: int) -> None:
-    if total > largest_bytes:
-        raise InputError(path, f"would unpack to more than {largest_bytes / 1e9:.3g} GB", REMEDY)
+        yield "what follows the members", len(rest), "", None

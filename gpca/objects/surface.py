@@ -1,7 +1,11 @@
-"""A surface: what every kind of source yields, a mesh or a point cloud in meters."""
+"""A surface: what every kind of source yields, a mesh or a point cloud in meters; and views, which their names tell.
+
+RGB-D datasets have views: clouds of one instance from several sides.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,3 +33,14 @@ class Surface:
         if self.faces is None:
             raise ValueError(f"{self.name} is a point cloud")
         return self.faces
+
+
+def instance_of(name: str) -> str:
+    """Return the instance that a view is of, by its name; a name of another form is an instance of its own."""
+    return view_order(name)[0]
+
+
+def view_order(name: str) -> tuple[str, int, int]:
+    """Return instance, sequence and frame of a name such as ``coffee_mug_1_2_14``; else the name itself, 0 and 0."""
+    match = re.fullmatch(r"(.+)_([0-9]+)_([0-9]+)", name)
+    return (match[1], int(match[2]), int(match[3])) if match else (name, 0, 0)

@@ -16,8 +16,7 @@ from gpca.errors import InputError
 from gpca.limits import require_file
 from gpca.objects import archive, pcd
 from gpca.objects.mesh_folder import files_in, metres_per
-from gpca.objects.surface import Surface
-from gpca.objects.views import instance_of, view_order
+from gpca.objects.surface import Surface, instance_of, view_order
 
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
 READS_ARCHIVES = True  # only a few of the 600 views in a tar are wanted, so nothing is unpacked

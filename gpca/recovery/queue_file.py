@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.attribution.wilson import wilson_interval
+from gpca.attribution.confidence import wilson_interval
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 

@@ -1,9 +1,10 @@
-"""What is learned before a policy decides: every action tried on failures of the training tables."""
+"""Before a policy decides: every action is tried on failures of the training tables, and the thresholds are settled."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,8 +12,11 @@ from gpca.recovery.actions import Action
 from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.recovery.chances import Trial
 from gpca.recovery.episodes import Episode, is_right
-from gpca.recovery.policy import NOTHING
+from gpca.recovery.policy import NOTHING, RecoveryPolicy
 from gpca.recovery.settings import LoopSettings
+
+if TYPE_CHECKING:
+    from gpca.recovery.loop_explainers import LoopExplainers
 
 
 @dataclass(frozen=True)
@@ -67,3 +71,29 @@ def rehearse(
         right = is_right(episode.take(sequence, actions, settings))
         trials[episode.number].append(Trial(state(episode, sequence[:-1]), sequence[-1], right))
     return Rehearsal(episodes, trials, {e.number: answers.history(explainer, e.number, ())[0].bald for e in episodes})
+
+
+def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
+    """Return the declared thresholds, and the one that is chosen on the rehearsed failures unless it is declared.
+
+    Those were searched for as the failures are that policies are asked about, on other tables. Without a rehearsal no
+    policy queues anything.
+
+    Args:
+        recovery: the config's section.
+    """
+    bald_N = np.array([rehearsal.bald[episode.number] for episode in rehearsal.failures] if rehearsal else [np.inf])
+    attempts = recovery["loop"]["budget"]
+    return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N)
+
+
+def summary(policy: RecoveryPolicy, explainers: LoopExplainers) -> dict:
+    """Return thresholds, treatments and the accuracy of every explainer on the calibration samples, for JSON."""
+    return {
+        "thresholds": {name: round(value, 6) for name, value in asdict(policy.thresholds).items()},
+        "treatments": dict(policy.treatments),
+        "calibration_samples": len(explainers.concepts),
+        "calibration_accuracy": {
+            name: round(float(explainers.right(name).mean()), 6) for name in explainers.calibration
+        },
+    }

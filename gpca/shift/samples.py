@@ -11,7 +11,7 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import Classifier, embed, train_encoder
 from gpca.explainers.analytical_features import analytical_features
 from gpca.objects.canonical import ObjectClouds
-from gpca.objects.views import instance_of
+from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.synthesis import make_registrations
 from gpca.seeds import generator

@@ -16,7 +16,6 @@ from gpca.files import whole_file
 from gpca.objects.source import data_files, resolve, surfaces
 from gpca.provenance import record_provenance
 from gpca.recovery.actions import action_of
-from gpca.recovery.calibration import robot_policy, summary
 from gpca.recovery.chances import learn_utility
 from gpca.recovery.episodes import find_episodes, is_right
 from gpca.recovery.example import ACTION, save_example
@@ -24,7 +23,7 @@ from gpca.recovery.loop import Loop
 from gpca.recovery.loop_explainers import learn_explainers
 from gpca.recovery.policies import Means, policy_entry
 from gpca.recovery.queueing import error_by_labels, learners_of
-from gpca.recovery.rehearsal import rehearse
+from gpca.recovery.rehearsal import rehearse, robot_policy, summary
 from gpca.recovery.settings import RecoverySettings
 from gpca.recovery.virtual_tables import lay_tables, register_situations
 

@@ -30,7 +30,7 @@ def reference():
     numbers = read_published()
     named = {number.counterpart.file for number in numbers if number.counterpart}
     results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named)
-    comparison = compare(numbers, results, objects, TOLERANCES, read_reasons(numbers))
+    comparison = compare(numbers, results, objects, TOLERANCES, read_reasons())
     if not (folder / READINGS).is_file():
         return comparison
     readings = read_metrics(folder / READINGS)

@@ -15,7 +15,7 @@ from gpca.controls.variants import (
     thinned,
 )
 from gpca.errors import InputError
-from gpca.objects.views import instance_of
+from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 
 

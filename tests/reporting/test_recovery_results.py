@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from gpca.arrays import save_arrays
+from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import tidy
-from gpca.attribution.wilson import wilson_interval
 from gpca.errors import InputError
 from gpca.files import read_image
 from gpca.pairs.perturbation import CONCEPTS

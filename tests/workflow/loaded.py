@@ -16,7 +16,7 @@ SKLEARN = (
 LIBRARIES = (
     *("gpytorch", "jinja2", "jsonschema", "matplotlib.pyplot", "nbformat", "numba", "pandas", "PIL.Image"),
     *("SALib.analyze.sobol", "scipy.ndimage", "scipy.optimize", "scipy.spatial.transform", "scipy.stats", "shap"),
-    *("skactiveml.pool", "skactiveml.stream", "torch", "trimesh", "yte"),
+    *("skactiveml.pool", "skactiveml.stream", "torch", "torch._dynamo", "trimesh", "yte"),
 )
 
 for module in (*(f"snakemake.{name}" for name in SNAKEMAKE), *(f"sklearn.{name}" for name in SKLEARN), *LIBRARIES):

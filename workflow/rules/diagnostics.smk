@@ -46,7 +46,7 @@ rule kernels:
             source=NAMES["kernel_source"],
             seed=SEEDS,
         ),
-        code=collector_code("gpca.classifier.kernel_metrics:collect_grids"),
+        code=collector_code("gpca.classifier.kernel_grid:collect_grids"),
     output:
         "<results>/kernels.csv",
     log:
@@ -61,7 +61,7 @@ rule kernels:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.classifier.kernel_metrics:collect_grids",
+        collector="gpca.classifier.kernel_grid:collect_grids",
     script:
         "../scripts/collect.py"
 

@@ -24,7 +24,7 @@ with job(snakemake):
         results,
         params.objects,
         tolerances,
-        read_reasons(numbers),
+        read_reasons(),
         measured_on(given.collected),
         cluster_intervals(numbers, given.predictions),
     )

@@ -7,7 +7,7 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.attribution.wilson import wilson_interval
+from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.metrics import pool_share

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.bootstrap import REPEATS
+from gpca.attribution.confidence import REPEATS
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.diagnosis.frames import KINDS, STATE, TRUTH
 from gpca.diagnosis.judged import CEILING, POOLED

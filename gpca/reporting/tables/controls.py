@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
-from gpca.attribution.bootstrap import REPEATS
+from gpca.attribution.confidence import REPEATS
 from gpca.controls.settings import PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.diagnosis.judged import POOLED
 from gpca.objects.title import stand_in_clause, title_of

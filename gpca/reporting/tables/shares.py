@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.wilson import wilson_interval
+from gpca.attribution.confidence import wilson_interval
 from gpca.reporting.tables.builder import rows_where
 from gpca.reporting.tables.table import Cell
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import tidy
-from gpca.attribution.wilson import wilson_interval
 from gpca.reporting.tables.shares import share_cell, share_over_sources
 from gpca.reporting.tables.table import Column
 

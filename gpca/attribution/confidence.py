@@ -1,10 +1,13 @@
-"""Bootstrap intervals of what is measured on samples of several objects in several seeds.
+"""Intervals of what is measured: by the bootstrap on samples of objects in seeds, and of a share of counted samples.
 
 Objects and seeds are crossed: an object is tested in several seeds, a seed tests several objects. The pigeonhole
 bootstrap (Owen 2007) draws both with replacement and weighs a sample by the product of how often its own were drawn.
 """
 
 from __future__ import annotations
+
+from math import sqrt
+from statistics import NormalDist
 
 import numpy as np
 
@@ -34,3 +37,19 @@ def bounds(values_B: np.ndarray) -> tuple[float, float]:
         return np.nan, np.nan
     low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return float(low), float(high)
+
+
+def wilson_interval(successes: float, trials: int, level: float = 0.95) -> tuple[float, float]:
+    """Return the bounds in [0, 1] of a share's score interval (Wilson 1927).
+
+    Raises:
+        ValueError: no trials.
+    """
+    if trials < 1:
+        raise ValueError("interval of no trials")
+    z = NormalDist().inv_cdf((1 + level) / 2)
+    share = successes / trials
+    centre = share + z**2 / (2 * trials)
+    half_width = z * sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
+    low, high = ((centre + sign * half_width) / (1 + z**2 / trials) for sign in (-1, 1))
+    return max(0.0, low), min(1.0, high)

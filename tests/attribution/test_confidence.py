@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.attribution.bootstrap import bounds, pigeonhole_weights
+from gpca.attribution.confidence import bounds, pigeonhole_weights, wilson_interval
 from gpca.seeds import generator
 
 SEED = np.repeat([100, 101], 6)
@@ -26,3 +26,12 @@ def test_bounds_are_those_of_the_draws_that_have_a_value():
     values = np.append(np.arange(101.0), np.nan)
     assert bounds(values) == pytest.approx((2.5, 97.5))
     assert np.isnan(bounds(np.array([np.nan]))).all()
+
+
+def test_the_wilson_interval_is_that_of_the_literature():
+    assert wilson_interval(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    assert wilson_interval(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)
+    low, high = wilson_interval(10, 10)
+    assert (low, high) == (pytest.approx(0.7225, abs=1e-4), 1.0)
+    with pytest.raises(ValueError, match="no trials"):
+        wilson_interval(0, 0)

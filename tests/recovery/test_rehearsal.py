@@ -5,9 +5,8 @@ import pytest
 
 from gpca.attribution.scores import Attribution
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.calibration import robot_policy, summary
 from gpca.recovery.loop_explainers import LoopExplainers
-from gpca.recovery.rehearsal import Rehearsal
+from gpca.recovery.rehearsal import Rehearsal, robot_policy, summary
 
 SECTION = {
     "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},

@@ -1,8 +1,8 @@
-"""Linear maps of many points, by NumPy's product on the processor.
+"""Layers on many points: linear maps by NumPy's product on the processor, and batch norm without its own statistics.
 
-It is OpenBLAS's: with its instructions pinned (:mod:`gpca.processor`) it gives the same bytes on every machine, at the
-speed of torch's own product, MKL's. MKL gives the same bytes on Intel's and AMD's processors only by code that takes
-twice the time.
+The product is OpenBLAS's: with its instructions pinned (:mod:`gpca.processor`) it gives the same bytes on every
+machine, at the speed of torch's own product, MKL's. MKL gives the same bytes on Intel's and AMD's processors only by
+code that takes twice the time.
 """
 
 from __future__ import annotations
@@ -39,6 +39,27 @@ class PointLinear(nn.Linear):
         """Map inputs (…, I) to (…, O)."""
         y_O = linear(x_I, self.weight)
         return y_O if self.bias is None else y_O + self.bias
+
+
+class BatchNorm(nn.BatchNorm1d):
+    """``nn.BatchNorm1d`` over F features, whose caller computes the statistics; running ones are always kept."""
+
+    running_mean: torch.Tensor
+    running_var: torch.Tensor
+    num_batches_tracked: torch.Tensor
+    momentum: float
+
+    def scale_and_shift(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return scale and shift (F,) of inference: the output is ``scale * y + shift``."""
+        scale_F = self.weight * torch.rsqrt(self.running_var + self.eps)
+        return scale_F, self.bias - scale_F * self.running_mean
+
+    @torch.no_grad()
+    def track(self, mean_F: torch.Tensor, variance_F: torch.Tensor, count: int) -> None:
+        """Take a batch of `count` values with this mean and biased variance into the running statistics."""
+        self.num_batches_tracked += 1
+        self.running_mean.lerp_(mean_F, self.momentum)
+        self.running_var.lerp_(variance_F * (count / (count - 1)), self.momentum)
 
 
 class _Linear(torch.autograd.Function):
