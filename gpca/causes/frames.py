@@ -34,14 +34,13 @@ from gpca.frames.camera import MeshScene
 from gpca.frames.clean_view import clean_view, rendered_side
 from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.progress import progress
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
 
-MEASURED_SEVERITIES = ("noise", "rotation_rad", "translation", "crop")
 OUTLINE_POINTS = 2048  # of an object, which tell where in the image it lies
 
 
@@ -168,7 +167,7 @@ def _table(instances: Instances, causes: Causes) -> pd.DataFrame:
     registrations, truth = causes.registrations, causes.truth
     rows = registrations.sample
     seen = {name: getattr(instances, name)[rows] for name in ("dataset", "scene", "image", "init_from")}
-    severities = {name: getattr(registrations, f"severity_{name}") for name in MEASURED_SEVERITIES}
+    severities = {name: getattr(registrations, f"severity_{name}") for name in SEVERITIES}
     found = {"state": truth.state, "dominant": truth.dominant}
     found |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
     found |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}

@@ -14,7 +14,7 @@ import numpy as np
 
 from gpca.names import SPLITS
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.seeds import seed_of
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
 from gpca.uncertainty.remedies import Remedies, RemedyRuns
@@ -28,8 +28,6 @@ SALTELLI = 8  # base samples of Saltelli's scheme, which makes five settings of 
 # The corners of the cube of three switches; corner b has switch i on where bit i of b is set.
 CORNERS = tuple(tuple(bool(corner >> i & 1) for i in range(3)) for corner in range(8))
 
-
-SEVERITIES = ("noise", "rotation_rad", "translation", "crop")
 KNOB_RANGE = np.subtract(UPPER, UNTOUCHED)
 # The settings of design ``additive``: the corners, and a small step of one knob.
 ADDITIVE_KNOBS = (
