@@ -17,6 +17,7 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.rigid import inverse, inverses
 from gpca.alignment.twist import exp
+from gpca.causes.candidate import NOISE, OVERLAP, POSE
 from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.descriptors.pair import ObservedPair, displacements
@@ -25,7 +26,6 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.uncertainty.remedies import denoise
 
-NOISE, POSE, OVERLAP = range(len(CONCEPTS))
 REMEDIED = (
     *(f"error_{subset}" for subset in range(len(SUBSETS))),
     *(f"phi_{concept}" for concept in CONCEPTS),
