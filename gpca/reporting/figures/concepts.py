@@ -50,9 +50,7 @@ def draw_concepts_figure(
     target = objects.points(row)[:points_shown] / objects.diameters_m[row]
     view = choose_view(target, sources)
 
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     clouds = {concept: (target @ view.T, source @ view.T) for concept, source in sources.items()}
     corners = np.concatenate([np.concatenate(pair) for pair in clouds.values()])
     low, high = corners.min(axis=0), corners.max(axis=0)

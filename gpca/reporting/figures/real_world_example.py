@@ -65,8 +65,7 @@ def draw_real_world_example(
     sample = samples.iloc[row]
     i = int(sample["instance"])
     camera = _Camera(instances, i, registrations, row)
-    use_style()
-    import matplotlib.pyplot as plt
+    plt = use_style()
     from matplotlib.patheffects import withStroke
 
     image = read_image(str(instances.colour[i]), "fetch the frames anew")
