@@ -29,7 +29,8 @@ def align(
         most_matches: the best so many are used; TEASER's authors advise some hundreds.
     """
     _, features = fpfh_of_pair(pair, feature_radius)
-    rows_n_2 = mutual_matches(*(each.data.T for each in features), most_matches)
+    source_N_33, target_P_33 = (each.data.T for each in features)
+    rows_n_2 = mutual_matches(source_N_33, target_P_33, most_matches)
     found = solve(pair.source[rows_n_2[:, 0]], pair.target[rows_n_2[:, 1]], noise)
     if found is None or len(found.inliers) < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
