@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.causes.candidate import Candidate
 from gpca.causes.counterfactuals import Registrar, Unmeasurable
@@ -28,7 +27,7 @@ from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.measuring import Measuring, as_causes
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.shapley import ALL, NONE
-from gpca.causes.subjects import JUDGED_POINTS, Subject, measure_clean_pairs
+from gpca.causes.subjects import Subject, measure_clean_pairs
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.clean_view import clean_view, rendered_side
@@ -151,14 +150,10 @@ def _measured(candidate: Candidate, measuring: Measuring, subject: Subject, axes
 
 def _subjects(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> list[Subject]:
     """Return the objects that the instances show; symmetric is what the dataset says is."""
-    subjects = []
-    for index in np.unique(instances.object_index[rows]).tolist():
-        diameter_m = float(objects.diameters_m[index])
-        surface = objects.points(index).astype(np.float64) / diameter_m
-        symmetric = bool(instances.symmetric[instances.object_index == index].any())
-        errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
-        subjects.append(Subject(index, str(objects.names[index]), diameter_m, surface, symmetric, errors))
-    return subjects
+    return [
+        Subject.of(objects, index, bool(instances.symmetric[instances.object_index == index].any()))
+        for index in np.unique(instances.object_index[rows]).tolist()
+    ]
 
 
 def _table(instances: Instances, causes: Causes) -> pd.DataFrame:
