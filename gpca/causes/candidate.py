@@ -12,9 +12,7 @@ import numpy as np
 
 from gpca.alignment.rigid import random_direction
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
-from gpca.pairs.perturbation import CONCEPTS, misplacement, within_half_space
-
-NOISE, POSE, OVERLAP = range(len(CONCEPTS))
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE, misplacement, within_half_space
 
 
 def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.ndarray:

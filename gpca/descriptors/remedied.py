@@ -17,12 +17,11 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.rigid import inverse, inverses
 from gpca.alignment.twist import exp
-from gpca.causes.candidate import NOISE, OVERLAP, POSE
 from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.descriptors.pair import ObservedPair, displacements
 from gpca.descriptors.settings import DescriptorSettings
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.seeds import generator
 from gpca.uncertainty.remedies import denoise
 

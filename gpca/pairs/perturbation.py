@@ -19,6 +19,7 @@ from gpca.settings import Bounds, Share
 
 Concept = Literal["noise", "pose", "overlap"]
 CONCEPTS: tuple[str, ...] = get_args(Concept)
+NOISE, POSE, OVERLAP = range(len(CONCEPTS))
 # What the perturbation of each concept draws, as files name it.
 SEVERITIES_OF = {"noise": ("noise",), "pose": ("rotation_rad", "translation"), "overlap": ("crop",)}
 SEVERITIES = tuple(name for names in SEVERITIES_OF.values() for name in names)
