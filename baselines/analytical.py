@@ -7,20 +7,17 @@ overlap away, which no sensor does. Hence two rows: `analytical_gpc` with the pa
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
-from time import perf_counter
 
 import numpy as np
 
-from gpca.attribution.scores import Attribution
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
 
 
-class AnalyticalGPC:
+class AnalyticalGPC(GPCA):
     """GP-CA with analytical features in place of the embedding.
 
     Args:
@@ -42,23 +39,11 @@ class AnalyticalGPC:
         neighbours: int = 16,
         **settings,
     ) -> None:
+        super().__init__(source, seed, **settings)
         self._axes = (source, seed, "analytical")
         self._point_count = point_count
         self._shape_points = shape_points
         self._neighbours = neighbours
-        self._gpca = GPCA(source, seed, **settings)
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit the GPC to the features of the labelled registrations."""
-        self._gpca.fit(self._with_features(registrations))
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every registration's features and summarise, as GP-CA does."""
-        started = perf_counter()
-        described = self._with_features(registrations)
-        seconds = (perf_counter() - started) / len(registrations)
-        attribution = self._gpca.explain(described)
-        return replace(attribution, seconds_N=attribution.seconds_N + seconds)
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the features, the point-count ratio last, unless they are attached already."""
@@ -74,8 +59,8 @@ class AnalyticalGPC:
     def _prefix(self) -> str:
         return "_".join(map(str, (*self._axes, self._shape_points, self._neighbours, "")))
 
-    def _with_features(self, registrations: Registrations) -> Registrations:
-        return replace(registrations, attached={"embedding": self.features(registrations)})
+    def _inputs(self, registrations: Registrations) -> np.ndarray:
+        return self.features(registrations)
 
 
 EXPLAINERS = {

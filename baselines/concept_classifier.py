@@ -1,10 +1,12 @@
-"""A scikit-learn classifier of concepts, for the rivals that learn from a few numbers per registration."""
+"""Scikit-learn classifiers of concepts, for the rivals that learn from a few numbers per registration."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.explainers.interface import ScoringExplainer
+from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
 
@@ -32,6 +34,25 @@ class ConceptClassifier:
         columns = [self._labels.index(concept) for concept in self._classifier.classes_]
         scores_N_C[:, columns] = self._classifier.predict_proba(features_N_F)
         return scores_N_C
+
+
+class ClassifierExplainer(ScoringExplainer):
+    """Scores are the probabilities of a scikit-learn classifier, unfitted when it is given, on some features."""
+
+    def __init__(self, classifier) -> None:
+        self._classifier = ConceptClassifier(classifier, self.labels)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit the classifier to the labelled registrations."""
+        self._classifier.fit(self.features(registrations), registrations.concept)
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the classifier's probabilities."""
+        return self._classifier.scores(self.features(registrations))
+
+    def features(self, registrations: Registrations) -> np.ndarray:
+        """Return what the classifier reads (N, F)."""
+        raise NotImplementedError
 
 
 def known_concepts(concept_N: np.ndarray, labels: tuple[str, ...] = CONCEPTS) -> list[str]:

@@ -7,20 +7,16 @@ does: the concept activation vector (CAV), the normal of a linear probe that par
 
 from __future__ import annotations
 
-from time import perf_counter
-
 import numpy as np
 
 from baselines.attached import attached
 from baselines.concept_classifier import known_concepts
-from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 
 
-class ConceptVectors:
+class ConceptVectors(ScoringExplainer):
     """One-vs-rest logistic probes; scores are the softmax over concepts of the standardised projections.
 
     The embedding is standardised on the training rows. A projection on a unit CAV is the signed distance from the
@@ -30,12 +26,7 @@ class ConceptVectors:
     Args:
         source, seed: not used; the probes are a convex problem and nothing is drawn.
         inverse_regularisation: scikit-learn's C, of the L2 penalty of the probes.
-
-    Attributes:
-        labels: what it names.
     """
-
-    labels: tuple[str, ...] = CONCEPTS
 
     def __init__(self, source: str, seed: int, inverse_regularisation: float = 1.0) -> None:
         self._inverse_regularisation = inverse_regularisation
@@ -60,17 +51,15 @@ class ConceptVectors:
         self.vectors_K_d = np.array([normal / np.linalg.norm(normal) for normal in normals])
         self._projection_scaler = StandardScaler().fit(scaled_N_d @ self.vectors_K_d.T)
 
-    def explain(self, registrations: Registrations) -> Attribution:
+    def scores(self, registrations: Registrations) -> np.ndarray:
         """Score every registration by its position along the CAVs."""
         from scipy.special import softmax
 
-        started = perf_counter()
         scaled_N_d = self._embedding_scaler.transform(attached(registrations, "embedding", None))
         positions_N_C = np.full((len(registrations), len(self.labels)), -np.inf)
         columns = [self.labels.index(concept) for concept in self._known]
         positions_N_C[:, columns] = self._projection_scaler.transform(scaled_N_d @ self.vectors_K_d.T)
-        scores_N_C = softmax(positions_N_C, axis=1)
-        return Attribution.of_scores(self.labels, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+        return softmax(positions_N_C, axis=1)
 
 
 EXPLAINERS = {"concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, reads="embeddings")}

@@ -7,7 +7,6 @@ likelihood, and the softmax of its draws are the probabilities.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -82,8 +81,7 @@ class DirichletGP:
         normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, len(CONCEPTS)))
         scores_N_C, variances_N_C, bald_N = summarise_marginals(*self._posterior(registrations), normal_M_C)
         seconds = (perf_counter() - started) / len(registrations)
-        attribution = Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds)
-        return replace(attribution, variances_N_C=variances_N_C, bald_N=bald_N)
+        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
 
     def _gradient(
         self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray

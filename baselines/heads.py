@@ -7,7 +7,6 @@ follow draws of the logits, and from those scores, variances and BALD as GP-CA's
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from time import perf_counter
 from typing import Annotated
@@ -136,8 +135,7 @@ class HeadLearner:
         logits_M_N_C = self._draw_logits(attached(registrations, "embedding", None))
         scores_N_C, variances_N_C, bald_N = summarise_draws(logits_M_N_C)
         seconds = (perf_counter() - started) / len(registrations)
-        attribution = Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds)
-        return replace(attribution, variances_N_C=variances_N_C, bald_N=bald_N)
+        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
 
     def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
         self._heads.fit(h_N_d, target_N)

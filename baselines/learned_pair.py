@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from time import perf_counter
 
-from baselines.pair import DescribedPairs
-from gpca.attribution.scores import Attribution
+import numpy as np
+
+from baselines.pair import PairDescription
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 
 
-class LearnedPairGPCA(DescribedPairs):
+class LearnedPairGPCA(PairDescription, GPCA):
     """GP-CA's classifier on the embedding of an encoder that sees both clouds after ICP, and the motion that ICP made.
 
     Args:
@@ -36,11 +36,11 @@ class LearnedPairGPCA(DescribedPairs):
         encoder_learning_rate: float = 4e-3,
         **settings,
     ) -> None:
-        super().__init__(source, seed, "relations", points)
+        PairDescription.__init__(self, source, seed, "relations", points)
+        GPCA.__init__(self, source, seed, **settings)
         self._encoder = encoder
         self._training = (min(draw_points, points), epochs, encoder_learning_rate)
         self._embedding = f"{self._prefix}embedding_by_{encoder}"
-        self._gpca = GPCA(source, seed, **settings)
         self._embed: Callable[[Registrations], Registrations] | None = None
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
@@ -70,20 +70,10 @@ class LearnedPairGPCA(DescribedPairs):
         """Fit the GPC to the labelled pairs, after the encoder, unless its embeddings are attached."""
         if self._embedding not in registrations.attached:
             self._embed = self.learn_encoder(registrations)
-        self._gpca.fit(self._embedded(registrations))
+        super().fit(registrations)
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every pair and summarise, as GP-CA does."""
-        started = perf_counter()
-        embedded = self._embedded(registrations)
-        seconds = (perf_counter() - started) / len(registrations)
-        attribution = self._gpca.explain(embedded)
-        return replace(attribution, seconds_N=attribution.seconds_N + seconds)
-
-    def _embedded(self, registrations: Registrations) -> Registrations:
-        if self._embed is not None:
-            registrations = self._embed(registrations)
-        return replace(registrations, attached={"embedding": registrations.attached[self._embedding]})
+    def _inputs(self, registrations: Registrations) -> np.ndarray:
+        return (self._embed(registrations) if self._embed else registrations).attached[self._embedding]
 
 
 EXPLAINERS = {

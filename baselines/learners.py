@@ -6,36 +6,23 @@ and the linear SVM are the paper's: scikit-learn's defaults, 50 trees, random_st
 
 from __future__ import annotations
 
-from time import perf_counter
-
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ConceptClassifier, standardised_regression
-from gpca.attribution.scores import Attribution
+from baselines.concept_classifier import ClassifierExplainer, ConceptClassifier, standardised_regression
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 
 PAPERS_RANDOM_STATE = 42
 
 
-class Learner:
-    """A scikit-learn classifier on the embeddings; scores are its probabilities."""
+class Learner(ClassifierExplainer):
+    """A scikit-learn classifier on the embeddings."""
 
-    def __init__(self, classifier) -> None:
-        self._classifier = ConceptClassifier(classifier)
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit to the labelled embeddings."""
-        self._classifier.fit(attached(registrations, "embedding", None), registrations.concept)
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration."""
-        started = perf_counter()
-        scores_N_C = self._classifier.scores(attached(registrations, "embedding", None))
-        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+    def features(self, registrations: Registrations) -> np.ndarray:
+        """Return the embeddings."""
+        return attached(registrations, "embedding", None)
 
 
 def forest(source: str, seed: int, trees: int = 50) -> Learner:

@@ -7,21 +7,16 @@ of the same idea, a forest on distances, and a rival that knows the density of t
 
 from __future__ import annotations
 
-from dataclasses import replace
-from time import perf_counter
-
 import numpy as np
 
-from baselines.concept_classifier import ConceptClassifier, standardised_regression
-from gpca.attribution.scores import Attribution
-from gpca.explainers.gpca import GPCA
+from baselines.concept_classifier import ClassifierExplainer, standardised_regression
+from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
 
-class DescribedPairs:
+class PairDescription:
     """What these explainers share: one group of descriptors of each pair.
 
     Args:
@@ -51,8 +46,8 @@ class DescribedPairs:
         return self.describe(registrations).attached[self._prefix + self._group]
 
 
-class PairGPCA(DescribedPairs):
-    """GP-CA on the relations of the pair, normalised by their ranks among the training samples.
+class PairGPCA(PairDescription, DescriptorGPCA):
+    """GP-CA on the relations of the pair.
 
     Args:
         source, seed: name the draws.
@@ -61,45 +56,16 @@ class PairGPCA(DescribedPairs):
     """
 
     def __init__(self, source: str, seed: int, points: int = 512, **settings) -> None:
-        super().__init__(source, seed, "relations", points)
-        self._gpca = GPCA(source, seed, **settings)
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit the GPC to the labelled pairs."""
-        from gpca.explainers.pair_classifier import NormalisedDescriptors
-
-        features_N_F = self.features(registrations)
-        self._normalised = NormalisedDescriptors(*self._axes, "gpca_pair").fit(features_N_F)
-        self._gpca.fit(self._embedded(registrations, features_N_F))
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every pair and summarise, as GP-CA does."""
-        started = perf_counter()
-        embedded = self._embedded(registrations, self.features(registrations))
-        seconds = (perf_counter() - started) / len(registrations)
-        attribution = self._gpca.explain(embedded)
-        return replace(attribution, seconds_N=attribution.seconds_N + seconds)
-
-    def _embedded(self, registrations: Registrations, features_N_F: np.ndarray) -> Registrations:
-        return replace(registrations, attached={"embedding": self._normalised(features_N_F)})
+        PairDescription.__init__(self, source, seed, "relations", points)
+        DescriptorGPCA.__init__(self, (source, seed, "gpca_pair"), source, seed, **settings)
 
 
-class PairLearner(DescribedPairs):
+class PairLearner(PairDescription, ClassifierExplainer):
     """Scores are the probabilities of a scikit-learn classifier on one group."""
 
     def __init__(self, classifier, *description) -> None:
-        super().__init__(*description)
-        self._classifier = ConceptClassifier(classifier)
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit the classifier to the labelled pairs."""
-        self._classifier.fit(self.features(registrations), registrations.concept)
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every pair."""
-        started = perf_counter()
-        scores_N_C = self._classifier.scores(self.features(registrations))
-        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+        PairDescription.__init__(self, *description)
+        ClassifierExplainer.__init__(self, classifier)
 
 
 def pair_forest(source: str, seed: int, trees: int = 200, points: int = 512) -> PairLearner:

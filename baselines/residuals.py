@@ -7,24 +7,23 @@ and spreads the Monte-Carlo poses of ICP. Like GP-CA it learns from the labels o
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
-from time import perf_counter
 
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ConceptClassifier, standardised_regression
+from baselines.concept_classifier import ClassifierExplainer, standardised_regression
 from gpca.attribution.scores import Attribution
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
 FLOOR = 1e-6  # variance, as that of the uncertainty itself: a thousandth of a radian or of the diameter, squared
 OBSERVED = 0  # the condition of the uncertainty design in which the observed pair is left as it is
 
 
-class Residuals:
+class Residuals(ClassifierExplainer):
     """A classifier on log forward residual, log backward residual and the log-determinant of the pose covariance.
 
     Reads ``covariance`` (S, K, 6, 6), ``icp_calls``, ``seconds`` and ``icp_seconds`` (S, K), of which only the
@@ -36,28 +35,25 @@ class Residuals:
     """
 
     def __init__(self, classifier, floor: float) -> None:
-        self._classifier = ConceptClassifier(classifier)
+        super().__init__(classifier)
         self._floor = floor
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the residuals of both directions, unless they are attached already."""
         return measured(registrations, "residuals_", lambda: {"both_ways": residuals(registrations)})
 
-    def fit(self, registrations: Registrations) -> None:
-        """Fit the classifier to the labelled registrations."""
-        self._classifier.fit(features(registrations, self._floor), registrations.concept)
+    def features(self, registrations: Registrations) -> np.ndarray:
+        """Return :func:`features` with this floor."""
+        return features(registrations, self._floor)
 
     def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration by the classifier's probabilities."""
-        started = perf_counter()
-        scores_N_C = self._classifier.scores(features(registrations, self._floor))
-        seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.of_scores(
-            CONCEPTS,
-            scores_N_C,
-            seconds=_observed(registrations, "seconds") + seconds,
-            icp_seconds=_observed(registrations, "icp_seconds"),
-            icp_calls=_observed(registrations, "icp_calls"),
+        """Score every registration by the classifier's probabilities, and charge the observed condition."""
+        attribution = super().explain(registrations)
+        return replace(
+            attribution,
+            seconds_N=attribution.seconds_N + _observed(registrations, "seconds"),
+            icp_seconds_N=_observed(registrations, "icp_seconds"),
+            icp_calls_N=_observed(registrations, "icp_calls").astype(int),
         )
 
 

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+import numpy as np
 
 from baselines.attached import attached
-from gpca.attribution.scores import Attribution
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 
 
-class SoftmaxHead:
+class SoftmaxHead(ScoringExplainer):
     """Scores are the softmax of the head's logits, averaged over the draws from a cloud as the embedding is.
 
     Attributes:
-        labels: what it names.
         trained_with_encoder: labels that are given to ``fit`` teach it nothing.
     """
 
-    labels: tuple[str, ...] = CONCEPTS
     trained_with_encoder = True
 
     def __init__(self, source: str, seed: int) -> None:
@@ -28,13 +24,11 @@ class SoftmaxHead:
     def fit(self, registrations: Registrations) -> None:
         """Do nothing: the head was trained with the encoder, on the same training rows."""
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration."""
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the softmax of the logits."""
         from scipy.special import softmax
 
-        started = perf_counter()
-        scores_N_C = softmax(attached(registrations, "head_logits", len(self.labels)), axis=1)
-        return Attribution.of_scores(self.labels, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+        return softmax(attached(registrations, "head_logits", len(self.labels)), axis=1)
 
 
 EXPLAINERS = {"softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, reads="embeddings")}

@@ -12,9 +12,10 @@ from time import perf_counter
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ConceptClassifier, standardised_regression
+from baselines.concept_classifier import ClassifierExplainer, standardised_regression
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
+from gpca.explainers.interface import ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -24,7 +25,20 @@ WORTHS = (
 )  # a condition's worth: KL in nats, or log distance from the target to the source
 
 
-class KnobValues:
+class ChargedValues(ScoringExplainer):
+    """What these explainers share: the conditions that they need are charged. None stands for all."""
+
+    def __init__(self, conditions: list[int] | None) -> None:
+        self._conditions = conditions
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration by its values."""
+        started = perf_counter()
+        scores_N_3 = self.scores(registrations)
+        return charged(registrations, scores_N_3, self._conditions, started)
+
+
+class KnobValues(ChargedValues):
     """The knob with the largest value names the concept; nothing is learned.
 
     Args:
@@ -33,21 +47,18 @@ class KnobValues:
     """
 
     def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int] | None = None) -> None:
+        super().__init__(conditions)
         self._values = values
-        self._conditions = conditions
 
     def fit(self, registrations: Registrations) -> None:
         """Do nothing, since nothing is learned."""
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration by the values of its uncertainty."""
-        started = perf_counter()
-        uncertainty_N_K = attached(registrations, "uncertainty", None)
-        conditions = self._conditions or list(range(uncertainty_N_K.shape[1]))
-        return charged(registrations, self._values(uncertainty_N_K), conditions, started)
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the values of the uncertainty."""
+        return self._values(attached(registrations, "uncertainty", None))
 
 
-class ScaledValues:
+class ScaledValues(ChargedValues):
     """The remedy with the largest scaled value names the concept; no labels are used.
 
     Args:
@@ -59,8 +70,8 @@ class ScaledValues:
     def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], worth: str) -> None:
         if worth not in WORTHS:
             raise InputError("setting 'worth'", f"unknown '{worth}'", f"choose one of {', '.join(WORTHS)}")
+        super().__init__(conditions)
         self._values = values
-        self._conditions = conditions
         self._worth = worth
 
     def fit(self, registrations: Registrations) -> None:
@@ -69,35 +80,23 @@ class ScaledValues:
         self._mean_3 = values_N_3.mean(axis=0)
         self._deviation_3 = np.maximum(values_N_3.std(axis=0), 1e-9)
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration by its scaled values."""
-        started = perf_counter()
-        values_N_3 = self._values(-corners(registrations, self._worth))
-        scores_N_3 = (values_N_3 - self._mean_3) / self._deviation_3
-        return charged(registrations, scores_N_3, self._conditions, started)
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the scaled values."""
+        return (self._values(-corners(registrations, self._worth)) - self._mean_3) / self._deviation_3
 
 
-class LearnedValues:
+class LearnedValues(ChargedValues, ClassifierExplainer):
     """Logistic regression on the values of the remedies by both worths, with the same labels as GP-CA."""
 
     def __init__(
         self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], inverse_regularisation: float
     ) -> None:
+        ChargedValues.__init__(self, conditions)
+        ClassifierExplainer.__init__(self, standardised_regression(inverse_regularisation))
         self._values = values
-        self._conditions = conditions
-        self._classifier = ConceptClassifier(standardised_regression(inverse_regularisation))
 
-    def fit(self, registrations: Registrations) -> None:
-        """Fit to the labelled registrations."""
-        self._classifier.fit(self._features(registrations), registrations.concept)
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration by the classifier's probabilities."""
-        started = perf_counter()
-        scores_N_3 = self._classifier.scores(self._features(registrations))
-        return charged(registrations, scores_N_3, self._conditions, started)
-
-    def _features(self, registrations: Registrations) -> np.ndarray:
+    def features(self, registrations: Registrations) -> np.ndarray:
+        """Return the values of the remedies by both worths."""
         return np.hstack([self._values(-corners(registrations, worth)) for worth in WORTHS])
 
 
@@ -106,14 +105,16 @@ def corners(registrations: Registrations, worth: str) -> np.ndarray:
     return attached(registrations, worth, None)[:, :8]
 
 
-def charged(registrations: Registrations, scores_N_3: np.ndarray, conditions: list[int], started: float) -> Attribution:
-    """Make an attribution that cost these conditions and the time since `started`.
+def charged(
+    registrations: Registrations, scores_N_3: np.ndarray, conditions: list[int] | None, started: float
+) -> Attribution:
+    """Make an attribution that cost these conditions, None for all, and the time since `started`.
 
     Where all three scores are equal, nothing sets a concept apart, and none is named.
     """
     own_seconds = (perf_counter() - started) / len(registrations)
     cost = {
-        name: attached(registrations, name, None)[:, conditions].sum(axis=1)
+        name: attached(registrations, name, None)[:, slice(None) if conditions is None else conditions].sum(axis=1)
         for name in ("seconds", "icp_seconds", "icp_calls")
     }
     return Attribution.of_scores(

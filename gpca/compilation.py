@@ -55,7 +55,7 @@ from numba.core.event import Listener, register  # noqa: E402
 
 setattr(config, "CACHE_DIR", os.environ.get(VARIABLE, ""))  # noqa: B010 - numba declares it at run time; where it was imported before
 
-__all__ = ["INNER_LOOP", "NOTICE", "njit", "prange", "say_when_compiling"]
+__all__ = ["INNER_LOOP", "NOTICE", "OVER_CLOUDS", "njit", "prange", "say_when_compiling"]
 
 # Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
 # in the loops of ICP takes longer than the search. Functions compiled so cannot make arrays; they are given room to
@@ -65,6 +65,13 @@ INNER_LOOP: dict[str, Any] = {
     "_nrt": False,
     "error_model": "numpy",
     "fastmath": {"contract", "nsz", "nnan", "reassoc"},
+}
+# Loops over clouds run in parallel; without "reassoc", so that each sum is made in its written order.
+OVER_CLOUDS: dict[str, Any] = {
+    "cache": True,
+    "parallel": True,
+    "error_model": "numpy",
+    "fastmath": {"contract", "nsz", "nnan"},
 }
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from graphlib import TopologicalSorter
 
 import pytest
 
@@ -75,6 +76,16 @@ def test_a_module_imports_only_from_folders_above_its_own(path):
     # The command line finds its steps by name; the package offers its public names from wherever they are.
     others = [module for module in imported(path) if module[0] in ("gpca", "baselines")]
     assert [".".join(module) for module in others if ROOMS.index(room_of(module)) > own] == []
+
+
+def test_modules_do_not_import_in_a_circle():
+    """Not even where one is imported for its types alone, or inside a function."""
+    names = {path.relative_to(ROOT).with_suffix("").parts: path for path in MODULES}
+    graph = {
+        name: {module if module in names else module[:-1] for module in imported(path)} - {name}
+        for name, path in names.items()
+    }
+    assert set(TopologicalSorter(graph).static_order()) >= set(names)  # a circle raises a CycleError that lists it
 
 
 def test_at_the_top_is_only_what_everything_stands_on():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,18 +11,20 @@ from baselines.causes.nominal import NominalThreshold
 from gpca.attribution.scores import Attribution
 from gpca.causes.labels import LABELS
 from gpca.descriptors.groups import MOTION
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
 
-class Gate:
+class Gate(ScoringExplainer):
     """An alarm by one of the numbers of the motion, times a sign.
 
     Args:
         name: in :data:`gpca.descriptors.groups.MOTION`.
         sign: −1 where small values are bad.
     """
+
+    labels = LABELS
 
     def __init__(self, name: str, sign: int = 1) -> None:
         self._column = MOTION.index(name)
@@ -33,13 +35,13 @@ class Gate:
         self._threshold = NominalThreshold().fit(self._alarm(registrations), registrations.concept)
 
     def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration, and name no cause of any."""
+        return replace(super().explain(registrations), abstained_N=np.ones(len(registrations), bool))
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
         """Score nominal by the alarm, and all causes alike."""
-        started = perf_counter()
-        n = len(registrations)
-        even_N_3 = np.full((n, len(CONCEPTS)), 1 / len(CONCEPTS))
-        scores_N_4 = self._threshold.scores(self._alarm(registrations), even_N_3)
-        seconds = (perf_counter() - started) / n
-        return Attribution.of_scores(LABELS, scores_N_4, seconds=seconds, abstained_N=np.ones(n, bool))
+        even_N_3 = np.full((len(registrations), len(CONCEPTS)), 1 / len(CONCEPTS))
+        return self._threshold.scores(self._alarm(registrations), even_N_3)
 
     def _alarm(self, registrations: Registrations) -> np.ndarray:
         return self._sign * attached(registrations, "motion", len(MOTION))[:, self._column]

@@ -8,7 +8,6 @@ all causes left alone, v̂ is the alarm that tells whether anything is wrong.
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
 
 import numpy as np
 
@@ -16,18 +15,19 @@ from baselines.attached import attached
 from baselines.causes.nominal import NominalThreshold
 from baselines.sensitivity import single_drops
 from baselines.shap_kl import shapley_values
-from gpca.attribution.scores import Attribution
 from gpca.causes.labels import LABELS
 from gpca.causes.shapley import ALL, SUBSETS
 from gpca.causes.truth import NOMINAL
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
 
 SMALLEST = 1e-4  # diameters: what a remedy moves less is rounding and chance
 
 
-class RemovalValues:
+class RemovalValues(ScoringExplainer):
     """Values (N, 3) of the remedies by v̂ of the eight subsets."""
+
+    labels = LABELS
 
     def __init__(self, values: Callable[[np.ndarray], np.ndarray]) -> None:
         self._values = values
@@ -41,15 +41,13 @@ class RemovalValues:
         self._deviation_3 = np.maximum(scatter_N_3.std(axis=0), SMALLEST)
         self._threshold = NominalThreshold().fit(_alarm(errors_N_8), registrations.concept)
 
-    def explain(self, registrations: Registrations) -> Attribution:
+    def scores(self, registrations: Registrations) -> np.ndarray:
         """Score every registration by its scaled values."""
         from scipy.special import softmax
 
-        started = perf_counter()
         errors_N_8 = _errors(registrations)
         shares_N_3 = softmax((self._values(errors_N_8) - self._mean_3) / self._deviation_3, axis=1)
-        scores_N_4 = self._threshold.scores(_alarm(errors_N_8), shares_N_3)
-        return Attribution.of_scores(LABELS, scores_N_4, seconds=(perf_counter() - started) / len(registrations))
+        return self._threshold.scores(_alarm(errors_N_8), shares_N_3)
 
 
 def _errors(registrations: Registrations) -> np.ndarray:

@@ -6,7 +6,7 @@ fitness and spread. ``pair_boosting`` reads every descriptor.
 
 from __future__ import annotations
 
-from baselines.causes.described import DescribedPairs
+from baselines.causes.described import DescriptorClassifier
 from gpca.descriptors.groups import GROUPS
 from gpca.explainers.interface import ExplainerEntry
 from gpca.seeds import seed_of
@@ -39,14 +39,14 @@ def boosted_trees(source: str, seed: int, iterations: int = 150, learning_rate: 
     )
 
 
-def pair_forest(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2) -> DescribedPairs:
+def pair_forest(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2) -> DescriptorClassifier:
     """Make the forest."""
-    return DescribedPairs(randomised_trees(source, seed, trees, smallest_leaf), ("distances", "motion"))
+    return DescriptorClassifier(randomised_trees(source, seed, trees, smallest_leaf), ("distances", "motion"))
 
 
-def pair_boosting(source: str, seed: int, iterations: int = 150, learning_rate: float = 0.06) -> DescribedPairs:
+def pair_boosting(source: str, seed: int, iterations: int = 150, learning_rate: float = 0.06) -> DescriptorClassifier:
     """Make the boosted trees."""
-    return DescribedPairs(boosted_trees(source, seed, iterations, learning_rate), GROUPS)
+    return DescriptorClassifier(boosted_trees(source, seed, iterations, learning_rate), GROUPS)
 
 
 EXPLAINERS = {

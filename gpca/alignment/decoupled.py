@@ -16,7 +16,7 @@ import numpy as np
 
 from gpca.alignment.clique import largest_clique
 from gpca.alignment.least_squares import best_rotation
-from gpca.alignment.rigid import rotate
+from gpca.alignment.rigid import rigid_motion, rotate
 
 GROWTH = 1.4  # of the convexity's parameter μ per iteration, as in the paper
 MOST_ITERATIONS = 100
@@ -45,10 +45,9 @@ def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> Solut
     p_n_3, q_n_3 = source_n_3[clique], target_n_3[clique]
     R, _ = gnc_rotation(p_n_3[other] - p_n_3[one], q_n_3[other] - q_n_3[one], 2 * noise)
     shifts_n_3 = q_n_3 - rotate(R, p_n_3)
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, [vote(shifts_n, noise) for shifts_n in shifts_n_3.T]
-    inlier_n = (np.abs(shifts_n_3 - T[:3, 3]) <= noise).all(axis=1)
-    return Solution(T, clique[inlier_n], certain)
+    shift_3 = [vote(shifts_n, noise) for shifts_n in shifts_n_3.T]
+    inlier_n = (np.abs(shifts_n_3 - shift_3) <= noise).all(axis=1)
+    return Solution(rigid_motion(R, shift_3), clique[inlier_n], certain)
 
 
 def _agreeing(source_n_3: np.ndarray, target_n_3: np.ndarray, bound: float) -> np.ndarray:

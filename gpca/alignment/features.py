@@ -21,6 +21,12 @@ def cloud_with_normals(points_N_3: np.ndarray, normals_N_3: np.ndarray) -> Any:
     return cloud
 
 
+def fpfh_of_pair(pair: Any, radius: float = RADIUS) -> tuple[list[Any], list[Any]]:
+    """Return Open3D's clouds of a pair's source and target, and the features of each."""
+    clouds = [cloud_with_normals(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
+    return clouds, [fpfh(cloud, radius) for cloud in clouds]
+
+
 def fpfh(cloud: Any, radius: float = RADIUS) -> Any:
     """Return Open3D's features of a cloud with normals; `.data` is (33, N)."""
     o3d = require_open3d()

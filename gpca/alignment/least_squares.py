@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import rotate
+from gpca.alignment.rigid import rigid_motion, rotate
 
 
 def best_rotation(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.ndarray) -> np.ndarray:
@@ -19,10 +19,8 @@ def best_rotation(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.
 def best_motion(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.ndarray) -> np.ndarray:
     """Return the rigid motion (4×4) that minimises Σ w |q - T p|²."""
     p_3, q_3 = (np.average(points, axis=0, weights=weights_n) for points in (source_n_3, target_n_3))
-    T = np.eye(4)
-    T[:3, :3] = best_rotation(source_n_3 - p_3, target_n_3 - q_3, weights_n)
-    T[:3, 3] = q_3 - rotate(T, p_3)
-    return T
+    R = best_rotation(source_n_3 - p_3, target_n_3 - q_3, weights_n)
+    return rigid_motion(R, q_3 - rotate(R, p_3))
 
 
 def plane_step(
@@ -38,7 +36,5 @@ def plane_step(
     hessian_6_6 = np.einsum("ni,nj->ij", weighted_n_6, jacobian_n_6)
     gradient_6 = np.einsum("ni,n->i", weighted_n_6, residuals_n)
     step_6 = np.linalg.lstsq(hessian_6_6, gradient_6, rcond=1e-10)[0]
-    T = np.eye(4)
     # About x, then y, then z, as Open3D does: to first order the order of small angles does not matter.
-    T[:3, :3], T[:3, 3] = Rotation.from_euler("xyz", step_6[:3]).as_matrix(), step_6[3:]
-    return T
+    return rigid_motion(Rotation.from_euler("xyz", step_6[:3]).as_matrix(), step_6[3:])

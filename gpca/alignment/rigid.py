@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gpca.errors import InputError
 from gpca.limits import LARGEST_NUMBER
@@ -20,6 +21,15 @@ def rotate(T_b_a: np.ndarray, vectors_a: np.ndarray) -> np.ndarray:
     """
     x, y, z = np.moveaxis(vectors_a, -1, 0)
     return np.stack([x * to_x + y * to_y + z * to_z for to_x, to_y, to_z in T_b_a[:3, :3]], axis=-1)
+
+
+def rigid_motion(R_b_a: np.ndarray, translation: ArrayLike = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """Return the transforms (..., 4, 4) with these rotations (..., 3, 3) and translations (..., 3)."""
+    T_b_a = np.zeros((*R_b_a.shape[:-2], 4, 4))
+    T_b_a[..., :3, :3] = R_b_a
+    T_b_a[..., :3, 3] = translation
+    T_b_a[..., 3, 3] = 1
+    return T_b_a
 
 
 def inverse(T_b_a: np.ndarray) -> np.ndarray:

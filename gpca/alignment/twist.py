@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gpca.alignment.rigid import rigid_motion
+
 
 def exp(xi_n_6: np.ndarray) -> np.ndarray:
     """Return the rigid motions (n, 4, 4) of twists (n, 6) in radians and units of length."""
-    T_n = np.tile(np.eye(4), (len(xi_n_6), 1, 1))
-    T_n[:, :3, :3] = Rotation.from_rotvec(xi_n_6[:, :3]).as_matrix()
-    T_n[:, :3, 3] = np.einsum("nij,nj->ni", _left_jacobian(xi_n_6[:, :3]), xi_n_6[:, 3:])
-    return T_n
+    shift_n_3 = np.einsum("nij,nj->ni", _left_jacobian(xi_n_6[:, :3]), xi_n_6[:, 3:])
+    return rigid_motion(Rotation.from_rotvec(xi_n_6[:, :3]).as_matrix(), shift_n_3)
 
 
 def log(T_n: np.ndarray) -> np.ndarray:

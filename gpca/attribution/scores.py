@@ -41,8 +41,10 @@ class Attribution:
         icp_seconds: np.ndarray | float = 0.0,
         icp_calls: np.ndarray | int = 0,
         abstained_N: np.ndarray | None = None,
+        variances_N_C: np.ndarray | None = None,
+        bald_N: np.ndarray | None = None,
     ) -> Attribution:
-        """Make the attribution of an explainer that gives scores alone; variances and BALD are NaN.
+        """Make the attribution of an explainer; variances and BALD are NaN where it gives none.
 
         Times and calls are one number for each row, or one for all.
         """
@@ -50,8 +52,8 @@ class Attribution:
         return cls(
             concepts=concepts,
             scores_N_C=scores_N_C,
-            variances_N_C=np.full(scores_N_C.shape, np.nan),
-            bald_N=np.full(n, np.nan),
+            variances_N_C=np.full(scores_N_C.shape, np.nan) if variances_N_C is None else variances_N_C,
+            bald_N=np.full(n, np.nan) if bald_N is None else bald_N,
             abstained_N=np.zeros(n, bool) if abstained_N is None else abstained_N,
             icp_calls_N=np.broadcast_to(icp_calls, n).astype(int),
             seconds_N=np.broadcast_to(seconds, n).astype(float),

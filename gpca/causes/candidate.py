@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import random_direction
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
-from gpca.pairs.perturbation import CONCEPTS
-
-NOISE, POSE, OVERLAP = range(len(CONCEPTS))
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE, misplacement, within_half_space
 
 
 def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.ndarray:
@@ -86,17 +83,13 @@ def draw_candidate(
     anywhere = random.uniform(-0.5, 0.5, size=clean.shape)
     is_outlier = random.random(len(clean)) < severity["outliers"]
     along = (clean * random_direction(random)).sum(axis=1)
-    left = max(min(FEWEST_POINTS, len(clean)), round(len(clean) * (1 - severity["crop"])))
-    T_init = np.eye(4)
-    T_init[:3, :3] = Rotation.from_rotvec(severity["rotation_rad"] * random_direction(random)).as_matrix()
-    T_init[:3, 3] = severity["translation"] * random_direction(random)
     cause_of = {"noise": NOISE, "outliers": NOISE, "rotation_rad": POSE, "translation": POSE, "crop": OVERLAP}
     return Candidate(
         applied=applied,
         model=model,
         clean=clean,
         noisy=np.where(is_outlier[:, None], anywhere, clean + jitter),
-        kept=np.sort(np.argsort(along, kind="stable")[:left]),
-        T_init=T_init,
+        kept=within_half_space(along, severity["crop"], FEWEST_POINTS),
+        T_init=misplacement(severity["rotation_rad"], severity["translation"], random),
         severity={name: value if applied[cause_of[name]] else 0.0 for name, value in severity.items()},
     )

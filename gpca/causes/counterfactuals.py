@@ -14,10 +14,11 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverses
 from gpca.alignment.twist import exp
-from gpca.causes.candidate import POSE, Candidate
+from gpca.causes.candidate import Candidate
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.shapley import NONE, SUBSETS
 from gpca.causes.truth import LARGEST_ERROR
+from gpca.pairs.perturbation import POSE
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Runs, divergence
 

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.causes.candidate import Candidate
 from gpca.causes.counterfactuals import Registrar, Unmeasurable
@@ -28,20 +27,19 @@ from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.measuring import Measuring, as_causes
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.shapley import ALL, NONE
-from gpca.causes.subjects import JUDGED_POINTS, Subject, measure_clean_pairs
+from gpca.causes.subjects import Subject, measure_clean_pairs
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.clean_view import clean_view, rendered_side
 from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.progress import progress
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
 
-MEASURED_SEVERITIES = ("noise", "rotation_rad", "translation", "crop")
 OUTLINE_POINTS = 2048  # of an object, which tell where in the image it lies
 
 
@@ -152,14 +150,10 @@ def _measured(candidate: Candidate, measuring: Measuring, subject: Subject, axes
 
 def _subjects(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> list[Subject]:
     """Return the objects that the instances show; symmetric is what the dataset says is."""
-    subjects = []
-    for index in np.unique(instances.object_index[rows]).tolist():
-        diameter_m = float(objects.diameters_m[index])
-        surface = objects.points(index).astype(np.float64) / diameter_m
-        symmetric = bool(instances.symmetric[instances.object_index == index].any())
-        errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
-        subjects.append(Subject(index, str(objects.names[index]), diameter_m, surface, symmetric, errors))
-    return subjects
+    return [
+        Subject.of(objects, index, bool(instances.symmetric[instances.object_index == index].any()))
+        for index in np.unique(instances.object_index[rows]).tolist()
+    ]
 
 
 def _table(instances: Instances, causes: Causes) -> pd.DataFrame:
@@ -168,7 +162,7 @@ def _table(instances: Instances, causes: Causes) -> pd.DataFrame:
     registrations, truth = causes.registrations, causes.truth
     rows = registrations.sample
     seen = {name: getattr(instances, name)[rows] for name in ("dataset", "scene", "image", "init_from")}
-    severities = {name: getattr(registrations, f"severity_{name}") for name in MEASURED_SEVERITIES}
+    severities = {name: getattr(registrations, f"severity_{name}") for name in SEVERITIES}
     found = {"state": truth.state, "dominant": truth.dominant}
     found |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
     found |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}

@@ -23,7 +23,6 @@ from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
 
 JUDGED_POINTS = 256  # of the model, over which an error is the mean
-SYMMETRY_POINTS = 4096  # as everywhere where symmetries are sought
 # Of an object's clean pairs. Where more are off, hardly any of its candidates would be kept; of the others, those whose
 # own clean pair is off are refused one by one. Half would be a matter of chance for mugs, at so few pairs each.
 MOST_FAILING = 0.9
@@ -47,17 +46,19 @@ class Subject:
     symmetric: bool
     errors: PoseErrors
 
+    @classmethod
+    def of(cls, objects: ObjectClouds, index: int, symmetric: bool) -> Subject:
+        """Return an object of the file."""
+        diameter_m = float(objects.diameters_m[index])
+        surface = objects.points(index).astype(np.float64) / diameter_m
+        errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
+        return cls(index, str(objects.names[index]), diameter_m, surface, symmetric, errors)
+
 
 def read_subjects(objects: ObjectClouds) -> list[Subject]:
     """Return the objects, with what their symmetries mean for errors."""
-    subjects = []
-    for i, name in enumerate(objects.names):
-        diameter_m = float(objects.diameters_m[i])
-        surface = objects.points(i).astype(np.float64) / diameter_m
-        symmetric = bool(find_symmetries(objects.points(i)[:SYMMETRY_POINTS], diameter_m))
-        errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
-        subjects.append(Subject(i, str(name), diameter_m, surface, symmetric, errors))
-    return subjects
+    symmetries = (find_symmetries(objects.points(i), float(objects.diameters_m[i])) for i in range(len(objects)))
+    return [Subject.of(objects, i, bool(found)) for i, found in enumerate(symmetries)]
 
 
 def split_by_object(

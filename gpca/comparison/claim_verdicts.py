@@ -20,7 +20,7 @@ from gpca.comparison.claims import PREDICTIONS, Claim, Compared
 from gpca.comparison.published import UNITS, Counterpart
 from gpca.comparison.values import RUNTIME, of_seeds, runtime_mean
 from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import read_numbers
 from gpca.errors import InputError
 
 if TYPE_CHECKING:
@@ -208,9 +208,8 @@ def read_verdicts(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a number that is none, an unknown verdict.
     """
-    rows = read_csv(path, CLAIM_COLUMNS)
-    for column in ("value", "low", "high", "n"):
-        rows[column] = numbers(path, rows, column, needed=rows[column] != "")
+    measured = ("value", "low", "high", "n")
+    rows = read_numbers(path, CLAIM_COLUMNS, measured, optional=measured)
     for column in ("verdict", "claim_verdict"):
         if unknown := set(rows[column]) - set(CLAIM_VERDICTS):
             raise InputError(path, f"unknown {column} '{min(unknown)}'", "regenerate it")

@@ -16,7 +16,7 @@ from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.controls.judged import read_controls
 from gpca.controls.metrics import auroc_error
 from gpca.controls.settings import PAPER, TRANSFER, plain_of
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import read_numbers
 from gpca.diagnosis.judged import POOLED
 from gpca.seeds import generator
 
@@ -27,7 +27,6 @@ COLUMNS = (
     *("control", "source", "trained_on", "method", "metric", "samples", "seeds", "value", "low", "high"),
     *("change", "change_low", "change_high"),
 )
-TEXTS = COLUMNS[:5]
 
 
 def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
@@ -68,11 +67,7 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
     """
-    rows = read_csv(path, COLUMNS)
-    for column in COLUMNS:
-        if column not in TEXTS:
-            rows[column] = numbers(path, rows, column, needed=column in ("samples", "seeds", "value"))
-    return rows
+    return read_numbers(path, COLUMNS, COLUMNS[5:], optional=COLUMNS[8:])
 
 
 Measured = tuple[dict[str, np.ndarray], tuple[int, int]]  # values by metric; numbers of samples and seeds

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse
 from gpca.causes.subjects import read_subjects
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import read_numbers
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
@@ -52,9 +52,7 @@ def read_samples(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number, a sample twice.
     """
-    rows = read_csv(path, COLUMNS)
-    for column in (*SEVERITIES, "error"):
-        rows[column] = numbers(path, rows, column, least=0)
+    rows = read_numbers(path, COLUMNS, (*SEVERITIES, "error"), least=0)
     if rows["sample"].duplicated().any():
         raise InputError(path, "contains a sample twice", "regenerate it")
     return rows

@@ -12,7 +12,7 @@ from gpca.attribution.metrics import source_method_seed
 from gpca.controls.judged import read_controls
 from gpca.controls.samples import OF_CONCEPT, read_samples
 from gpca.controls.settings import PAPER
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import read_numbers
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings
@@ -76,11 +76,7 @@ def read_severities(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
     """
-    rows = read_csv(path, COLUMNS)
-    for column in COLUMNS:
-        if column not in ("concept", "method"):
-            rows[column] = numbers(path, rows, column, needed=not column.startswith("other_"))
-    return rows
+    return read_numbers(path, COLUMNS, COLUMNS[2:], optional=("other_low", "other_high"))
 
 
 def _edges(ranges: Severities, name: str, bins: int) -> np.ndarray:

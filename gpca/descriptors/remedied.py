@@ -21,11 +21,10 @@ from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.descriptors.pair import ObservedPair, displacements
 from gpca.descriptors.settings import DescriptorSettings
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.seeds import generator
 from gpca.uncertainty.remedies import denoise
 
-NOISE, POSE, OVERLAP = range(len(CONCEPTS))
 REMEDIED = (
     *(f"error_{subset}" for subset in range(len(SUBSETS))),
     *(f"phi_{concept}" for concept in CONCEPTS),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import read_numbers
 from gpca.diagnosis.judged import CEILING, Judged, joined, read_judged
 from gpca.diagnosis.measures import MEASURES, SMALLER_IS_BETTER, counted, measure
 from gpca.diagnosis.metrics import with_pooled
@@ -49,11 +49,7 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
     """
-    rows = read_csv(path, COLUMNS)
-    for column in COLUMNS:
-        if column not in ("source", "method", "metric", "rival"):
-            rows[column] = numbers(path, rows, column, needed=column in ("samples", "seeds", "value"))
-    return rows
+    return read_numbers(path, COLUMNS, (*COLUMNS[3:8], *COLUMNS[9:]), optional=(*COLUMNS[6:8], *COLUMNS[9:]))
 
 
 def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:

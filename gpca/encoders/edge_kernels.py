@@ -8,21 +8,12 @@ Inner loops run over channels, where they vectorise.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from gpca.compilation import njit, prange
-
-_options: dict[str, Any] = {
-    "cache": True,
-    "parallel": True,
-    "fastmath": {"contract", "nsz", "nnan"},
-    "error_model": "numpy",
-}
+from gpca.compilation import OVER_CLOUDS, njit, prange
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def smallest_k(distances, k):
     """Return for every row of ``distances`` (B, N, M) the columns of its k smallest entries, ties to the lower column.
 
@@ -116,7 +107,7 @@ def _collect_with_ties(row, below, above, out):
             filled += 1
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def gather_extreme_and_sums(ac, neighbours, gamma):
     """Pass once over all edges y_ij = A_j + C_i.
 
@@ -169,7 +160,7 @@ def gather_extreme_and_sums(ac, neighbours, gamma):
     return extreme, extreme_at, edge_sums, mean, variance
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def normalise_activate(extreme, mean, inverse_std, gamma, beta, slope):
     """Return act(γ (extreme - μ)/σ + β), the layer's output (B, N, F)."""
     batch, n, features = extreme.shape
@@ -185,7 +176,7 @@ def normalise_activate(extreme, mean, inverse_std, gamma, beta, slope):
     return out
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def gather_max_affine(ac, neighbours, scale, shift, slope):
     """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), for inference: in one pass and without statistics."""
     batch, n, k = neighbours.shape
@@ -211,7 +202,7 @@ def gather_max_affine(ac, neighbours, scale, shift, slope):
     return out
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def edge_max_backward(
     grad_out, ac, neighbours, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope
 ):

@@ -9,18 +9,10 @@ Inner loops run over channels, where they vectorise.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from gpca.compilation import njit, prange
+from gpca.compilation import OVER_CLOUDS, njit, prange
 
-_options: dict[str, Any] = {
-    "cache": True,
-    "parallel": True,
-    "fastmath": {"contract", "nsz", "nnan"},
-    "error_model": "numpy",
-}
 _BLOCK = 64  # rows that are summed in the arrays' own precision before they are added in double
 
 
@@ -41,7 +33,7 @@ def distinct_edges(neighbours, counts, n_points):
     return point, weight, ends
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def gather(a, c, point, ends, batch):
     """Return y_e = a_j + c_g (E, F) for the edges from group g to point j; a (P, F), c (G, F)."""
     features = a.shape[1]
@@ -56,7 +48,7 @@ def gather(a, c, point, ends, batch):
     return y
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def gather_backward(grad_y, point, ends, batch, n_rows):
     """Return the gradients of :func:`gather` with respect to a (P, F) and c (G, F)."""
     features = grad_y.shape[1]
@@ -73,7 +65,7 @@ def gather_backward(grad_y, point, ends, batch, n_rows):
     return grad_a, grad_c
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def moments(y, weight, cloud_ends):
     """Return mean and biased variance (F,), float64, of the rows of y (E, F), each counted `weight` times."""
     features = y.shape[1]
@@ -103,7 +95,7 @@ def moments(y, weight, cloud_ends):
     return mean, np.maximum(variance - mean * mean, 0.0)
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def normalise(y, scale, shift, cloud_ends):
     """Return ReLU(scale y + shift), (E, F)."""
     out = np.empty_like(y)
@@ -115,7 +107,7 @@ def normalise(y, scale, shift, cloud_ends):
     return out
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def normalise_max(y, scale, shift, ends, batch):
     """Return the maximum of scale y + shift over each group's edges (G, F), and the edge where it is reached."""
     features = y.shape[1]
@@ -138,7 +130,7 @@ def normalise_max(y, scale, shift, ends, batch):
     return out, at
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def normalise_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud_ends):
     """Return the gradients of :func:`normalise` where its scale and shift come from :func:`moments`.
 
@@ -179,7 +171,7 @@ def normalise_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud
     return grad_y, grad_gamma.astype(y.dtype), grad_beta.astype(y.dtype)
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def normalise_max_backward(grad_out, at, y, weight, mean, inverse_std, gamma, cloud_ends):
     """Return the gradients of :func:`normalise_max`: as :func:`normalise_backward`, with g zero but at the maxima."""
     features = y.shape[1]

@@ -7,21 +7,12 @@ vectorise.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from gpca.compilation import njit, prange
-
-_options: dict[str, Any] = {
-    "cache": True,
-    "parallel": True,
-    "fastmath": {"contract", "nsz", "nnan"},
-    "error_model": "numpy",
-}
+from gpca.compilation import OVER_CLOUDS, njit, prange
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def farthest_points(points, n_centres):
     """Return (B, M): point 0, then always the point farthest from all chosen ones, ties to the lower index."""
     batch, n, _ = points.shape
@@ -43,7 +34,7 @@ def farthest_points(points, n_centres):
     return chosen
 
 
-@njit(**_options)
+@njit(**OVER_CLOUDS)
 def ball_query(points, centres, radius, k):
     """Return neighbours (B, M, k) and counts (B, M); see :func:`gpca.encoders.grouping.ball_query`."""
     batch, n, _ = points.shape

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from copy import deepcopy
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -57,100 +57,146 @@ def _on(device: torch.device, clouds: Any) -> Any:
     return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
 
 
+@dataclass(frozen=True)
+class Task:
+    """What an encoder sees of a registration, and what its head learns to say of it.
+
+    Attributes:
+        classes: what ``concept`` names.
+        targets_S_C: numbers that the head learns to predict, by least squares, in the place of the concepts; `classes`
+            then names its columns, and the curve has no accuracy.
+        make: makes the encoder, where it is none of the registry.
+        draw: what the encoder sees of a row, anew in every epoch.
+    """
+
+    classes: tuple[str, ...] = CONCEPTS
+    targets_S_C: np.ndarray | None = None
+    make: Callable[[], nn.Module] | None = None
+    draw: Draw = draw_points
+
+    def model(self, settings: EncoderSettings) -> Classifier:
+        """Return a new encoder with its head."""
+        return with_head(self.make(), settings, self.classes) if self.make else make_model(settings, self.classes)
+
+    def targets(self, registrations: Registrations) -> torch.Tensor:
+        """Return the number of each row's class (S,), or the numbers that are to be predicted (S, C)."""
+        if self.targets_S_C is None:
+            return torch.from_numpy(np.array([self.classes.index(concept) for concept in registrations.concept]))
+        return torch.from_numpy(self.targets_S_C.astype(np.float32))
+
+
 def train_encoder(
     registrations: Registrations,
     source: str,
     seed: int,
     settings: EncoderSettings,
     checkpoint: Path | None = None,
-    classes: tuple[str, ...] = CONCEPTS,
-    targets_S_C: np.ndarray | None = None,
+    task: Task = Task(),
     start: Mapping[str, torch.Tensor] | None = None,
     group_S: np.ndarray | None = None,
-    make: Callable[[], nn.Module] | None = None,
-    draw: Draw = draw_points,
 ) -> tuple[Classifier, list[dict[str, float]]]:
     """Train on the rows of split ``train``, of which a share of the groups can be held out for validation.
 
     With validation, the weights are those of the epoch with the smallest validation loss, and training may end early.
 
     Args:
-        classes: what ``concept`` names.
-        targets_S_C: numbers that the head learns to predict, by least squares, in the place of the concepts; `classes`
-            then names its columns, and the curve has no accuracy.
+        checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
+            continues from it and ends with the same weights as an unbroken run.
         start: the weights to start from; random ones where None.
         group_S: (S,) of each row; rows of one group are held out together. By default rows of one object that were
             made one after the other.
-        make: makes the encoder, where it is none of the registry.
-        draw: what the encoder sees of a row, anew in every epoch.
-        checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
-            continues from it and ends with the same weights as an unbroken run.
 
     Returns:
         the model (``model.encoder``, ``model.head``), and the training curve: epoch, learning_rate, loss, accuracy,
         and validation_loss and validation_accuracy where samples are held out.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
-    device = best_device()
-    model = (with_head(make(), settings, classes) if make else make_model(settings, classes)).to(device)
+    model = task.model(settings).to(best_device())
     if start is not None:
         model.load_state_dict(start)
-    # Fused, since the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
-    rate = settings.learning_rate
-    optimizer = torch.optim.AdamW(model.parameters(), rate, weight_decay=settings.weight_decay, fused=True)
     rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
     if len(rows) < 2:
         raise InputError(f"registrations of {source}, seed {seed}", "have no training samples", "increase their number")
-    if targets_S_C is None:
-        wanted_S = torch.from_numpy(np.array([classes.index(concept) for concept in registrations.concept]))
-    else:
-        wanted_S = torch.from_numpy(targets_S_C.astype(np.float32))
-    batches = -(-len(rows) // settings.batch_size)
-    steps = max(5, settings.epochs * batches)  # a quarter of 4 would be one step, a rise of no length
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rate, total_steps=steps, pct_start=RISING)
+    training = _Training(model, registrations, rows, task, (source, seed), settings)
     best = deepcopy(model) if len(held_out) else model
-    state = {"model": model, "optimizer": optimizer, "schedule": schedule} | ({"best": best} if len(held_out) else {})
-    identity = repr((source, seed, asdict(settings), fingerprint(registrations, targets_S_C), fingerprint_of(start)))
+    state = training.state | ({"best": best} if len(held_out) else {})
+    data = (fingerprint(registrations, task.targets_S_C), fingerprint_of(start))
+    identity = repr((source, seed, asdict(settings), *data))
     curve = resume(checkpoint, identity, state)
 
-    title = f"{settings.backbone} on {source}, seed {seed}"
-    for epoch in progress(range(len(curve), settings.epochs), title, initial=len(curve), total=settings.epochs):
+    epochs = range(len(curve), settings.epochs)
+    for epoch in progress(epochs, training.title, initial=len(curve), total=settings.epochs):
         if _is_settled(curve, settings.patience):
             break
-        model.train()
-        torch.manual_seed(seed_of(source, seed, "dropout", epoch))  # whether or not it is the first epoch of a process
-        loss_sum = correct = 0.0
-        order = generator(source, seed, "order", epoch).permutation(rows)
-        for batch_rows in np.array_split(order, batches):
-            clouds = draw(
-                *(registrations, batch_rows, settings.draw_points, source, seed, "epoch", epoch),
-                fewest=settings.fewest_points,
-            )
-            logits_B_C = model(_on(device, clouds))
-            wanted_B = wanted_S[batch_rows].to(device)
-            loss = _loss_of(wanted_B)(logits_B_C, wanted_B)
-            optimizer.zero_grad()
-            loss.backward()
-            optimizer.step()
-            schedule.step()
-            loss_sum += loss.item() * len(batch_rows)
-            correct += _hits(logits_B_C, wanted_B)
-        curve.append(
-            {
-                "epoch": epoch + 1,
-                "learning_rate": optimizer.param_groups[0]["lr"],
-                "loss": loss_sum / len(rows),
-                "accuracy": correct / len(rows),
-            }
-        )
-        if not np.isfinite(loss_sum):
-            raise InputError(title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
+        curve.append({"epoch": epoch + 1, **training.run_epoch(epoch)})
         if len(held_out):
-            curve[-1] |= _validate(model, registrations, held_out, wanted_S, source, seed, settings, draw)
+            curve[-1] |= training.validate(held_out)
             if curve[-1]["validation_loss"] == min(record["validation_loss"] for record in curve):
                 best.load_state_dict(model.state_dict())
         keep(checkpoint, identity, state, curve)
     return best.cpu().eval(), curve
+
+
+class _Training:
+    """A model with its optimizer and schedule, and the rows on which it is trained."""
+
+    def __init__(
+        self,
+        model: Classifier,
+        registrations: Registrations,
+        rows: np.ndarray,
+        task: Task,
+        axes: tuple[str, int],
+        settings: EncoderSettings,
+    ) -> None:
+        self._model, self._registrations, self._rows = model, registrations, rows
+        self._axes, self._settings, self._draw = axes, settings, task.draw
+        self._targets_S = task.targets(registrations)
+        self._batches = -(-len(rows) // settings.batch_size)
+        rate = settings.learning_rate
+        steps = max(5, settings.epochs * self._batches)  # a quarter of 4 would be one step, a rise of no length
+        # Fused, since the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
+        self._optimizer = torch.optim.AdamW(model.parameters(), rate, weight_decay=settings.weight_decay, fused=True)
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimizer, rate, steps, pct_start=RISING)
+        self.state = {"model": model, "optimizer": self._optimizer, "schedule": self._schedule}
+        self.title = f"{settings.backbone} on {axes[0]}, seed {axes[1]}"
+
+    def run_epoch(self, epoch: int) -> dict[str, float]:
+        """Train on every row once, in an order of this epoch; return the last learning rate, loss and accuracy."""
+        self._model.train()
+        torch.manual_seed(seed_of(*self._axes, "dropout", epoch))  # whether or not it is the first epoch of a process
+        loss_sum = correct = 0.0
+        order = generator(*self._axes, "order", epoch).permutation(self._rows)
+        for batch_rows in np.array_split(order, self._batches):
+            outputs_B_C, targets_B = self._predict(batch_rows, "epoch", epoch)
+            loss = _loss(outputs_B_C, targets_B)
+            self._optimizer.zero_grad()
+            loss.backward()
+            self._optimizer.step()
+            self._schedule.step()
+            loss_sum += loss.item() * len(batch_rows)
+            correct += _hits(outputs_B_C, targets_B)
+        if not np.isfinite(loss_sum):
+            raise InputError(self.title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
+        means = {"loss": loss_sum / len(self._rows), "accuracy": correct / len(self._rows)}
+        return {"learning_rate": self._optimizer.param_groups[0]["lr"], **means}
+
+    @torch.inference_mode()
+    def validate(self, rows: np.ndarray) -> dict[str, float]:
+        """Return loss and accuracy on rows, of one draw from each cloud that is the same in every epoch."""
+        self._model.eval()
+        batches = np.array_split(rows, -(-len(rows) // self._settings.batch_size))
+        parts = [self._predict(batch_rows, "validation") for batch_rows in batches]
+        outputs_R_C, targets_R = (torch.cat(part).cpu() for part in zip(*parts, strict=True))
+        loss = _loss(outputs_R_C, targets_R).item()
+        return {"validation_loss": loss, "validation_accuracy": _hits(outputs_R_C, targets_R) / len(rows)}
+
+    def _predict(self, rows: np.ndarray, *axes: object) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the head's outputs (B, C) for a draw from each row, named by the axes, and the rows' targets."""
+        points, fewest = self._settings.draw_points, self._settings.fewest_points
+        clouds = self._draw(self._registrations, rows, points, *self._axes, *axes, fewest=fewest)
+        device = best_device()
+        return self._model(_on(device, clouds)), self._targets_S[rows].to(device)
 
 
 def _held_out(
@@ -167,41 +213,15 @@ def _held_out(
     return rows[~is_held_out], rows[is_held_out]
 
 
-@torch.inference_mode()
-def _validate(
-    model: Classifier,
-    registrations: Registrations,
-    rows: np.ndarray,
-    wanted_S: torch.Tensor,
-    source: str,
-    seed: int,
-    settings: EncoderSettings,
-    draw: Draw,
-) -> dict[str, float]:
-    """Return loss and accuracy on rows, of one draw from each cloud that is the same in every epoch.
-
-    Args:
-        wanted_S: each row's class, or the numbers that are to be predicted, which have no accuracy.
-    """
-    model.eval()
-    parts = []
-    for batch_rows in np.array_split(rows, -(-len(rows) // settings.batch_size)):
-        clouds = draw(
-            registrations, batch_rows, settings.draw_points, source, seed, "validation", fewest=settings.fewest_points
-        )
-        parts.append(model(_on(next(model.parameters()).device, clouds)).cpu())
-    logits_R_C, wanted_R = torch.cat(parts), wanted_S[rows]
-    loss = _loss_of(wanted_R)(logits_R_C, wanted_R).item()
-    return {"validation_loss": loss, "validation_accuracy": _hits(logits_R_C, wanted_R) / len(rows)}
+def _loss(outputs_B_C: torch.Tensor, targets_B: torch.Tensor) -> torch.Tensor:
+    """Return the mean squared error where the targets are numbers, else the cross-entropy."""
+    least_squares = targets_B.is_floating_point()
+    return (nn.functional.mse_loss if least_squares else nn.functional.cross_entropy)(outputs_B_C, targets_B)
 
 
-def _loss_of(wanted: torch.Tensor) -> Callable[[torch.Tensor, torch.Tensor], torch.Tensor]:
-    return nn.functional.mse_loss if wanted.is_floating_point() else nn.functional.cross_entropy
-
-
-def _hits(logits_B_C: torch.Tensor, wanted_B: torch.Tensor) -> float:
+def _hits(outputs_B_C: torch.Tensor, targets_B: torch.Tensor) -> float:
     """Return how many classes are right; NaN of numbers."""
-    return np.nan if wanted_B.is_floating_point() else float((logits_B_C.argmax(dim=1) == wanted_B).sum())
+    return np.nan if targets_B.is_floating_point() else float((outputs_B_C.argmax(dim=1) == targets_B).sum())
 
 
 def _is_settled(curve: list[dict[str, float]], patience: int | None) -> bool:

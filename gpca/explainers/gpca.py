@@ -42,20 +42,41 @@ class GPCA:
         started = perf_counter()
         scores_N_C, variances_N_C, bald_N = self._gpc.attribute(self._inputs(registrations))
         seconds = (perf_counter() - started) / len(registrations)
-        zeros_N = np.zeros(len(registrations))
-        return Attribution(
-            concepts=self.labels,
-            scores_N_C=scores_N_C,
-            variances_N_C=variances_N_C,
-            bald_N=bald_N,
-            abstained_N=zeros_N.astype(bool),
-            icp_calls_N=zeros_N.astype(int),
-            seconds_N=zeros_N + seconds,
-            icp_seconds_N=zeros_N,
+        return Attribution.of_scores(
+            self.labels, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N
         )
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
+        """Return what the GPC reads of each registration (N, d)."""
         return registrations.embedding
+
+
+class DescriptorGPCA(GPCA):
+    """GP-CA on descriptors in the place of the embedding, normalised by their ranks among the training samples.
+
+    Args:
+        axes: name the draws of the normalisation.
+        source, seed, settings: as for GP-CA.
+    """
+
+    def __init__(self, axes: tuple, source: str, seed: int, **settings) -> None:
+        from gpca.explainers.pair_classifier import NormalisedDescriptors
+
+        super().__init__(source, seed, **settings)
+        self._normalised = NormalisedDescriptors(*axes)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn the scales of the descriptors, and fit the GPC to the labelled registrations."""
+        features_N_F = self.features(registrations)
+        self._normalised.fit(features_N_F)
+        self._gpc.fit(self._normalised(features_N_F), registrations.concept)
+
+    def features(self, registrations: Registrations) -> np.ndarray:
+        """Return the descriptors (N, F)."""
+        raise NotImplementedError
+
+    def _inputs(self, registrations: Registrations) -> np.ndarray:
+        return self._normalised(self.features(registrations))
 
 
 EXPLAINERS = {

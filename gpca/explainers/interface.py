@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from time import perf_counter
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 
 
 class ConceptExplainer(Protocol):
@@ -45,6 +47,26 @@ class Encoding(Protocol):
 
         Where they are attached, ``fit`` and ``explain`` read them.
         """
+
+
+class ScoringExplainer:
+    """What explainers share that give scores and nothing else: the time that they take is measured.
+
+    Attributes:
+        labels: what it names.
+    """
+
+    labels: tuple[str, ...] = CONCEPTS
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration."""
+        started = perf_counter()
+        scores_N_C = self.scores(registrations)
+        return Attribution.of_scores(self.labels, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the scores (N, C) of the labels."""
+        raise NotImplementedError
 
 
 def measured(

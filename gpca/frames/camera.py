@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gpca.alignment.rigid import rotate
+from gpca.alignment.rigid import rigid_motion, rotate
 from gpca.environment import require_open3d
 from gpca.settings import Bounds, Positive
 
@@ -184,7 +184,4 @@ def look_at(eye_m: np.ndarray, target_m: np.ndarray) -> np.ndarray:
     z = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)
     x = np.cross(z, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
-    T_world_camera = np.eye(4)
-    T_world_camera[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    T_world_camera[:3, 3] = eye_m
-    return T_world_camera
+    return rigid_motion(np.stack([x, np.cross(z, x), z], axis=1), eye_m)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse
+from gpca.alignment.rigid import inverse, rigid_motion
 from gpca.csv_file import ANY, numbers, read_csv
 from gpca.errors import InputError
 from gpca.frames.results_file import Estimates, nearest_to
@@ -110,8 +110,6 @@ def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.nda
         raise InputError(path, "contains a rotation of more than half a turn", "give rotation vectors in radians")
     if np.linalg.norm(shifts_N_3, axis=1).max() > FARTHEST_MM:
         raise InputError(path, "contains an error of more than 10 m", "give translations in millimeters")
-    T_N_4_4 = np.tile(np.eye(4), (len(ids), 1, 1))
-    T_N_4_4[:, :3, :3] = Rotation.from_rotvec(turns_N_3).as_matrix()
-    T_N_4_4[:, :3, 3] = shifts_N_3 / 1000
+    motions = rigid_motion(Rotation.from_rotvec(turns_N_3).as_matrix(), shifts_N_3 / 1000)
     known = set(known)
-    return [(int(number), T) for number, T in zip(ids, T_N_4_4, strict=True) if int(number) in known]
+    return [(int(number), T) for number, T in zip(ids, motions, strict=True) if int(number) in known]

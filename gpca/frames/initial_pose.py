@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, random_direction, rotate, transform
+from gpca.alignment.rigid import inverse, random_direction, rigid_motion, rotate, transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import HalfTurn, Shift
 from gpca.settings import Count, PositiveShare
@@ -45,11 +45,9 @@ class InitialPoseSettings:
 
 def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPoseSettings, random) -> np.ndarray:
     """Return the true pose with a random error of at most the declared size."""
-    T_object_displaced = np.eye(4)
-    angle_rad = np.deg2rad(random.uniform(0, settings.rotation_deg))
-    T_object_displaced[:3, :3] = Rotation.from_rotvec(angle_rad * random_direction(random)).as_matrix()
-    T_object_displaced[:3, 3] = random.uniform(0, settings.translation) * diameter_m * random_direction(random)
-    return T_camera_object @ T_object_displaced
+    turn = Rotation.from_rotvec(np.deg2rad(random.uniform(0, settings.rotation_deg)) * random_direction(random))
+    shift_m = random.uniform(0, settings.translation) * diameter_m * random_direction(random)
+    return T_camera_object @ rigid_motion(turn.as_matrix(), shift_m)
 
 
 class GlobalRegistration:

@@ -276,7 +276,7 @@ class _Objects:
         listed = self._models[number].listed_symmetries
         i = self._index[number]
         return bool(
-            find_symmetries(self._objects.points(i)[:4096], self._objects.diameters_m[i]) if listed is None else listed
+            find_symmetries(self._objects.points(i), self._objects.diameters_m[i]) if listed is None else listed
         )
 
 

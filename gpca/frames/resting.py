@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from gpca.alignment.rigid import rigid_motion
 from gpca.errors import InputError
 from gpca.objects.canonical import diameter
 from gpca.objects.surface import Surface
@@ -36,9 +37,7 @@ def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Draw one of the stable poses and turn it about the vertical."""
     chosen = poses_n[random.choice(len(poses_n), p=probabilities_n / probabilities_n.sum())]
-    turn = np.eye(4)
-    turn[:3, :3] = Rotation.from_euler("z", random.uniform(0, 2 * np.pi)).as_matrix()
-    return turn @ chosen
+    return rigid_motion(Rotation.from_euler("z", random.uniform(0, 2 * np.pi)).as_matrix()) @ chosen
 
 
 def _is_inside(point_m: np.ndarray, hull) -> bool:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.rigid import require_rotation
+from gpca.alignment.rigid import require_rotation, rigid_motion
 from gpca.csv_file import ANY, read_csv
 from gpca.errors import InputError
 from gpca.numerals import decimal, whole
@@ -81,9 +81,8 @@ def _id(subject: str, row: dict, column: str) -> int:
 
 
 def _pose(subject: str, row: dict) -> np.ndarray:
-    T_camera_model = np.eye(4)
-    T_camera_model[:3, :3] = _entries(subject, row, "R", 9).reshape(3, 3)
-    T_camera_model[:3, 3] = _entries(subject, row, "t", 3) / 1000
+    R_camera_model = _entries(subject, row, "R", 9).reshape(3, 3)
+    T_camera_model = rigid_motion(R_camera_model, _entries(subject, row, "t", 3) / 1000)
     require_rotation(T_camera_model, subject)
     if T_camera_model[2, 3] <= 0:
         raise InputError(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.alignment.rigid import require_rotation
+from gpca.alignment.rigid import require_rotation, rigid_motion
 from gpca.errors import InputError
 from gpca.json_file import read_json
 from gpca.numerals import whole
@@ -64,12 +64,11 @@ def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
 
 def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
     """Return an annotation's object id and ``T_camera_model`` in metres; InputError where it can be no pose."""
-    T_camera_model = np.eye(4)
-    T_camera_model[:3, :3] = _numbers(entry, "cam_R_m2c", 9, subject).reshape(3, 3)
+    R_camera_model = _numbers(entry, "cam_R_m2c", 9, subject).reshape(3, 3)
     translation_mm = _numbers(entry, "cam_t_m2c", 3, subject)
     if abs(translation_mm).max() > FARTHEST_MM:
         raise InputError(subject, f"cam_t_m2c is {abs(translation_mm).max():.3g} mm", "no camera sees that far")
-    T_camera_model[:3, 3] = translation_mm / 1000
+    T_camera_model = rigid_motion(R_camera_model, translation_mm / 1000)
     require_rotation(T_camera_model, subject)
     (object_id,) = _numbers(entry, "obj_id", 1, subject)
     if object_id < 0 or object_id > 999_999 or object_id != int(object_id):  # files of models have six digits

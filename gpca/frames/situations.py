@@ -71,7 +71,7 @@ class Shelf:
         names = tuple(surface.name for surface in self.surfaces)
         diameters_m = np.array([diameter_m for *_, diameter_m in clouds])
         self.objects = ObjectClouds(names, diameters_m, tuple((p, n) for p, n, _ in clouds))
-        self.symmetric = [bool(find_symmetries(p[:4096], d)) for p, _, d in clouds]
+        self.symmetric = [bool(find_symmetries(p, d)) for p, _, d in clouds]
         self._settings = estimator or InitialPoseSettings()
         self._estimators: dict[int, GlobalRegistration] = {}
 

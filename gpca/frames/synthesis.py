@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.pose_error import pose_error
+from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.environment import require_open3d
 from gpca.frames.instances import Instances
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 OCCLUDER, HALF_SPACE = "occluder", "half_space"
-JUDGED_POINTS = 1000  # so many points of the model measure a pose error
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from gpca.errors import InputError
 
 TOLERANCE = 0.01  # diameters
+SOUGHT_POINTS = 4096  # of a cloud, the first ones, on which symmetries are sought
 DISCRETE_DEG = (90.0, 180.0)
 CONTINUOUS_DEG = (25.0, 50.0, 75.0)  # none is a symmetry of a square or hexagonal shape
 
@@ -79,7 +80,7 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
         ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with their offset. Keys only
         where there are some.
     """
-    points_N_3 = np.asarray(points_N_3, np.float64)
+    points_N_3 = np.asarray(points_N_3[:SOUGHT_POINTS], np.float64)
     tree = cKDTree(points_N_3)
     spacing = tree.query(points_N_3, k=2)[0][:, 1].mean()
     limit = TOLERANCE * diameter + spacing

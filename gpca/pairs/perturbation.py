@@ -13,12 +13,16 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, random_direction, transform
+from gpca.alignment.rigid import inverse, random_direction, rigid_motion, transform
 from gpca.errors import InputError
 from gpca.settings import Bounds, Share
 
 Concept = Literal["noise", "pose", "overlap"]
 CONCEPTS: tuple[str, ...] = get_args(Concept)
+NOISE, POSE, OVERLAP = range(len(CONCEPTS))
+# What the perturbation of each concept draws, as files name it.
+SEVERITIES_OF = {"noise": ("noise",), "pose": ("rotation_rad", "translation"), "overlap": ("crop",)}
+SEVERITIES = tuple(name for names in SEVERITIES_OF.values() for name in names)
 HalfTurn = Annotated[float, Bounds(minimum=0, maximum=180)]  # in degrees
 Shift = Annotated[float, Bounds(minimum=0, maximum=10)]  # in diameters
 Hidden = Annotated[float, Bounds(minimum=0, maximum=0.95)]  # share; of what is left a pose has to be found
@@ -72,9 +76,7 @@ def misplace(points: np.ndarray, severities: Severities, random: np.random.Gener
     """Rotate about a random axis through the object's centre and shift in a random direction."""
     angle_rad = np.deg2rad(random.uniform(*severities.rotation_deg))
     distance = random.uniform(*severities.translation)
-    T_source_target = np.eye(4)
-    T_source_target[:3, :3] = Rotation.from_rotvec(angle_rad * random_direction(random)).as_matrix()
-    T_source_target[:3, 3] = distance * random_direction(random)
+    T_source_target = misplacement(angle_rad, distance, random)
     return Perturbed(
         transform(T_source_target, points),
         inverse(T_source_target),
@@ -82,12 +84,26 @@ def misplace(points: np.ndarray, severities: Severities, random: np.random.Gener
     )
 
 
+def misplacement(angle_rad: float, distance: float, random: np.random.Generator) -> np.ndarray:
+    """Return the transform (4, 4) that turns by an angle about a random axis and shifts in a random direction."""
+    turn = Rotation.from_rotvec(angle_rad * random_direction(random))
+    return rigid_motion(turn.as_matrix(), distance * random_direction(random))
+
+
 def crop(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
     """Cut off the points beyond a plane with a random normal, placed so that the drawn share is lost."""
     share = random.uniform(*severities.crop)
-    along = points @ random_direction(random)
-    kept = np.argsort(along, kind="stable")[: max(1, round(len(points) * (1 - share)))]
-    return Perturbed(points[np.sort(kept)], severity={"crop": share})
+    return Perturbed(points[within_half_space(points @ random_direction(random), share, 1)], severity={"crop": share})
+
+
+def within_half_space(along_N: np.ndarray, share: float, fewest: int) -> np.ndarray:
+    """Return the rows, in order, that are left when a half-space takes a share of the points, but for the fewest.
+
+    Args:
+        along_N: how far each point lies along the normal of the plane, towards what is lost.
+    """
+    left = max(min(fewest, len(along_N)), round(len(along_N) * (1 - share)))
+    return np.sort(np.argsort(along_N, kind="stable")[:left])
 
 
 Perturbation = Callable[[np.ndarray, Severities, np.random.Generator], Perturbed]

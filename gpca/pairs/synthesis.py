@@ -15,7 +15,7 @@ from gpca.environment import require_open3d
 from gpca.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
-from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed, Severities
+from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, Perturbed, Severities
 from gpca.progress import progress
 from gpca.seeds import generator
 from gpca.settings import Bounds
@@ -102,7 +102,7 @@ def align_pair(
     icp = ICP(target, objects.normals(object_index)[target_rows], icp_settings)
     registration = icp.register(perturbed.points, T_init)
     icp_seconds = perf_counter() - started
-    severity = {name: perturbed.severity.get(name, 0.0) for name in ("noise", "rotation_rad", "translation", "crop")}
+    severity = {name: perturbed.severity.get(name, 0.0) for name in SEVERITIES}
     return {
         "object_index": object_index,
         "object_name": str(objects.names[object_index]),

@@ -16,7 +16,8 @@ from gpca.progress import progress
 from gpca.readings.given import Given, Row
 from gpca.readings.settings import Reading, ReadingSizes
 from gpca.seeds import generator
-from gpca.uncertainty.designs import CORNERS, KNOB_RANGE, STEP, Pair
+from gpca.uncertainty.conditions import CORNERS
+from gpca.uncertainty.designs import KNOB_RANGE, STEP, Pair
 from gpca.uncertainty.evaluation import design_rows
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
 from gpca.uncertainty.settings import UncertaintySettings

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from gpca.alignment.icp import clipped_cost
-from gpca.alignment.rigid import inverse, scale_translation
+from gpca.alignment.rigid import inverse, rigid_motion, scale_translation
 from gpca.errors import require_known
 from gpca.frames.shots import Shot, agreement, fuse
 from gpca.settings import require_arguments
@@ -91,9 +91,8 @@ def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: 
     icp = BatchedICP(model_m / d, replace(settings, correspondence_distance=LOOSER * settings.correspondence_distance))
     away = cloud_m.mean(axis=0) - holding.shots[0].T_world_camera[:3, 3]
     away /= np.linalg.norm(away)
-    T_world_object_n = np.tile(np.eye(4), (starts, 1, 1))
-    T_world_object_n[:, :3, :3] = Rotation.random(starts, random_state=random).as_matrix()
-    T_world_object_n[:, :3, 3] = cloud_m.mean(axis=0) + np.resize(BEHIND, starts)[:, None] * d * away
+    centers_n_3_m = cloud_m.mean(axis=0) + np.resize(BEHIND, starts)[:, None] * d * away
+    T_world_object_n = rigid_motion(Rotation.random(starts, random_state=random).as_matrix(), centers_n_3_m)
     T_world_object_n[0] = holding.T_world_object
     starts_n = np.array([scale_translation(inverse(T), 1 / d) for T in T_world_object_n])
     poses_n, fitness_n, rmse_n = icp.register(thinned_m / d, starts_n)

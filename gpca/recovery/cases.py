@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.pose_error import pose_error
+from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.frames.shots import Shot, fuse
 from gpca.frames.situations import Situation
@@ -18,7 +18,6 @@ from gpca.recovery.actions import Action, Holding
 from gpca.seeds import generator
 
 FEWEST_POINTS = 64  # with fewer points of the object in all shots there is nothing to register
-JUDGED_POINTS = 1000  # so many points of the model measure a pose error
 
 
 @dataclass(frozen=True)

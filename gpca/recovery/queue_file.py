@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import wilson_interval
-from gpca.csv_file import numbers, read_csv
+from gpca.csv_file import read_numbers
 from gpca.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,9 +30,7 @@ def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
 
     parts = []
     for path in files:
-        rows = read_csv(path, QUEUE_COLUMNS)
-        for name in QUEUE_COLUMNS[2:]:
-            rows[name] = numbers(path, rows, name)
+        rows = read_numbers(path, QUEUE_COLUMNS, QUEUE_COLUMNS[2:])
         within = (rows["unsolved"] >= 0) & (rows["unsolved"] <= rows["failures"]) & (rows["failures"] > 0)
         if not (within & rows["order"].isin((DOUBTED, DRAWN))).all():
             raise InputError(path, "contains an unknown order, or more errors than failures", "regenerate it")

@@ -17,7 +17,8 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.steps import per_seed
-from gpca.uncertainty.outcomes import CONDITIONS, Outcomes, read_seconds
+from gpca.uncertainty.conditions import CONDITIONS
+from gpca.uncertainty.outcomes import Outcomes, read_seconds
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -96,7 +97,7 @@ def _load(
             )
         outcomes = Outcomes.load(uncertainty, axes)
         found = outcomes.uncertainty.shape[1]
-        if found != CONDITIONS.get(entry.design, found):
+        if entry.design in CONDITIONS and found != len(CONDITIONS[entry.design]):
             remedy = f"make it with 'python -m gpca uncertainty --design {entry.design}'"
             raise InputError(uncertainty, f"{found} conditions are not those of design '{entry.design}'", remedy)
         return outcomes.attach_to(loaded, *read_seconds(uncertainty_timings, outcomes))

@@ -12,8 +12,8 @@ from gpca.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.provenance import record_provenance
 from gpca.steps import checked_by_name, checked_sections, per_seed, require_files
-from gpca.trials.covariances import REFERENCE, ReferenceSamples
-from gpca.trials.estimation import try_estimators
+from gpca.trials.covariances import REFERENCE
+from gpca.trials.estimation import reference_samples, try_estimators
 from gpca.trials.judge import Judges
 from gpca.trials.settings import EstimatorPairSettings
 from gpca.uncertainty.estimators.registry import require_estimator_settings
@@ -58,7 +58,7 @@ def run(options: Namespace) -> None:
         inputs = [options.objects, path]
         with record_provenance([*out, *timings, samples], inputs, options.settings, seed=seed):
             rows, cases = try_estimators(Causes.load(path, axes), judges, *axes, estimators, settings)
-            ReferenceSamples.of(cases).save(samples, axes)
+            reference_samples(cases).save(samples, axes)
             for of_estimator, own_out, own_timings in zip(rows.values(), out, timings, strict=True):
                 write_csv(own_out, of_estimator.drop(columns="seconds"))
                 write_csv(own_timings, of_estimator[["sample", "method", "seconds"]])

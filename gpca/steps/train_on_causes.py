@@ -16,7 +16,7 @@ from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, with_label
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed, train_encoder
+from gpca.encoders.training import Task, embed, train_encoder
 from gpca.encoders.weights import write_weights
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
@@ -47,7 +47,7 @@ def run(options: Namespace) -> None:
         causes = Causes.load(options.causes, axes)
         registrations = causes.registrations
         seconds_S, icp_seconds_S = read_timings(options.causes_timings, registrations)
-        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, LABELS)
+        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, Task(LABELS))
         started = perf_counter()
         h_S_d, logits_S_C = embed(model, registrations, *axes, settings)
         seconds = (perf_counter() - started) / len(h_S_d)

@@ -18,8 +18,6 @@ from gpca.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from gpca.trials.estimation import Case
-
 REFERENCE = "reference"  # Monte-Carlo from many starts, which has rows of its own among the estimators
 MADE_BY = "python -m gpca estimate"
 SIXTH = np.triu_indices(6)
@@ -81,17 +79,6 @@ class ReferenceSamples:
     twists: np.ndarray
     offsets: np.ndarray
     true_twist: np.ndarray
-
-    @classmethod
-    def of(cls, cases: list[Case]) -> ReferenceSamples:
-        """Return those of registrations that were tried."""
-        return cls(
-            sample=np.array([case.known["sample"] for case in cases]),
-            method=np.array([case.known["method"] for case in cases]),
-            twists=np.concatenate([case.reference_twists for case in cases]).astype(np.float32),
-            offsets=np.cumsum([0, *(len(case.reference_twists) for case in cases)], dtype=np.int64),
-            true_twist=np.array([case.true_twist for case in cases]),
-        )
 
     def twists_of(self, i: int) -> np.ndarray:
         """Return the twists (N, 6) of a row."""

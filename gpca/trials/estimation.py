@@ -6,7 +6,7 @@ kind. They are held against a reference, Monte-Carlo from many starts, and again
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -22,13 +22,14 @@ from gpca.descriptors.pair import observed_pair
 from gpca.errors import InputError
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
-from gpca.trials.covariances import JUDGED, REFERENCE, covariance_columns
+from gpca.trials.covariances import JUDGED, REFERENCE, ReferenceSamples, covariance_columns
 from gpca.trials.examples import Moved, describe, example, true_twist
 from gpca.trials.judge import Judges
 from gpca.trials.settings import EstimatorPairSettings
 from gpca.uncertainty.estimators.interface import Estimate, Example, FailedEstimate, RegisteredPair
 from gpca.uncertainty.estimators.monte_carlo import sample
 from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
+from gpca.uncertainty.spread import divergence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,6 +106,17 @@ def try_estimators(
     return {name: pd.DataFrame(of_estimator) for name, of_estimator in records.items()}, cases
 
 
+def reference_samples(cases: Sequence[Case]) -> ReferenceSamples:
+    """Return what the file of the reference's results holds of these registrations."""
+    return ReferenceSamples(
+        sample=np.array([case.known["sample"] for case in cases]),
+        method=np.array([case.known["method"] for case in cases]),
+        twists=np.concatenate([case.reference_twists for case in cases]).astype(np.float32),
+        offsets=np.cumsum([0, *(len(case.reference_twists) for case in cases)], dtype=np.int64),
+        true_twist=np.array([case.true_twist for case in cases]),
+    )
+
+
 class _Maker:
     """Registers rows of the causes by one method, as they come to the estimators."""
 
@@ -174,14 +186,6 @@ def predicted_spread(points_N_3: np.ndarray, covariance_6_6: np.ndarray) -> floa
     return float(np.sqrt(max(squares.mean(), 0.0)))
 
 
-def kl(reference_k_k: np.ndarray, estimate_k_k: np.ndarray, floor: float) -> float:
-    """Return KL(N(0, Σ_ref + εI) ‖ N(0, Σ + εI)) in nats, of blocks of any size."""
-    k = len(reference_k_k)
-    first, second = reference_k_k + floor * np.eye(k), estimate_k_k + floor * np.eye(k)
-    log_ratio = np.linalg.slogdet(second)[1] - np.linalg.slogdet(first)[1]
-    return float(max(0.5 * (np.trace(np.linalg.solve(second, first)) + log_ratio - k), 0.0))
-
-
 def _judged(case: Case, said: Estimate, reference: Estimate, floor: float) -> dict[str, object]:
     """Return the row of an estimate; numbers that it has not are NaN."""
     row = {**case.known, "failure": said.failure}
@@ -194,7 +198,8 @@ def _judged(case: Case, said: Estimate, reference: Estimate, floor: float) -> di
         numbers["spread"] = predicted_spread(points, sigma_6_6)
         if reference.covariance_6_6 is not None:
             for name, block in (("kl_rotation", slice(0, 3)), ("kl_translation", slice(3, 6))):
-                numbers[name] = kl(reference.covariance_6_6[block, block], sigma_6_6[block, block], floor)
+                expected_3_3, estimated_3_3 = reference.covariance_6_6[block, block], sigma_6_6[block, block]
+                numbers[name] = float(divergence(expected_3_3, estimated_3_3, floor))
     return row | numbers | covariance_columns(said.covariance_6_6)
 
 

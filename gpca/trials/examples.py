@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from gpca.alignment.methods.interface import Outcome, Pair
-from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.rigid import inverse, rigid_motion, transform
 from gpca.alignment.twist import log
 from gpca.descriptors.distances import describe_distances
 from gpca.descriptors.entropy import describe_entropy
@@ -50,11 +50,10 @@ def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, mov
     Symmetries are turns of the model: before the pose where the model moves, after it where it is the target.
     """
     T_found = registered.T_target_source
-    turn = np.eye(4)
     if moved == "model":
-        turn[:3, :3] = symmetric_turn(T_found[:3, :3].T @ T_true[:3, :3], judge.symmetries)
+        turn = rigid_motion(symmetric_turn(T_found[:3, :3].T @ T_true[:3, :3], judge.symmetries))
         return log((T_true @ turn @ inverse(T_found))[None])[0]
-    turn[:3, :3] = symmetric_turn(T_true[:3, :3] @ T_found[:3, :3].T, judge.symmetries)
+    turn = rigid_motion(symmetric_turn(T_true[:3, :3] @ T_found[:3, :3].T, judge.symmetries))
     return log((turn @ T_true @ inverse(T_found))[None])[0]
 
 

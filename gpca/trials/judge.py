@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.pose_error import PoseErrors
+from gpca.alignment.pose_error import JUDGED_POINTS, PoseErrors
 from gpca.alignment.rigid import inverse
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.symmetry import angle_up_to_symmetry, find_symmetries
 from gpca.pairs.dataset import Registrations
-
-JUDGED_POINTS = 1000  # of the object, over which ADD is the mean
-SYMMETRY_POINTS = 4096  # as everywhere where symmetries are sought
 
 
 class Judge:
@@ -27,7 +24,7 @@ class Judge:
 
     def __init__(self, objects: ObjectClouds, index: int) -> None:
         diameter_m = float(objects.diameters_m[index])
-        self.symmetries = find_symmetries(objects.points(index)[:SYMMETRY_POINTS], diameter_m)
+        self.symmetries = find_symmetries(objects.points(index), diameter_m)
         self.symmetric = bool(self.symmetries)
         self._add = PoseErrors(objects.points(index).astype(np.float64) / diameter_m, JUDGED_POINTS, self.symmetric)
 

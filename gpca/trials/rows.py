@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 
 if TYPE_CHECKING:
     import pandas as pd
 
 INITIAL, NO_START = "initial", "none"  # where a registration starts, or the name of a global method
-SEVERITIES = ("severity_noise", "severity_rotation_rad", "severity_translation", "severity_crop")
+SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
 MEASURED = ("add_relative", "rotation_error_rad", "translation_error")
-COLUMNS = ("sample", "concept", "start", "success", "failure", *SEVERITIES, *MEASURED)
+COLUMNS = ("sample", "concept", "start", "success", "failure", *SEVERITY_COLUMNS, *MEASURED)
 
 
 def row_name(method: str, start: str) -> str:
@@ -26,7 +26,7 @@ def row_name(method: str, start: str) -> str:
 def read_trials(path: str | Path) -> pd.DataFrame:
     """Read a file of the step ``register_methods``: `success` as booleans, numbers as numbers, the rest as text."""
     rows = read_csv(path, COLUMNS, others=("object", "symmetric", "fitness", "inlier_rmse"))
-    for name in (*SEVERITIES, *MEASURED):
+    for name in (*SEVERITY_COLUMNS, *MEASURED):
         rows[name] = numbers(path, rows, name, least=0)
     if not (rows["concept"].isin(CONCEPTS) & rows["success"].isin(("True", "False"))).all():
         raise InputError(path, "contains an unknown cause, or a success other than True and False", "regenerate it")

@@ -19,7 +19,7 @@ from gpca.pairs.dataset import Registrations
 from gpca.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.trials.judge import Judges
-from gpca.trials.rows import INITIAL, NO_START, SEVERITIES
+from gpca.trials.rows import INITIAL, NO_START, SEVERITY_COLUMNS
 from gpca.trials.settings import PairSettings
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def try_methods(
             "sample": registrations.sample[row],
             "object": registrations.object_name[row],
             "concept": registrations.concept[row],
-            **{name: getattr(registrations, name)[row] for name in SEVERITIES},
+            **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
             "symmetric": judge.symmetric,
         }
         found = _timed(made[start], pair)

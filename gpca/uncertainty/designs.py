@@ -14,22 +14,15 @@ import numpy as np
 
 from gpca.names import SPLITS
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import SEVERITIES
 from gpca.seeds import seed_of
+from gpca.uncertainty.conditions import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
-from gpca.uncertainty.remedies import Remedies, RemedyRuns
+from gpca.uncertainty.remedies import RemedyRuns
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Outcome
 
 STEP = 0.1  # a local derivative takes this step, in the knob's range
-LATIN = 24  # settings of the knobs in a Latin hypercube
-SALTELLI = 8  # base samples of Saltelli's scheme, which makes five settings of each
-
-# The corners of the cube of three switches; corner b has switch i on where bit i of b is set.
-CORNERS = tuple(tuple(bool(corner >> i & 1) for i in range(3)) for corner in range(8))
-
-
-SEVERITIES = ("noise", "rotation_rad", "translation", "crop")
 KNOB_RANGE = np.subtract(UPPER, UNTOUCHED)
 # The settings of design ``additive``: the corners, and a small step of one knob.
 ADDITIVE_KNOBS = (
@@ -153,25 +146,17 @@ def sample_knobs(kind: str) -> np.ndarray:
     return sobol.sample(problem, SALTELLI, calc_second_order=False, seed=seed)
 
 
-def _names(corners: tuple[tuple[bool, ...], ...], switches: tuple[str, ...], none: str) -> tuple[str, ...]:
-    return tuple("+".join(name for name, on in zip(switches, corner, strict=True) if on) or none for corner in corners)
-
-
-_KNOB_CORNERS = _names(CORNERS, CONCEPTS, "untouched")
-
 DESIGNS = {
     # SHAP and local sensitivity as the paper describes them: fixed knobs on top of the observed pair.
-    "additive": Design(_additive, (*_KNOB_CORNERS, *(f"{concept}_step" for concept in CONCEPTS))),
-    "latin": Design(partial(_sweep, "latin"), ("untouched", *(f"latin_{k}" for k in range(LATIN)))),
-    "saltelli": Design(partial(_sweep, "saltelli"), ("untouched", *(f"saltelli_{k}" for k in range(5 * SALTELLI)))),
+    "additive": Design(_additive, CONDITIONS["additive"]),
+    "latin": Design(partial(_sweep, "latin"), CONDITIONS["latin"]),
+    "saltelli": Design(partial(_sweep, "saltelli"), CONDITIONS["saltelli"]),
     # The true knobs on a clean pair.
-    "oracle": Design(_oracle, _KNOB_CORNERS, oracle=True),
+    "oracle": Design(_oracle, CONDITIONS["oracle"], oracle=True),
     # Remedies applied to the observed pair; the clean run is the one with all of them.
-    "removal": Design(
-        _removal, _names(CORNERS, Remedies._fields, "observed"), reference=len(CORNERS) - 1, splits=SPLITS
-    ),
+    "removal": Design(_removal, CONDITIONS["removal"], reference=len(CORNERS) - 1, splits=SPLITS),
     # The observed pair alone, for explainers that need no more: the reference is itself, so the uncertainty is none.
-    "observed": Design(_observed, ("observed",), splits=SPLITS),
+    "observed": Design(_observed, CONDITIONS["observed"], splits=SPLITS),
     # Whether the pair is uncertain at all, beside a second clean pair.
-    "causal": Design(_causal, ("reference", "clean", "observed")),
+    "causal": Design(_causal, CONDITIONS["causal"]),
 }

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import random_direction
 from gpca.errors import InputError
+from gpca.pairs.perturbation import within_half_space
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarise_runs
 
@@ -40,6 +41,7 @@ UNTOUCHED = Knobs()
 MIDDLE = Knobs(0.02, 3.75, 0.40)
 UPPER = Knobs(0.03, 6.0, 0.60)  # their upper ends: 3 %, 60°, 60 %
 MOST = Knobs(1.0, 100.0, 0.95)
+FEWEST_POINTS = 3  # that a cut leaves
 
 
 class KnobbedSource:
@@ -53,7 +55,7 @@ class KnobbedSource:
     def __init__(self, source: np.ndarray, random: np.random.Generator) -> None:
         self._source = source
         self._jitter = random.normal(size=source.shape)
-        self._order = np.argsort(source @ random_direction(random), kind="stable")
+        self._along = source @ random_direction(random)
 
     def at(self, knobs: Knobs) -> np.ndarray:
         """Return the points (n, 3) that are left, with their jitter.
@@ -64,7 +66,7 @@ class KnobbedSource:
         for name, value, most in zip(Knobs._fields, knobs, MOST, strict=True):
             if not 0 <= value <= most:
                 raise InputError(f"knob '{name}'", f"{value} is outside [0, {most}]", "give a value within it")
-        kept = np.sort(self._order[: max(3, round(len(self._order) * (1 - knobs.overlap)))])
+        kept = within_half_space(self._along, knobs.overlap, FEWEST_POINTS)
         return (self._source + knobs.noise * self._jitter)[kept]
 
 

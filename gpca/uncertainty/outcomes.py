@@ -14,9 +14,6 @@ from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 
-# How many conditions each design has. A test holds it to designs.py, which readers of outcomes need not depend on.
-CONDITIONS = {"additive": 11, "latin": 25, "saltelli": 41, "oracle": 8, "removal": 8, "observed": 1, "causal": 3}
-
 
 @dataclass(frozen=True)
 class Outcomes:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from functools import cached_property
 from time import perf_counter
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import transform
+from gpca.uncertainty.conditions import Remedies
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarise_runs
 
@@ -23,14 +23,6 @@ OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbour distance
 BROADER = 3.75  # spread of the restarts, in that of the other starts: the middle of the pose severities
 RESTARTS = 5  # the one with the lowest cost counts
 FEWEST_POINTS = 16  # where a trimmed target would have fewer, nothing is trimmed
-
-
-class Remedies(NamedTuple):
-    """What is switched on, in the order of the concepts noise, pose, overlap."""
-
-    denoise: bool = False
-    restart: bool = False
-    trim: bool = False
 
 
 class RemedyRuns:

@@ -123,14 +123,15 @@ def log_residual(points: np.ndarray, tree: cKDTree) -> float:
 
 
 def divergence(covariance_clean: np.ndarray, covariance: np.ndarray, floor: float) -> np.ndarray:
-    """Return u = KL(N(0, Σ_clean + εI) ‖ N(0, Σ + εI)) in nats over the last two axes (…, 6, 6).
+    """Return u = KL(N(0, Σ_clean + εI) ‖ N(0, Σ + εI)) in nats over the last two axes (…, k, k), k = 6 for a pose.
 
-    u = ½ [tr(Σ⁻¹ Σ_clean) + ln(|Σ| / |Σ_clean|) − 6]; zero where the two are equal, finite whatever they are.
+    u = ½ [tr(Σ⁻¹ Σ_clean) + ln(|Σ| / |Σ_clean|) − k]; zero where the two are equal, finite whatever they are.
     """
-    clean, other = covariance_clean + floor * np.eye(6), covariance + floor * np.eye(6)
+    k = covariance.shape[-1]
+    clean, other = covariance_clean + floor * np.eye(k), covariance + floor * np.eye(k)
     trace = np.trace(np.linalg.solve(other, np.broadcast_to(clean, other.shape)), axis1=-2, axis2=-1)
     log_ratio = np.linalg.slogdet(other)[1] - np.linalg.slogdet(clean)[1]
-    return np.maximum(0.5 * (trace + log_ratio - 6), 0.0)
+    return np.maximum(0.5 * (trace + log_ratio - k), 0.0)
 
 
 def log_determinant(covariance: np.ndarray, floor: float) -> np.ndarray:

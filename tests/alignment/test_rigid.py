@@ -6,6 +6,7 @@ from gpca.alignment.rigid import (
     inverse,
     random_direction,
     require_rigid,
+    rigid_motion,
     rotate,
     rotation_angle_rad,
     scale_translation,
@@ -15,16 +16,22 @@ from gpca.errors import InputError
 
 
 def pose(seed=0):
-    T_b_a = np.eye(4)
-    T_b_a[:3, :3] = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
-    T_b_a[:3, 3] = [0.3, -0.2, 0.1]
-    return T_b_a
+    return rigid_motion(Rotation.random(rng=np.random.default_rng(seed)).as_matrix(), [0.3, -0.2, 0.1])
 
 
 def test_transform_is_the_product_with_homogeneous_points():
     points_a = np.random.default_rng(1).normal(size=(20, 3))
     homogeneous = np.column_stack([points_a, np.ones(20)])
     assert np.allclose(transform(pose(), points_a), (pose() @ homogeneous.T).T[:, :3])
+
+
+def test_a_motion_turns_and_then_shifts_one_point_or_many():
+    R_n = Rotation.random(5, rng=np.random.default_rng(0)).as_matrix()
+    shift_n_3 = np.random.default_rng(1).normal(size=(5, 3))
+    for T_b_a, R, shift_3 in zip(rigid_motion(R_n, shift_n_3), R_n, shift_n_3, strict=True):
+        assert np.array_equal(T_b_a, rigid_motion(R, shift_3))
+        assert transform(T_b_a, np.ones(3)) == pytest.approx(R @ np.ones(3) + shift_3)
+    assert np.array_equal(rigid_motion(np.eye(3)), np.eye(4))
 
 
 def test_the_inverse_takes_points_back():

@@ -25,11 +25,11 @@ def with_losses(monkeypatch, losses):
     """Let validation say these losses, epoch by epoch, and return the rows that it was given."""
     given, said = [], iter(losses)
 
-    def validate(model, registrations, rows, *_):
+    def validate(self, rows):
         given.append(rows)
         return {"validation_loss": next(said), "validation_accuracy": 0.5}
 
-    monkeypatch.setattr(training, "_validate", validate)
+    monkeypatch.setattr(training._Training, "validate", validate)
     return given
 
 

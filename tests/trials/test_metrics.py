@@ -9,7 +9,7 @@ from gpca.csv_file import write_csv
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.trials.metrics import collect_seconds, collect_trials, share_of_milder
-from gpca.trials.rows import MEASURED, SEVERITIES, read_trials, row_name
+from gpca.trials.rows import MEASURED, SEVERITY_COLUMNS, read_trials, row_name
 
 RANGES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05, 0.30], "crop": [0.2, 0.6]}
 
@@ -17,7 +17,7 @@ RANGES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05,
 def trials(starts=("initial", "fgr"), **changes):
     """Six pairs, two of each cause, the milder one a success from the first start."""
     severe, mild = (
-        dict(zip(SEVERITIES, of, strict=True)) for of in ((0.029, 1.0, 0.29, 0.58), (0.011, 0.3, 0.06, 0.22))
+        dict(zip(SEVERITY_COLUMNS, of, strict=True)) for of in ((0.029, 1.0, 0.29, 0.58), (0.011, 0.3, 0.06, 0.22))
     )
     records = []
     for sample in range(6):
@@ -104,7 +104,9 @@ def test_the_file_is_read_as_it_was_written(written):
     rows = read_trials(written(trials()))
     assert rows["success"].tolist() == trials()["success"].tolist()
     assert set(rows["failure"]) == {"", "lost, alas"}
-    assert rows[list(SEVERITIES)].to_numpy() == pytest.approx(trials()[list(SEVERITIES)].to_numpy(), abs=1e-6)
+    assert rows[list(SEVERITY_COLUMNS)].to_numpy() == pytest.approx(
+        trials()[list(SEVERITY_COLUMNS)].to_numpy(), abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(

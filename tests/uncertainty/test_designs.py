@@ -6,7 +6,8 @@ import pytest
 from gpca.alignment.rigid import transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.designs import CORNERS, DESIGNS, KNOB_RANGE, LATIN, SALTELLI, STEP, Pair, sample_knobs
+from gpca.uncertainty.conditions import CONDITIONS, CORNERS, LATIN, SALTELLI
+from gpca.uncertainty.designs import DESIGNS, KNOB_RANGE, STEP, Pair, sample_knobs
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -38,6 +39,10 @@ def test_corner_bits_are_switches():
     assert CORNERS[1] == (True, False, False) and CORNERS[4] == (False, False, True)
     for corner, switches in enumerate(CORNERS):
         assert sum(on << i for i, on in enumerate(switches)) == corner
+
+
+def test_every_design_that_is_named_can_be_run():
+    assert DESIGNS.keys() == CONDITIONS.keys()
 
 
 @pytest.mark.parametrize("design", DESIGNS)

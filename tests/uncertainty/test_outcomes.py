@@ -5,8 +5,7 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.uncertainty.designs import DESIGNS
-from gpca.uncertainty.outcomes import CONDITIONS, Outcomes, read_seconds, write_seconds
+from gpca.uncertainty.outcomes import Outcomes, read_seconds, write_seconds
 
 COLUMNS = tuple(field.name for field in fields(Outcomes))
 S, K = 6, 4
@@ -29,10 +28,6 @@ def made(sample=range(S), split=("train",) * 2 + ("test",) * 4, seed=0):
 def seconds_of(outcomes, seed=0):
     seconds = np.random.default_rng(seed).uniform(0.001, 2, size=outcomes.uncertainty.shape).round(6)
     return seconds, (0.9 * seconds).round(6)
-
-
-def test_every_design_has_its_number_of_conditions():
-    assert {name: len(design.conditions) for name, design in DESIGNS.items()} == CONDITIONS
 
 
 # The npz

@@ -6,7 +6,7 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.twist import exp
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.uncertainty import remedies
-from gpca.uncertainty.designs import CORNERS
+from gpca.uncertainty.conditions import CORNERS
 from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbours, denoise, trim
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Runs

@@ -55,6 +55,9 @@ def test_of_diagonal_covariances_it_is_the_sum_over_the_axes():
     by_hand = 0.5 * sum(c / o - 1 - np.log(c / o) for c, o in zip(clean + 0.5, other + 0.5, strict=True))
     assert divergence(np.diag(clean), np.diag(other), 0.5) == pytest.approx(by_hand, rel=1e-12)
     assert by_hand > 0.1
+    # Of a block of the pose, such as the rotation, as well.
+    assert divergence(np.diag([1.0, 2]), np.diag([2.0, 2]), 0.0) == pytest.approx(0.5 * (0.5 - 1 + np.log(2)))
+    assert divergence(np.zeros((3, 3)), np.zeros((3, 3)), 1e-6) == 0
 
 
 @pytest.mark.parametrize("factor", [1.5, 4.0, 0.3])

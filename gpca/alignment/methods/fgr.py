@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.features import RADIUS, cloud_with_normals, fpfh
+from gpca.alignment.features import RADIUS, fpfh_of_pair
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
     FailedRegistration,
@@ -36,7 +36,7 @@ def align(
     """
     o3d = require_open3d()
     registration = o3d.pipelines.registration
-    clouds = [cloud_with_normals(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
+    clouds, features = fpfh_of_pair(pair, feature_radius)
     o3d.utility.random.seed(pair.seed % 2**31)
     option = registration.FastGlobalRegistrationOption(
         use_absolute_scale=True,
@@ -46,7 +46,6 @@ def align(
         tuple_scale=tuple_similarity,
         maximum_tuple_count=tuples,
     )
-    features = [fpfh(cloud, feature_radius) for cloud in clouds]
     try:
         found = registration.registration_fgr_based_on_feature_matching(*clouds, *features, option)
     except RuntimeError as fault:  # with a single match it has none to draw from

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gpca.alignment.features import RADIUS, cloud_with_normals, fpfh
+from gpca.alignment.features import RADIUS, fpfh_of_pair
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
     FEWEST,
@@ -35,11 +35,11 @@ def align(
     """
     o3d = require_open3d()
     registration = o3d.pipelines.registration
-    clouds = [cloud_with_normals(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
+    clouds, features = fpfh_of_pair(pair, feature_radius)
     o3d.utility.random.seed(pair.seed % 2**31)
     found = registration.registration_ransac_based_on_feature_matching(
         *clouds,
-        *(fpfh(cloud, feature_radius) for cloud in clouds),
+        *features,
         mutual_filter=True,
         max_correspondence_distance=inlier_distance,
         estimation_method=registration.TransformationEstimationPointToPoint(False),

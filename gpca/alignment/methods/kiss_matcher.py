@@ -15,6 +15,7 @@ from gpca.alignment.methods.interface import (
     Outcome,
     Pair,
 )
+from gpca.alignment.rigid import rigid_motion
 
 # Diameters. On a development seed, the best of 0.02 to 0.13 for clouds of some 500 points; for 2000 it is 0.05.
 VOXEL = 0.08
@@ -35,8 +36,7 @@ def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = COR
         raise FailedRegistration(f"KISS-Matcher: {fault}") from fault
     if not found.valid or matcher.get_num_final_inliers() < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
-    T_target_source = np.eye(4)
-    T_target_source[:3, :3], T_target_source[:3, 3] = found.rotation, np.ravel(found.translation)
+    T_target_source = rigid_motion(found.rotation, np.ravel(found.translation))
     return Outcome.at(pair, T_target_source, correspondence_distance)
 
 

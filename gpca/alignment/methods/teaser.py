@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gpca.alignment.decoupled import solve
-from gpca.alignment.features import RADIUS, cloud_with_normals, fpfh, mutual_matches
+from gpca.alignment.features import RADIUS, fpfh_of_pair, mutual_matches
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
     FEWEST,
@@ -28,10 +28,8 @@ def align(
         noise: how far a right match may be off, in diameters: about the spacing of the points.
         most_matches: the best so many are used; TEASER's authors advise some hundreds.
     """
-    source_N_33, target_P_33 = (
-        fpfh(cloud_with_normals(getattr(pair, name), pair.normals(name)), feature_radius).data.T
-        for name in ("source", "target")
-    )
+    _, features = fpfh_of_pair(pair, feature_radius)
+    source_N_33, target_P_33 = (each.data.T for each in features)
     rows_n_2 = mutual_matches(source_N_33, target_P_33, most_matches)
     found = solve(pair.source[rows_n_2[:, 0]], pair.target[rows_n_2[:, 1]], noise)
     if found is None or len(found.inliers) < FEWEST:

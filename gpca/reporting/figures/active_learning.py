@@ -119,9 +119,7 @@ def draw_panels(
                              for i, part in enumerate((sources, rows, lines)))  # fmt: skip
     if not shown:
         raise InputError("active learning", "has no curve of these sources and strategies", "run it first")
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     longest = max(len(lines[line]) for line in across)
     beside = max(1, min(LEGEND_COLUMNS, LEGEND_LETTERS // (longest + LEGEND_LETTERS_OF_LINE)))
     below = -(-(len(across) + 1) // beside)

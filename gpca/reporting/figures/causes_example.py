@@ -67,9 +67,7 @@ def draw_causes_example(
     own = CauseSettings.from_dict({k: v for k, v in given.items() if k != "icp"}, given.get("icp"))
     shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
     names, scores_R_4 = _scores(causes, row, predictions_csv, explainers)
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     rows_in = ROW_IN * (len(names) + GAP)
     height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), 0.35 + rows_in)
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))

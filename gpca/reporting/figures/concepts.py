@@ -10,16 +10,12 @@ from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import SEVERITIES_OF
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
 from gpca.reporting.words import object_in_words
 
 TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
-SEVERITIES = {
-    "noise": ("severity_noise",),
-    "pose": ("severity_rotation_rad", "severity_translation"),
-    "overlap": ("severity_crop",),
-}
 
 
 def draw_concepts_figure(
@@ -54,9 +50,7 @@ def draw_concepts_figure(
     target = objects.points(row)[:points_shown] / objects.diameters_m[row]
     view = choose_view(target, sources)
 
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     clouds = {concept: (target @ view.T, source @ view.T) for concept, source in sources.items()}
     corners = np.concatenate([np.concatenate(pair) for pair in clouds.values()])
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -84,16 +78,16 @@ def choose_samples(registrations: Registrations, path: str | Path, object_name: 
 
     # The distance of a sample's rank from the middle rank is infinite where the sample cannot be shown.
     distance_S = np.full(len(registrations), np.inf)
-    for concept, names in SEVERITIES.items():
+    for concept, names in SEVERITIES_OF.items():
         rows = np.flatnonzero((registrations.split == "test") & (registrations.concept == concept))
-        ranks = [rankdata(getattr(registrations, name)[rows]) / (len(rows) + 1) for name in names]
+        ranks = [rankdata(getattr(registrations, f"severity_{name}")[rows]) / (len(rows) + 1) for name in names]
         distance_S[rows] = np.abs(np.array(ranks) - 0.5).max(axis=0)
     is_shown_S = np.isfinite(distance_S)
     object_names = [object_name] if object_name else list(dict.fromkeys(registrations.object_name.tolist()))
     choices = []
     for name in object_names:
         of_object_S = is_shown_S & (registrations.object_name == name)
-        rows_of = {c: np.flatnonzero(of_object_S & (registrations.concept == c)) for c in SEVERITIES}
+        rows_of = {c: np.flatnonzero(of_object_S & (registrations.concept == c)) for c in SEVERITIES_OF}
         if all(len(rows) for rows in rows_of.values()):
             choices.append({concept: int(rows[np.argmin(distance_S[rows])]) for concept, rows in rows_of.items()})
     if not choices:

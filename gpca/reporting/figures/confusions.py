@@ -66,9 +66,7 @@ def draw_confusions_figure(
     columns = [name for name in sources if any((name, explainer) in confusions for explainer in explainers)]
     if not rows:
         raise InputError(metrics_csv, "has no confusion of these explainers and sources", "regenerate it")
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     drawn = {(source, name): confusions[source, name] for source in columns for name in rows
              if (source, name) in confusions}  # fmt: skip
     concepts = len(next(iter(drawn.values())).columns) - 1

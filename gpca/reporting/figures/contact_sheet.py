@@ -104,9 +104,7 @@ def draw_contact_sheet(
         InputError: the npz is missing, unreadable or not of that format.
     """
     objects = ObjectClouds.load(objects_npz)
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     count = len(objects)
     columns = _columns(count)
     rows = math.ceil(count / columns)

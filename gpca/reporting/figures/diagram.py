@@ -16,9 +16,7 @@ class Canvas:
     """
 
     def __init__(self, width_in: float, height_in: float) -> None:
-        use_style()
-        import matplotlib.pyplot as plt
-
+        plt = use_style()
         self.width_in = width_in
         self.height_in = height_in
         self.figure = plt.figure(figsize=(width_in, height_in))

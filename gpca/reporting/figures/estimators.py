@@ -58,9 +58,7 @@ def draw_estimators(
     of_shown = {name: _of_method(estimates, (source, name, seed), method, samples_npz) for name in titles}
     shown = _chosen(of_shown[REFERENCE], samples, method, samples_npz)
     pooled = {name: _pooled(estimates, name, method) for name in titles}
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, 5.35))
     panels = figure.add_gridspec(1, 4, left=0.065, right=0.995, top=0.875, bottom=0.63, wspace=0.5)
     for column, (kind, place) in enumerate(shown.items()):

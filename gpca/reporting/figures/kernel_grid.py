@@ -45,8 +45,7 @@ def draw_kernel_curves(
     shown = [name for name in sources if (grid["source"] == name).any()]
     if not shown:
         raise InputError("kernels", "have no results for these sources", "run them first")
-    use_style()
-    import matplotlib.pyplot as plt
+    plt = use_style()
     from matplotlib.lines import Line2D
     from matplotlib.ticker import NullLocator
 

@@ -52,9 +52,7 @@ def draw_coverage_risk(
     A panel in which no classifier errs says so.
     """
     shown, columns = _known(learned, sources, learners)
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     height_in = 2.5
     figure, axes = plt.subplots(
         1, len(columns), figsize=(TEXT_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
@@ -113,8 +111,7 @@ def draw_uncertainty_vs_distance(
     parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
     letters = dict(zip(_paper_first(shown), "abcdefgh", strict=False))
     down = [name for name in SETS if any(name in of_key for of_key in parts.values())]
-    use_style()
-    import matplotlib.pyplot as plt
+    plt = use_style()
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     height_in = 0.72 + 1.22 * len(down)

@@ -12,9 +12,7 @@ MOST_PER_ROW = 5
 
 def small_panels(count: int, panel_height_in: float):
     """Return a figure with that many panels, their axes shared, and the panels; rows are as even as they can be."""
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     lines = -(-count // MOST_PER_ROW)
     size = (TEXT_WIDTH_IN, 0.75 + panel_height_in * lines)
     figure, axes = plt.subplots(lines, -(-count // lines), figsize=size, sharex=True, sharey=True, squeeze=False)

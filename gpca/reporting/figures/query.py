@@ -14,9 +14,7 @@ _POINTS = 1500  # At most this many points of each cloud are drawn, as more hide
 
 def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:
     """Draw source over target along each axis, at one scale, into a PNG."""
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     clouds = [
         (thinned(target_Q_3, _POINTS), TARGET_COLOUR, "reference"),
         (thinned(cloud_P_3, _POINTS), SOURCE_COLOUR, "aligned source"),

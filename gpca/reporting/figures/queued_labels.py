@@ -26,9 +26,7 @@ def draw_queued_labels(
         policies: The title of each name, in order.
         pdf_path, png_path: The two files to write.
     """
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     shown = [name for name in policies if (queues["policy"] == name).any()]
     size = (TEXT_WIDTH_IN, 2.4)
     highest = 100 * queues[queues["policy"].isin(shown)]["high"].max()

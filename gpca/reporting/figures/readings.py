@@ -57,8 +57,7 @@ def draw_readings(
     shown = [name for name in groups if (missed["group"] == name).any()]
     if not shown:
         raise InputError("reading_verdicts.csv", "has no readings of these groups", "run the readings first")
-    use_style()
-    import matplotlib.pyplot as plt
+    plt = use_style()
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     columns = min(COLUMNS, len(shown))

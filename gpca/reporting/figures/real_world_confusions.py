@@ -26,9 +26,7 @@ def draw_real_world_confusions(
     shown = {method: pooled[method] for method in methods if method in pooled}
     if not shown:
         raise InputError(metrics_csv, "has no confusion of these backbones", "regenerate it")
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     panel_in = min(1.5, (TEXT_WIDTH_IN - 0.6) / len(shown) - 0.12)
     width_in = max(3.2, 0.6 + len(shown) * (panel_in + 0.12))
     height_in = panel_in + 0.72

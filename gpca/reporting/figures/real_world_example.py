@@ -27,18 +27,11 @@ from gpca.reporting.figures.style import (
     use_style,
     write_title,
 )
-from gpca.reporting.words import object_of_frames
+from gpca.reporting.words import BOP_TITLES, object_of_frames
 
 if TYPE_CHECKING:
     import pandas as pd
 
-DATASETS = {  # what readers call the datasets of frames
-    "ycbv": "YCB-Video",
-    "lm": "LINEMOD",
-    "lmo": "LINEMOD-Occlusion",
-    "icbin": "IC-BIN",
-    "visp": "ViSP",
-}
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
 PANEL_IN = 1.88  # The three pictures are square.
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
@@ -72,8 +65,7 @@ def draw_real_world_example(
     sample = samples.iloc[row]
     i = int(sample["instance"])
     camera = _Camera(instances, i, registrations, row)
-    use_style()
-    import matplotlib.pyplot as plt
+    plt = use_style()
     from matplotlib.patheffects import withStroke
 
     image = read_image(str(instances.colour[i]), "fetch the frames anew")
@@ -154,7 +146,7 @@ def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray)
 
 def title_of_frame(object_name: str, title: str) -> str:
     """Return what the one frame is called, by the dataset before its object's name; else the title of all frames."""
-    dataset = DATASETS.get(object_name.partition(" ")[0], "")
+    dataset = BOP_TITLES.get(object_name.partition(" ")[0], "")
     return f"{dataset} frame" if dataset and dataset in title else title
 
 

@@ -37,9 +37,7 @@ def draw_real_world_failures(
     """
     objects = ObjectClouds.load(objects_npz)
     mistakes = _mistakes(poses_csv, predictions_csv)
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     rows = max(1, -(-min(SHOWN, len(mistakes)) // PANELS_PER_ROW))
     cell_in = TEXT_WIDTH_IN / PANELS_PER_ROW
     head_in = 0.22

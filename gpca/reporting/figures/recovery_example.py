@@ -53,9 +53,7 @@ def draw_recovery_example(
         InputError: an unusable file.
     """
     found = load_arrays(example_npz, SHAPES, "python -m gpca recover")
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, 1.95))
     for left, view in ((0.003, "first"), (0.722, "next")):
         panel = figure.add_axes((left, 0.12, 0.275, 0.75))

@@ -51,9 +51,7 @@ def draw_runtime(
         InputError: A stage was not measured.
     """
     series = _stages(runtime, numbers)
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     rows = [*(COMPONENTS[component] for component in OF_ONE_EXPLANATION), ALL_STAGES]
     figure, panel = plt.subplots(figsize=(TEXT_WIDTH_IN, 0.9 + ROW_IN * len(rows)))
     step = 0.7 / len(series)

@@ -48,8 +48,7 @@ def draw_saliency(
     shown = {concept: sample for concept, sample in chosen.items() if sample is not None}
     if not shown or set(shown.values()) - (set(test) & set(places)):
         raise InputError(maps_npz, f"its samples differ from those of {deletions_csv}", "regenerate both")
-    use_style()
-    import matplotlib.pyplot as plt
+    plt = use_style()
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from matplotlib.layout_engine import ConstrainedLayoutEngine

@@ -57,8 +57,7 @@ def draw_severity_curves(
     shown = [name for name in explainers if (severities["method"] == name).any()]
     if not shown:
         raise InputError("severities", "have none of these explainers", "run the controls first")
-    use_style()
-    import matplotlib.pyplot as plt
+    plt = use_style()
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     maps = [REGISTRATION, *shown]

@@ -42,8 +42,8 @@ METHOD_LOOKS: dict[str, tuple[str, Any, float]] = {
 OTHER_LOOK = (LIGHT_GREY, "-", 0.9)
 
 
-def use_style() -> None:
-    """Set matplotlib to the suite's style, the file `MATPLOTLIBRC`, drawn by Agg.
+def use_style() -> Any:
+    """Set matplotlib to the suite's style, the file `MATPLOTLIBRC`, drawn by Agg, and return its ``pyplot``.
 
     It starts from matplotlib's own defaults, so that a user's matplotlibrc cannot change a figure.
     """
@@ -52,6 +52,9 @@ def use_style() -> None:
     matplotlib.use("Agg")
     matplotlib.rcdefaults()
     matplotlib.rc_file(MATPLOTLIBRC, use_default_template=False)
+    from matplotlib import pyplot
+
+    return pyplot
 
 
 def write_title(figure, words: str) -> None:

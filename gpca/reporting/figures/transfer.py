@@ -42,9 +42,7 @@ def draw_transfer(
     shown = [name for name in explainers if (moved["method"] == name).any()]
     if not shown:
         raise InputError("intervals", "have no transfer", "run the controls of two sources first")
-    use_style()
-    import matplotlib.pyplot as plt
-
+    plt = use_style()
     lines = -(-len(shown) // WIDEST)
     height_in = 0.75 + 1.55 * lines
     figure, axes = plt.subplots(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -22,11 +23,7 @@ def estimate(
     """Return the covariance of what the chains visit after `burn_in` steps; they begin at the pose."""
     posterior = Posterior(registered)
     random = generator("bayesian_icp", registered.pair.seed)
-    points = len(posterior.source)
-
-    def slope(xi_n_6: np.ndarray) -> np.ndarray:
-        return posterior.slope(xi_n_6, random.choice(points, min(batch, points), replace=False, shuffle=False))
-
+    slope = partial(posterior.slope_of_batch, batch=batch, random=random)
     start_n_6 = np.zeros((chains, 6))
     visited = langevin(slope, start_n_6, posterior.covariance, steps, burn_in, step_size, random)
     return np.cov(visited, rowvar=False)

@@ -15,7 +15,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, MAX_ITERATIONS, Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry
-from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.rigid import inverse, rigid_motion, transform
 from gpca.alignment.twist import exp, log, point_jacobians
 
 SINGULAR = 1e-9  # ratio of eigenvalues below which a direction counts as open
@@ -214,9 +214,7 @@ def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
     along_N_3 = np.einsum("ni,ij->nj", offset_N_3, axes_3_3)
     axes_3_3 = axes_3_3 * np.where((along_N_3**3).sum(axis=0) < 0, -1.0, 1.0)
     axes_3_3[:, 2] = np.cross(axes_3_3[:, 0], axes_3_3[:, 1])
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = axes_3_3, centre_3
-    return T
+    return rigid_motion(axes_3_3, centre_3)
 
 
 def _batched(pair: Pair, method: str) -> Starter:

@@ -40,6 +40,11 @@ class Posterior:
         """Return draws (n, 6) of the prior, of standard normal numbers."""
         return self._prior_6 + normal_n_6 / np.sqrt(self._prior_precision_6)
 
+    def slope_of_batch(self, xi_n_6: np.ndarray, batch: int, random: np.random.Generator) -> np.ndarray:
+        """Return :meth:`slope` of so many of the source's points, drawn anew at each call."""
+        points = len(self.source)
+        return self.slope(xi_n_6, random.choice(points, min(batch, points), replace=False, shuffle=False))
+
     def slope(self, xi_n_6: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
         """Return ∂ ln p/∂ξ (n, 6); of some of the source's points alone, they count for all."""
         points = self.source if rows is None else self.source[rows]

@@ -7,6 +7,7 @@ The particles attract each other to where the posterior is high and repel each o
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -23,11 +24,7 @@ def estimate(
     """Return the covariance of the particles; batch and number are the authors'."""
     posterior = Posterior(registered)
     random = generator("stein_icp", registered.pair.seed)
-    points = len(posterior.source)
-
-    def slope(xi_n_6: np.ndarray) -> np.ndarray:
-        return posterior.slope(xi_n_6, random.choice(points, min(batch, points), replace=False, shuffle=False))
-
+    slope = partial(posterior.slope_of_batch, batch=batch, random=random)
     start_n_6 = posterior.prior_sample(random.normal(size=(particles, 6)))
     return np.cov(descend(slope, start_n_6, steps, learning_rate), rowvar=False)
 

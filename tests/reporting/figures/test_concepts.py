@@ -8,9 +8,8 @@ from gpca.alignment.rigid import scale_translation, transform
 from gpca.arrays import save_arrays
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
+from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, SEVERITIES_OF, Severities
 from gpca.reporting.figures.concepts import (
-    SEVERITIES,
     choose_samples,
     choose_view,
     draw_concepts_figure,
@@ -52,7 +51,7 @@ def files(clouds, tmp_path_factory):
     for sample in range(24):
         concept, row = CONCEPTS[sample % 3], sample // 3 % 2
         perturbed = PERTURBATIONS[concept](clouds[row][:500], Severities(), random)
-        severities.append([perturbed.severity.get(n, 0.0) for n in ("noise", "rotation_rad", "translation", "crop")])
+        severities.append([perturbed.severity.get(n, 0.0) for n in SEVERITIES])
         labels.append((concept, row))
         to_diameters = 1 / DIAMETERS_M[row]
         sources.append(transform(scale_translation(T_init, to_diameters), perturbed.points))
@@ -97,9 +96,10 @@ def test_samples_are_of_one_object_and_of_medium_severity(files):
     assert {registrations.concept[sample] for sample in samples.values()} == set(CONCEPTS)
     assert len({registrations.object_name[sample] for sample in samples.values()}) == 1
     for concept, sample in samples.items():
-        for name in SEVERITIES[concept]:
-            drawn = np.sort(getattr(registrations, name)[registrations.concept == concept])
-            assert drawn[0] < getattr(registrations, name)[sample] < drawn[-1]
+        for name in SEVERITIES_OF[concept]:
+            severity_S = getattr(registrations, f"severity_{name}")
+            drawn = np.sort(severity_S[registrations.concept == concept])
+            assert drawn[0] < severity_S[sample] < drawn[-1]
     named = choose_samples(registrations, "registrations.npz", "bar")
     assert {registrations.object_name[sample] for sample in named.values()} == {"bar"}
 
