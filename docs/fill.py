@@ -4,8 +4,9 @@
     python docs/fill.py --check    # writes nothing; the exit status is 1 if something differs
 
 A page marks a number by a comment behind it, `98.7<!--gpca_paper-->`, and a longer passage by a line before it and one
-behind it, `<!--begin verdicts-->` and `<!--end verdicts-->`. docs/numbers.yaml says what each of them is. Words around
-a number are free.
+behind it, `<!--begin verdicts-->` and `<!--end verdicts-->`. A sentence in words stands on a condition,
+`<!--if best_gate-->`; where this no longer holds, the sentence has to be rewritten, and the exit status is 1.
+docs/numbers.yaml defines all of them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import re
 import shlex
 import sys
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
@@ -34,7 +36,8 @@ DEFINITIONS = Path(__file__).with_name("numbers.yaml")
 REFERENCE = ROOT / "results/reference/real"
 NUMBER = re.compile(r"(?<![\w.])(-?\d[\d.]*)<!--(\w+)-->")
 PASSAGE = re.compile(r"(?<=<!--begin )(\w+)-->\n(.*?)(?=<!--end \1-->)", re.DOTALL)
-MARKER = re.compile(r"<!--(?:begin )?(\w+)-->")
+CONDITION = re.compile(r"<!--if (\w+)-->")
+MARKER = re.compile(r"<!--(?:begin |if )?(\w+)-->")
 OF_SEVERAL_ROWS: dict[str, Callable] = {"min": min, "max": max, "mean": fmean}
 LINE = 120  # letters
 
@@ -45,16 +48,18 @@ def main(arguments: list[str] | None = None) -> int:
     check = parser.parse_args(arguments).check
     try:
         pages = yaml.safe_load(DEFINITIONS.read_text(encoding="utf-8"))
-        new = {page: filled((ROOT / page).read_text(encoding="utf-8"), pages[page], page, REFERENCE) for page in pages}
+        texts = {page: (ROOT / page).read_text(encoding="utf-8") for page in pages}
+        new = {page: filled(texts[page], pages[page], page, REFERENCE) for page in pages}
+        untrue = {page: no_longer_true(texts[page], pages[page], REFERENCE) for page in pages}
     except (InputError, OSError, yaml.YAMLError) as fault:
         print(f"fill: {fault}", file=sys.stderr)
         return 2
     for page, (text, changes) in new.items():
-        print("".join(f"{page}: {change}\n" for change in changes), end="")
+        print("".join(f"{page}: {line}\n" for line in (*changes, *untrue[page])), end="")
         if changes and not check:
             with whole_file(ROOT / page) as partial:
                 partial.write_text(text, encoding="utf-8")
-    return int(check and any(changes for _, changes in new.values()))
+    return int(any(untrue.values()) or (check and any(changes for _, changes in new.values())))
 
 
 def filled(text: str, definitions: dict, page: str, folder: Path) -> tuple[str, list[str]]:
@@ -66,6 +71,7 @@ def filled(text: str, definitions: dict, page: str, folder: Path) -> tuple[str, 
     """
     marked = set(MARKER.findall(text))
     fillable = {name for _, name in NUMBER.findall(text)} | {name for name, _ in PASSAGE.findall(text)}
+    fillable |= set(CONDITION.findall(text))
     for names, fault, remedy in (
         (marked - fillable, "has no number before it, or no end", "write '0<!--NAME-->' or add '<!--end NAME-->'"),
         (marked - definitions.keys(), "is not defined", f"define it in docs/{DEFINITIONS.name}"),
@@ -94,6 +100,19 @@ def filled(text: str, definitions: dict, page: str, folder: Path) -> tuple[str, 
     return PASSAGE.sub(passage, NUMBER.sub(number, text)), changes
 
 
+def no_longer_true(text: str, definitions: dict, folder: Path) -> list[str]:
+    """Return a line about each comparison behind a sentence of the page that the reference contradicts."""
+    lines = []
+    for name in CONDITION.findall(text):
+        for comparison in definitions[name]:
+            with _named(comparison):
+                greater, word, less = re.split(r" (above|reaches) ", comparison)
+                difference = _difference(shlex.split(greater), folder) - _difference(shlex.split(less), folder)
+            if difference < 0 or (difference == 0 and word == "above"):
+                lines.append(f"{name}: no longer holds ({comparison}); rewrite the sentence")
+    return lines
+
+
 def table(definition: dict, folder: Path) -> str:
     """Return a Markdown table whose cells are of the words of their row and column, with a dash where none has them."""
     columns, rows = definition["columns"], definition["rows"]
@@ -111,26 +130,42 @@ def value(definition: str, folder: Path) -> str:
     Raises:
         InputError: the reference does not have it, or has it more than once.
     """
-    words = shlex.split(definition)
+    with _named(definition):
+        words = shlex.split(definition)
+        return _read(words, folder) if words[0] == "read" else format(_difference(words[:-1], folder), words[-1])
+
+
+@contextmanager
+def _named(definition: str) -> Iterator[None]:
+    """Name the definition that cannot be read."""
     try:
-        if words[0] == "read":
-            _, name, pattern = words
-            matches = re.findall(pattern, _text(folder / name), re.MULTILINE | re.DOTALL)
-            if len(matches) != 1:
-                raise InputError(definition, f"matches {len(matches)} times", "name a pattern that matches once")
-            return matches[0]
-        *words, digits = words
-        if "minus" in words:
-            at = words.index("minus")
-            return format(_number(words[:at], folder) - _number(words[at + 1 :], folder), digits)
-        return format(_number(words, folder), digits)
+        yield
     except InputError:
         raise
     except (KeyError, IndexError, ValueError, re.error) as fault:
         raise InputError(definition, f"cannot be read ({fault!r})", "see the head of docs/numbers.yaml") from fault
 
 
+def _read(words: list[str], folder: Path) -> str:
+    _, name, pattern = words
+    matches = re.findall(pattern, _text(folder / name), re.MULTILINE | re.DOTALL)
+    if len(matches) != 1:
+        raise InputError(" ".join(words), f"matches {len(matches)} times", "name a pattern that matches once")
+    return matches[0]
+
+
+def _difference(words: list[str], folder: Path) -> float:
+    if "minus" not in words:
+        return _number(words, folder)
+    at = words.index("minus")
+    return _number(words[:at], folder) - _number(words[at + 1 :], folder)
+
+
 def _number(words: list[str], folder: Path) -> float:
+    if len(words) == 1:
+        return float(words[0])
+    if words[0] == "read":
+        return float(_read(words, folder))
     if words[0] == "count":
         rows, column = _matching(words[1:], folder)
         return len({row[column] for row in rows}) if ":" in words[1] else len(rows)

@@ -89,6 +89,22 @@ def test_a_page_is_filled_once_and_keeps_its_words(reference):
 
 
 @pytest.mark.parametrize(
+    ("comparison", "holds"),
+    [
+        ("table9 cups gpca reaches max table9 gpca", True),
+        ("table9 cups gpca above max table9 gpca", False),
+        ("max table9 mine above 0", False),
+        ("table9 forest minus table9 cups gpca above 0.2", True),
+    ],
+)
+def test_a_sentence_stands_on_comparisons_with_the_reference(reference, comparison, holds):
+    lines = fill.no_longer_true("The best<!--if best-->.", {"best": [comparison]}, reference)
+    assert lines == ([] if holds else [f"best: no longer holds ({comparison}); rewrite the sentence"])
+    with pytest.raises(InputError, match="cannot be read"):
+        fill.no_longer_true("The best<!--if best-->.", {"best": ["table9 forest"]}, reference)
+
+
+@pytest.mark.parametrize(
     ("page", "fault"),
     [
         (PAGE + "5<!--own_two-->", "marker 'own_two': is not defined"),
@@ -111,6 +127,10 @@ def test_what_differs_is_written_unless_it_is_only_checked(reference, monkeypatc
     assert (fill.main(["--check"]), page.read_text()) == (1, "A share of 1<!--own--> %.\n")
     assert (fill.main([]), page.read_text()) == (0, "A share of 98.7<!--own--> %.\n")
     assert capsys.readouterr().out.splitlines() == ["page.md: own: 1 -> 98.7"] * 2
-    definitions.write_text("page.md: {own: table8 .1f}\n")
+    page.write_text("The best<!--if best-->.\n")
+    definitions.write_text("page.md: {best: [table9 mine above 0]}\n")
+    assert fill.main([]) == 1
+    page.write_text("A share of 1<!--own--> %.\n")
+    definitions.write_text("page.md: {own: table8 cups .1f}\n")
     assert fill.main([]) == 2
     assert "no such file" in capsys.readouterr().err
