@@ -28,11 +28,6 @@ def relative(path):
 PAGES = [path for path in our_files() if path.suffix == ".md" and "reference" not in path.parts]
 
 
-def unwrapped(path):
-    """Return a page of the project in one line, so that a sentence is found however it is wrapped."""
-    return " ".join((ROOT / path).read_text().split())
-
-
 def code_in(text):
     """Command lines in fenced blocks, without their comments, and spans of code in the running text."""
     blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)

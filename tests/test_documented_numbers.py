@@ -1,16 +1,31 @@
-"""Times and findings that pages print are those of the reference, or of the page that has them all."""
+"""The numbers that pages print are those of the reference, or of the page that has them all."""
 
-import csv
 import re
 
 import pytest
 
-from .documents import ROOT, unwrapped
+from docs import fill
+from gpca.errors import InputError
+
+from .documents import ROOT
 
 PAPERS_TABLES = (  # and the eighth, which is ours
     *("table1_single_baselines", "table2_per_concept", "table3_active_learning", "table4_kernels"),
     *("table5_learners", "table6_backbones", "table7_runtime", "table8_recovery"),
 )
+TABLE = "source,explainer,mean,n\ncups,gpca,98.74,8\ncups,forest,99,9\nmine,gpca,-3.2,8\n"
+
+
+@pytest.fixture
+def reference(tmp_path):
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables/table9.csv").write_text(TABLE)
+    (tmp_path / "report.md").write_text("Of 7 numbers, 3 fit.\n")
+    return tmp_path
+
+
+def test_all_pages_have_the_numbers_of_the_reference(capsys):
+    assert fill.main(["--check"]) == 0, capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("run", "name"), [("embedded", "embedded default"), ("real", "real objects")])
@@ -23,48 +38,99 @@ def test_the_readme_has_the_times_of_the_page_of_all_targets(run, name):
     assert shown.split(" | ") == [minutes[table] for table in PAPERS_TABLES]
 
 
-FOUND = {"GP-CA on the pair": "gpca_pair", "inlier RMSE (gate)": "gate_rmse"}
-FOUND |= {"GP-CA on the aligned source, the paper's input": "gpca"}
-FOUND |= {"forest on distances and motion": "pair_forest", "truth from other starts (ceiling)": "ceiling"}
+@pytest.mark.parametrize(
+    ("definition", "text"),
+    [
+        ("table9 cups gpca .1f", "98.7"),
+        ("table9 mine .0f", "-3"),
+        ("table9:n cups gpca .0f", "8"),
+        ("table9 gpca source=c*s .2f", "98.74"),
+        ("max table9 cups|mine .0f", "99"),
+        ("min table9 source=[!c]* .1f", "-3.2"),
+        ("mean table9 cups .2f", "98.87"),
+        ("count table9 cups d", "2"),
+        ("count table9:n d", "2"),
+        ("table9 forest minus table9 cups gpca .2f", "0.26"),
+        (r"read report.md '(\d+) fit'", "3"),
+    ],
+)
+def test_a_definition_stands_for_a_number_of_the_reference(reference, definition, text):
+    assert fill.value(definition, reference) == text
 
 
-def of_all_sources(explainer):
-    """The rows of Table IX, by their metric."""
-    with (ROOT / "results/reference/real/tables/table9_causes.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    return {row["metric"]: row for row in rows if (row["source"], row["explainer"]) == ("pooled", explainer)}
+@pytest.mark.parametrize(
+    ("definition", "fault"),
+    [
+        ("table9 gpca .1f", "matches 2 rows"),
+        ("table9 cup .1f", "matches 0 rows"),
+        ("table8 cups .1f", "no such file"),
+        ("table9 place=cups .1f", "cannot be read .*place"),
+        ("table9 mine gpca", "cannot be read .*format"),
+        (r"read report.md '(\d+)'", "matches 2 times"),
+    ],
+)
+def test_a_definition_that_is_not_one_number_is_refused(reference, definition, fault):
+    with pytest.raises(InputError, match=fault):
+        fill.value(definition, reference)
 
 
-@pytest.mark.parametrize("title", FOUND)
-def test_what_was_found_about_causes_stands_in_the_reference(title):
-    of = of_all_sources(FOUND[title])
-    [line] = re.findall(rf"^\| {re.escape(title)} \|(.*)\|$", (ROOT / "docs/causes.md").read_text(), re.MULTILINE)
-    metrics = {"balanced_accuracy": 1, "dominant_accuracy": 1, "false_alarm_rate": 1, "auroc_failed": 3}
-    expected = [f"{float(of[name]['mean']):.{digits}f}" if name in of else "–" for name, digits in metrics.items()]
-    assert [cell.split(" ± ")[0].strip() for cell in line.split("|")] == expected
+PAGE = "It has 97.5<!--own--> %, the **other 1<!--other-->**.\n<!--begin all-->\nold\n<!--end all-->\n<!-- a note -->\n"
+CELLS = {"head": "who", "columns": {"cups": "cups .0f", "mine": "mine .1f"}, "rows": {"GP-CA": "table9 gpca"}}
+CELLS["rows"] |= {"forest": "table9 forest"}
+NUMBERS = {"own": "table9 cups gpca .1f", "other": "table9 forest .0f", "all": CELLS}
 
 
-def test_what_the_readme_says_of_causes_stands_in_the_reference():
-    readme = unwrapped("README.md")
-
-    def of(explainer, metric, digits):
-        return f"{float(of_all_sources(explainer)[metric]['mean']):.{digits}f}"
-
-    balanced = {name: of(name, "balanced_accuracy", 0) for name in ("gpca", "gpca_pair", "pair_committee", "ceiling")}
-    assert f"a balanced accuracy of {balanced['gpca']} % from the paper's input" in readme
-    assert f"both clouds reaches {balanced['gpca_pair']} %; no method exceeds {balanced['pair_committee']} %" in readme
-    assert f"the ceiling is {balanced['ceiling']} %" in readme
-    area = {name: of(name, "auroc_failed", 3) for name in ("gpca_pair", "gate_rmse", "gate_fitness", "gate_spread")}
-    assert f"with an AUROC of {area['gpca_pair']}. The inlier RMSE reaches {area['gate_rmse']}" in readme
-    assert f"the best common gate, {area['gate_spread']}." in readme
-    assert area["gate_spread"] == max(area[name] for name in area if name.startswith("gate"))
+def test_a_page_is_filled_once_and_keeps_its_words(reference):
+    text, changes = fill.filled(PAGE, NUMBERS, "page.md", reference)
+    assert "It has 98.7<!--own--> %, the **other 99<!--other-->**.\n" in text
+    assert "\n| GP-CA | 99 | -3.2 |\n| forest | 99 | – |\n\n<!--end all-->\n<!-- a note -->" in text
+    assert changes == ["own: 97.5 -> 98.7", "other: 1 -> 99", "all: written anew"]
+    assert fill.filled(text, NUMBERS, "page.md", reference) == (text, [])
 
 
-def test_what_was_found_under_controls_stands_in_the_reference():
-    table = (ROOT / "results/reference/real/tables/table10_controls.md").read_text()
-    page = (ROOT / "docs/controls.md").read_text().split("## What was found")[1]
-    rows = re.findall(r"^\| ([^|\n]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
-    assert len(rows) == 4
-    for explainer, *shown in rows:
-        [line] = re.findall(rf"^\| All together \| {re.escape(explainer)} \|(.*)$", table, re.MULTILINE)
-        assert shown == [cell.replace("*", "").split()[0] for cell in line.split("|")[:4]]
+@pytest.mark.parametrize(
+    ("comparison", "holds"),
+    [
+        ("table9 cups gpca reaches max table9 gpca", True),
+        ("table9 cups gpca above max table9 gpca", False),
+        ("max table9 mine above 0", False),
+        ("table9 forest minus table9 cups gpca above 0.2", True),
+    ],
+)
+def test_a_sentence_stands_on_comparisons_with_the_reference(reference, comparison, holds):
+    lines = fill.no_longer_true("The best<!--if best-->.", {"best": [comparison]}, reference)
+    assert lines == ([] if holds else [f"best: no longer holds ({comparison}); rewrite the sentence"])
+    with pytest.raises(InputError, match="cannot be read"):
+        fill.no_longer_true("The best<!--if best-->.", {"best": ["table9 forest"]}, reference)
+
+
+@pytest.mark.parametrize(
+    ("page", "fault"),
+    [
+        (PAGE + "5<!--own_two-->", "marker 'own_two': is not defined"),
+        (PAGE.replace("1<!--other-->", ""), "marker 'other': is not on the page"),
+        (PAGE.replace("1<!--other", "one<!--other"), "marker 'other': has no number before it"),
+        (PAGE.replace("end all", "end some"), "marker 'all': has no number before it, or no end"),
+    ],
+)
+def test_a_marker_without_a_definition_a_number_or_an_end_is_refused(reference, page, fault):
+    with pytest.raises(InputError, match=fault):
+        fill.filled(page, NUMBERS, "page.md", reference)
+
+
+def test_what_differs_is_written_unless_it_is_only_checked(reference, monkeypatch, capsys):
+    page, definitions = reference / "page.md", reference / "numbers.yaml"
+    page.write_text("A share of 1<!--own--> %.\n")
+    definitions.write_text("page.md: {own: table9 cups gpca .1f}\n")
+    for name, value in (("ROOT", reference), ("DEFINITIONS", definitions), ("REFERENCE", reference)):
+        monkeypatch.setattr(fill, name, value)
+    assert (fill.main(["--check"]), page.read_text()) == (1, "A share of 1<!--own--> %.\n")
+    assert (fill.main([]), page.read_text()) == (0, "A share of 98.7<!--own--> %.\n")
+    assert capsys.readouterr().out.splitlines() == ["page.md: own: 1 -> 98.7"] * 2
+    page.write_text("The best<!--if best-->.\n")
+    definitions.write_text("page.md: {best: [table9 mine above 0]}\n")
+    assert fill.main([]) == 1
+    page.write_text("A share of 1<!--own--> %.\n")
+    definitions.write_text("page.md: {own: table8 cups .1f}\n")
+    assert fill.main([]) == 2
+    assert "no such file" in capsys.readouterr().err

@@ -23,8 +23,6 @@ FILES = {
 def test_every_cell_of_the_papers_tables_is_there_once():
     cells = {(name, row, column) for name, table in TABLES.items() for row in table.rows for column in table.columns}
     assert {number.key for number in NUMBERS if number.table != TEXT} == cells
-    assert len(cells) == 96
-    assert sum(number.table == TEXT for number in NUMBERS) == 16
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,6 @@ def test_only_a_stand_in_is_called_one():
 
 def test_a_caption_tells_stand_ins_from_a_mixture():
     assert stand_in_clause([REAL, REAL]) == stand_in_clause([]) == ""
-    assert stand_in_clause([STAND_IN, STAND_IN]) == ", measured on procedural stand-ins for the datasets' objects"
-    assert stand_in_clause([STAND_IN, REAL]) == ", measured partly on procedural stand-ins for the datasets' objects"
-    assert (
-        stand_in_clause([STAND_IN, REAL], partly=False)
-        == ", measured on procedural stand-ins for the datasets' objects"
-    )
+    whole, partly = stand_in_clause([STAND_IN, STAND_IN]), stand_in_clause([STAND_IN, REAL])
+    assert "stand-in" in whole and "partly" not in whole
+    assert partly.replace("partly ", "") == whole == stand_in_clause([STAND_IN, REAL], partly=False)

@@ -30,16 +30,8 @@ def test_every_component_stands_beside_the_printed_value():
     assert "| Feature extraction | GPU | GPU | 0.10 | 0.50 | 2.00 | 1200 |" in text
     assert "| GPC retraining (optional) | CPU | CPU | 7.00 | 0.50 | 2.00 | > 10000 |" in text
     assert "| One explanation, 512 points | CPU | – | 9.00 | 0.50 | 2.00 | – |" in text
-    retraining = "GPC retraining (optional) takes 10 to 30 s."
-    for said in (
-        "Over 100 runs, 1 thread",
-        "A processor, 2 cores",
-        "A GPU",
-        "i7-12700K",
-        "RTX 3090",
-        retraining,
-    ):
-        assert said in text
+    for measured in ("100 runs, 1 thread", "A processor, 2 cores", "A GPU", "i7-12700K", "RTX 3090", "10 to 30 s"):
+        assert measured in text
     assert set(printed_seconds(NUMBERS)) < set(COMPONENTS)
     assert "**" not in text.replace("**Runtime per component on Tiny, and as the paper prints it**", "")
 

@@ -45,23 +45,26 @@ class DryRun:
     plan: tuple[tuple[str, set[str], set[str]], ...]
     messages: str
 
+    def remade(self, path):
+        """The files that are made again once the file has changed."""
+        changed = {path}
+        for _, inputs, outputs in self.plan:
+            if inputs & changed:
+                changed |= outputs
+        return changed - {path}
+
     def behind(self, path):
         """How many jobs of each rule read the file, or what comes of it."""
-        changed, jobs = {path}, Counter()
-        for rule, inputs, outputs in self.plan:
-            if rule != "all" and inputs & changed:
-                changed |= outputs
-                jobs[rule] += 1
-        return jobs
+        remade = self.remade(path)
+        return Counter(rule for rule, _, outputs in self.plan if outputs & remade)
 
-    def before(self, path):
-        """How many jobs of each rule it takes to make the file."""
-        needed, jobs = {path}, Counter()
-        for rule, inputs, outputs in reversed(self.plan):
+    def needed(self, path):
+        """The files that are made on the way to the file, and it."""
+        needed = {path}
+        for _, inputs, outputs in reversed(self.plan):
             if outputs & needed:
-                needed |= inputs
-                jobs[rule] += 1
-        return jobs
+                needed |= inputs | outputs
+        return needed & self.outputs
 
 
 @dataclass(frozen=True)

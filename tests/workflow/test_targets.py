@@ -1,6 +1,5 @@
 import csv
 import json
-from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -10,54 +9,15 @@ from .conftest import without_ends
 SMOKE = ("all", "--configfile", "config/smoke.yaml")
 
 
-def jobs(*rules, **counts):
-    """How many jobs of each rule: one of each that is named alone."""
-    return Counter(rules) + Counter(counts)
+def assert_made(files, made, not_made, planned):
+    """Each word of the first text begins a part of the path of a file, none of the second, though it is planned."""
 
+    def of(paths, word):
+        return [path for path in paths if f"/{word}" in path]
 
-TABLES1 = jobs("table1_single_baselines", "table1_extended", "table2_per_concept")
-COLLECTORS = jobs("metrics", "timings", "table1_extended", "fig_attribution_confusions")
-TABLES3 = jobs("table3_active_learning", "table3_extended", "table3_stream")
-NEW_SHOWN = jobs("table15_new_concepts", "table15_oracle", "new_concept_curves")
-NEW = jobs("new_concepts", learn_new_concepts=2)
-LEARNED = jobs("active_learning", "active_learning_curves", "active_learning_overlap") + TABLES3 + NEW_SHOWN
-TABLES5 = jobs("table5_learners", "table5_compact", "table5_shift")
-DIAGNOSED = jobs("diagnostics", "coverage_risk", "reliability", "uncertainty_vs_distance", fit_learners=2) + TABLES5
-TABLES4 = jobs("table4_kernels", "table4_grid")
-KERNELS = jobs("fit_kernel_grid", "kernels", "kernel_learning_curves") + TABLES4
-METHOD = jobs("fig2_overview", "fig4_pipeline")
-FRAMES = jobs("real_world", "table6_backbones", "table6_seen_unseen", "table6_labels", "confusion_real_world")
-PICTURES = jobs("fig5_real_world_example", "real_world_failures")
-RUNTIME = jobs("time_stages", "table7_runtime", "runtime")
-MODEL = jobs("model") + RUNTIME
-RECOVERY_FIGURES = jobs("recovery_rates", "queued_labels", "fig6_mitigation", "fig1_recovery_example")
-RECOVERY = jobs("recovery", "table8_recovery", recover=2) + RECOVERY_FIGURES
-METHODS = jobs("registration_methods", "table11_registration", "table11_severity")
-ESTIMATED = jobs("estimator_metrics", "table12_uncertainty", "estimators")
-# GP-CA on the two reductions of Table VI, learning curves of the first seed, and what shows them.
-BACKBONES = jobs("learn_on_frames", attribute=2) + FRAMES + PICTURES
-LABELLED = jobs("learn_on_frames") + FRAMES
-# What four explainers say of the causes: from the samples on, and what is made of it.
-CAUSES_SHOWN = jobs("cause_metrics", "cause_intervals", "table9_causes", "causes_example", "cause_confusions")
-CAUSES_SHOWN += jobs("nominal_reliability")
-# The same explainers on depth frames.
-ON_FRAMES = jobs("measure_frame_causes", "frame_causes", "table9_frames")
-CAUSES_SHOWN += ON_FRAMES
-MODEL_CAUSES = jobs(sample_model_causes=2, describe_model_causes=2)
-CAUSES = jobs(sample_causes=4, describe=4, train_on_causes=4, diagnose=8) + CAUSES_SHOWN
-# Explainers of the first seed of two sources under the controls, and what is made of what they say.
-CONTROLS_SHOWN = jobs("control_metrics", "control_intervals", "control_severities")
-CONTROLS_SHOWN += jobs("table10_controls", "table10_transfer", "table10_costs", "severity_curves", "transfer")
-CONTROLS = jobs(explain_controls=2) + CONTROLS_SHOWN
-# With other methods and estimators beneath them: explainers of one source.
-EXCHANGED = jobs("explain_exchanged", "exchange_metrics", "table14_estimator_explanations", "table14_method_matrix")
-GRADIENTS_SHOWN = jobs("gradient_metrics", "saliency", "saliency_deletion", "tcav")
-GRADIENTS = jobs(follow_gradients=2) + GRADIENTS_SHOWN
-READINGS_SHOWN = jobs("readings", "table13_readings")
-# Explainers times two sources: three with a GPC (on the frames classic features and the pair too), four on embeddings,
-# 11 on uncertainties.
-WITH_GPC, ON_EMBEDDINGS, ON_UNCERTAINTY = (jobs(attribute=n) for n in (2 * 3 + 2, 2 * 4, 2 * 11))
-PRETRAINED = jobs("pretrain_encoder", "reduce_embeddings", train_on_frames=2)
+    assert [word for word in f"{made} {not_made}".split() if not of(planned.outputs, word)] == []
+    assert [word for word in made.split() if not of(files, word)] == []
+    assert [path for word in not_made.split() for path in of(files, word)] == []
 
 
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
@@ -68,138 +28,92 @@ def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project)
     project.append("config/smoke.yaml", "  lazy: {}\n")
     table1, table2 = (f"results/smoke/tables/table{name}.md" for name in ("1_single_baselines", "2_per_concept"))
     planned = project.dry_run(table1, table2, "--configfile", "config/smoke.yaml")
-    assert planned.before(table2) == {
-        "sample_objects": 2, "register": 4, "train_encoder": 4, "embed": 4, "attribute": 4, "table2_per_concept": 1
-    }  # fmt: skip
-    assert planned.before(table1)["attribute"] == 8
-    assert planned.before(table1)["run_icp"] == 2
+    assert {path.split("/")[3] for path in planned.needed(table2) if "/predictions/" in path} == {"ycb", "coffee_cup"}
+    assert {path.split("/")[4] for path in planned.needed(table2) if "/predictions/" in path} == {"gpca", "gpca_paper"}
+    assert not [path for path in planned.needed(table2) if "uncertainty" in path]
+    assert {path.split("/")[4] for path in planned.needed(table1) if "/uncertainty/" in path} == {"additive"}
     for unneeded in ("lazy", "figures", "removal"):
         assert not [path for path in planned.outputs if unneeded in path]
 
 
-def test_table3_needs_no_uncertainty_and_no_explainer(planned):
-    assert planned.before("results/smoke/tables/table3_active_learning.md") == {
-        "sample_objects": 2, "register": 4, "train_encoder": 4, "embed": 4, "embed_without": 4, "learn_actively": 4,
-        "active_learning": 1, "table3_active_learning": 1,
-    }  # fmt: skip
+NEEDS = {  # a table: what is made for it, and what is not
+    "table3_active_learning": ("embeddings/ycb active_learning/ycb", "uncertainty/ predictions causes/ real_rgbd"),
+    "table4_kernels": ("objects/ycb embeddings/ycb kernels/ycb", "coffee_cup predictions uncertainty/ real_rgbd"),
+    "table5_learners": ("embeddings/coffee_cup shifted/ycb learners/ycb", "predictions uncertainty/ causes/ real_rgbd"),
+    "table6_backbones": ("scenes/ instances/ predictions/real_rgbd", "uncertainty/ causes/ model.pt"),
+    "table7_runtime": ("model_causes/ycb model.pt runtime.csv", "predictions uncertainty/ diagnoses/ learners"),
+    "table8_recovery": ("recovery/ recovery.csv", "objects/ registrations encoders predictions model.pt"),
+    "table11_registration": ("registrations/ycb methods/ycb", "encoders embeddings uncertainty/ predictions causes/"),
+    "table12_uncertainty": ("causes/ycb estimates/ycb", "registrations encoders embeddings uncertainty/ predictions"),
+    "table14_method_matrix": ("encoders/ycb exchange/", "coffee_cup predictions uncertainty/ causes/ embeddings"),
+    "table15_new_concepts": (
+        "causes/ycb cause_encoders/ycb embeddings/ycb active_learning/ycb new_concepts/ycb",
+        "predictions diagnoses controls/ uncertainty/",
+    ),
+}
 
 
-def test_table15_needs_the_causes_and_the_encoders_of_other_seeds_and_sources(planned):
-    before = planned.before("results/smoke/tables/table15_new_concepts.md")
-    assert before["learn_new_concepts"] == before["sample_causes"] == before["train_on_causes"] == 2
-    assert before["train_encoder"] == before["learn_actively"] == 4
-    assert not {"attribute", "diagnose", "explain_controls", "run_icp"} & set(before)
+@pytest.mark.parametrize("table", NEEDS)
+def test_a_table_needs_its_own_stages_alone(planned, table):
+    assert_made(planned.needed(f"results/smoke/tables/{table}.md"), *NEEDS[table], planned)
 
 
-def test_table4_needs_its_sources_alone_and_table5_no_explainer(planned):
-    assert planned.before("results/smoke/tables/table4_kernels.md") == {
-        "sample_objects": 1, "register": 2, "train_encoder": 2, "embed": 2, "fit_kernel_grid": 1, "table4_kernels": 1,
-    }  # fmt: skip
-    assert planned.before("results/smoke/tables/table5_learners.md") == {
-        "sample_objects": 2, "register": 4, "train_encoder": 4, "embed": 4, "shift": 2, "fit_learners": 2,
-        "diagnostics": 1, "table5_learners": 1,
-    }  # fmt: skip
-
-
-def test_table6_needs_the_frames_and_what_the_encoder_starts_from(planned):
-    assert planned.before("results/smoke/tables/table6_backbones.md") == {
-        "sample_objects": 2, "register": 2, "pretrain_encoder": 1, "render_scenes": 1, "instances": 1,
-        "register_frames": 2, "train_on_frames": 2, "embed": 2, "reduce_embeddings": 1, "attribute": 4, "real_world": 1,
-        "learn_on_frames": 1, "table6_backbones": 1,
-    }  # fmt: skip
-
-
-def test_table11_needs_the_registrations_alone(planned):
-    assert planned.before("results/smoke/tables/table11_registration.md") == {
-        "sample_objects": 2, "register": 4, "register_methods": 2, "registration_methods": 1, "table11_registration": 1,
-    }  # fmt: skip
-
-
-def test_table12_needs_the_causes_alone(planned):
-    assert planned.before("results/smoke/tables/table12_uncertainty.md") == {
-        "sample_objects": 2, "sample_causes": 4, "estimate": 2, "estimator_metrics": 1, "table12_uncertainty": 1,
-    }  # fmt: skip
-
-
-def test_table14_needs_one_source_and_its_encoders(planned):
-    assert planned.before("results/smoke/tables/table14_method_matrix.md") == {
-        "sample_objects": 1, "register": 1, "train_encoder": 1, "explain_exchanged": 1, "exchange_metrics": 1,
-        "table14_method_matrix": 1,
-    }  # fmt: skip
-
-
-def test_table7_needs_the_model_alone_and_table8_only_itself(planned):
-    assert planned.before("results/smoke/tables/table7_runtime.md") == {
-        "render_scenes": 1, "instances": 1, "register_frames": 1, "embed": 1, "model": 1,
-        "register": 2, "pretrain_encoder": 1, "train_on_frames": 1,
-        "sample_objects": 2, "sample_model_causes": 2, "describe_model_causes": 2,
-        "time_stages": 1, "table7_runtime": 1,
-    }  # fmt: skip
-    assert planned.before("results/smoke/tables/table8_recovery.md") == {
-        "recover": 2, "recovery": 1, "table8_recovery": 1,
-    }  # fmt: skip
-
-
-EDITS = {
-    "gpca/classifier/gpc.py": WITH_GPC + COLLECTORS + jobs("table1_single_baselines", "table2_per_concept")
-    + jobs(learn_actively=4) + LEARNED + DIAGNOSED + KERNELS + BACKBONES + MODEL + RECOVERY + METHOD
-    + jobs(diagnose=4) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW + GRADIENTS,
-    "gpca/shift/samples.py": jobs(shift=2) + DIAGNOSED,
-    "baselines/heads.py": DIAGNOSED,
-    "gpca/reporting/figures/kernel_grid.py": jobs("kernel_learning_curves"),
-    "gpca/active_learning/acquisition.py":
-        jobs("fig4_pipeline", learn_actively=4) + LEARNED + NEW + RUNTIME + LABELLED,
-    "gpca/active_learning/stream.py": jobs("fig4_pipeline", learn_actively=4) + LEARNED,
-    "gpca/reporting/figures/active_learning.py":
-        jobs("active_learning_curves", "active_learning_overlap", "new_concept_curves", "fig4_pipeline"),
-    # Not Table II: it shows GP-CA alone.
-    "gpca/alignment/icp_kernels.py":
-        jobs("table1_single_baselines", run_icp=10) + ON_UNCERTAINTY + COLLECTORS + MODEL + RECOVERY + CAUSES
-        + MODEL_CAUSES + METHOD + jobs(register_methods=2, estimate=2) + METHODS + ESTIMATED + CONTROLS + EXCHANGED
-        + NEW + NEW_SHOWN,
-    "gpca/alignment/methods/teaser.py": jobs(register_methods=2) + METHODS,
-    "gpca/reporting/tables/registration.py": jobs("table11_registration", "table11_severity"),
-    "baselines/softmax_head.py": jobs(attribute=2, diagnose=2) + COLLECTORS + RECOVERY + CAUSES_SHOWN + CONTROLS,
-    "gpca/reporting/figures/contact_sheet.py": jobs("objects_coffee_cup", "objects_ycb"),
-    "gpca/reporting/figures/concepts.py": jobs("fig3_concepts", "fig5_real_world_example") + METHOD,
-    # Not the pictures: they show an encoder without reduction.
-    "gpca/encoders/reduction.py": jobs("reduce_embeddings", "attribute") + FRAMES,
-    "gpca/frames/occlusion.py": jobs("reduce_embeddings", register_frames=2, train_on_frames=2, embed=2, attribute=2)
-    + BACKBONES + MODEL,
-    "gpca/frames/bop.py":
-        jobs("reduce_embeddings", "instances", register_frames=2, train_on_frames=2, embed=2, attribute=2)
-        + jobs("render_scenes") + BACKBONES + MODEL + RECOVERY + ON_FRAMES,
-    "gpca/recovery/policy.py": MODEL + RECOVERY,
-    "gpca/reporting/tables/explainers.py": TABLES1,
-    "gpca/reporting/figures/confusions.py":
-        jobs("fig_attribution_confusions", "confusion_real_world", "cause_confusions"),
-    "gpca/encoders/dgcnn.py": PRETRAINED + jobs(train_encoder=4, embed=6, embed_without=4, learn_actively=4)
-    + jobs("table1_single_baselines", "table2_per_concept", shift=2) + BACKBONES + ON_EMBEDDINGS + COLLECTORS
-    + LEARNED + DIAGNOSED + KERNELS + MODEL + RECOVERY + METHOD
-    + jobs(train_on_causes=4, diagnose=2, train_control=2) + CAUSES_SHOWN + CONTROLS + EXCHANGED + NEW + GRADIENTS,
-    "gpca/objects/uw_rgbd.py": jobs(),
-    "gpca/objects/shapes/cups.py": jobs("sample_objects", "objects_coffee_cup", "fig3_concepts")
-    + jobs("table1_single_baselines", "table2_per_concept", register=2, train_encoder=2, embed=4, run_icp=5)
-    + PRETRAINED + BACKBONES
-    + jobs(attribute=16, embed_without=2, learn_actively=2, shift=2) + COLLECTORS + LEARNED + DIAGNOSED + METHOD
-    + jobs(sample_causes=2, describe=2, train_on_causes=2, diagnose=4) + CAUSES_SHOWN
-    + jobs(sample_model_causes=1, describe_model_causes=1, train_control=1) + MODEL
-    + jobs("register_methods", "estimate", "follow_gradients") + METHODS + ESTIMATED + CONTROLS + NEW + GRADIENTS_SHOWN,
-    "gpca/descriptors/entropy.py":
-        jobs(describe=4, diagnose=8, describe_model_causes=2, estimate=2) + CAUSES_SHOWN + MODEL + ESTIMATED
-        + EXCHANGED + NEW + NEW_SHOWN,
-    "gpca/uncertainty/estimators/censi.py": jobs(estimate=2) + ESTIMATED + EXCHANGED,
-    "gpca/reporting/figures/estimators.py": jobs("estimators"),
-    "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
-    "gpca/controls/variants.py": jobs(train_control=2) + CONTROLS,
-    "gpca/controls/judged.py": CONTROLS_SHOWN,
-    "gpca/exchange/estimated.py": EXCHANGED,
-}  # fmt: skip
+EDITS = {  # a module: what is made again where it has changed, and what is not
+    "gpca/classifier/gpc.py": (
+        "predictions/ycb/gpca/ predictions/real_rgbd/gpca_pair diagnoses/ycb/gpca active_learning/ycb kernels/ "
+        "learners/ model.pt recovery/ controls/ exchange/ new_concepts/ saliency/ table2_per_concept fig4_pipeline",
+        "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
+        "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
+    ),
+    "gpca/shift/samples.py": ("shifted/ learners/ reliability", "predictions active_learning diagnoses/ model.pt"),
+    "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
+    "gpca/reporting/figures/kernel_grid.py": ("figures/kernel_learning_curves", "kernels/ kernels.csv tables/"),
+    "gpca/active_learning/acquisition.py": (
+        "active_learning/ycb new_concepts/ frame_labels/ runtime.csv table6_labels",
+        "predictions embeddings learners diagnoses/ model.pt kernels/",
+    ),
+    "gpca/active_learning/stream.py": ("active_learning/ycb table3_stream", "predictions embeddings learners"),
+    "gpca/alignment/icp_kernels.py": (
+        "uncertainty/ycb/additive predictions/ycb/shap_additive causes/ycb methods/ycb estimates/ycb model.pt recovery",
+        "registrations/ encoders/ycb embeddings/ycb predictions/ycb/gpca/ active_learning/ table2_per_concept kernels",
+    ),
+    "gpca/alignment/methods/teaser.py": ("methods/ycb table11_severity", "causes/ycb predictions estimates exchange"),
+    "gpca/reporting/tables/registration.py": ("table11_registration table11_severity", "methods/ figures/"),
+    "baselines/softmax_head.py": (
+        "predictions/ycb/softmax_head recovery/ controls/",
+        "predictions/ycb/gpca predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
+    ),
+    "gpca/reporting/figures/contact_sheet.py": ("objects_coffee_cup objects_ycb", "objects/ tables/ fig3_concepts"),
+    "gpca/encoders/reduction.py": ("dgcnn/pca predictions/real_rgbd/dgcnn-pca", "encoders predictions/ycb model.pt"),
+    "gpca/frames/occlusion.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
+    "gpca/frames/bop.py": ("scenes/ instances/ frame_causes/ recovery/", "predictions/ycb encoders/ycb causes/ycb"),
+    "gpca/recovery/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
+    "gpca/reporting/tables/explainers.py": ("table1_extended table2_per_concept", "predictions metrics.csv figures/"),
+    "gpca/encoders/dgcnn.py": (
+        "encoders/ycb embeddings/ycb predictions/ycb/gpca/ predictions/ycb/concept_vectors shifted/ cause_encoders/ycb "
+        "control_embeddings/ saliency/ table2_per_concept",
+        "registrations uncertainty/ causes/ descriptors predictions/real_rgbd/gpca_pair residuals_forest methods/",
+    ),
+    "gpca/objects/uw_rgbd.py": ("", "objects/ tables/ figures/ page index.html"),
+    "gpca/objects/shapes/cups.py": (
+        "objects/coffee_cup registrations/coffee_cup predictions/coffee_cup objects_coffee_cup",
+        "objects/ycb registrations/ycb kernels/ scenes instances exchange/ recovery",
+    ),
+    "gpca/descriptors/entropy.py": (
+        "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt exchange/",
+        "predictions causes/ recovery methods/",
+    ),
+    "gpca/uncertainty/estimators/censi.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
+    "baselines/causes/trees.py": ("diagnoses/ycb/pair_forest table9_causes", "diagnoses/ycb/gpca predictions"),
+    "gpca/controls/variants.py": ("controls/ control_embeddings/ transfer", "predictions embeddings encoders"),
+    "gpca/controls/judged.py": ("controls.csv table10_controls transfer", "controls/ predictions diagnoses/"),
+    "gpca/exchange/estimated.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
+}
 
 
 @pytest.mark.parametrize("module", EDITS)
-def test_the_rules_that_use_a_module_depend_on_it_and_no_other(planned, module):
-    assert without_ends(planned.behind(module)) == EDITS[module]
+def test_the_files_that_a_module_makes_depend_on_it_and_no_others(planned, module):
+    assert_made(planned.remade(module), *EDITS[module], planned)
 
 
 @pytest.mark.parametrize("name", ["gpca/reporting/page/findings.py", "gpca/reporting/page/templates/page.js"])
@@ -218,9 +132,9 @@ def test_the_comparison_comes_after_every_number(planned):
 
 
 @pytest.mark.parametrize("module", ["gpca/classifier/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/uw_rgbd.py"])
-def test_an_edit_reruns_what_depends_on_the_module(finished, module):
+def test_an_edit_reruns_what_depends_on_the_module(finished, planned, module):
     finished.append(module, "\n# edited\n")
-    assert without_ends(finished.dry_run(*SMOKE).jobs) == EDITS[module]
+    assert without_ends(finished.dry_run(*SMOKE).jobs) == without_ends(planned.behind(module))
 
 
 @pytest.mark.parametrize("name", ["gpca", "gpca_paper"])
@@ -245,19 +159,25 @@ def test_a_finished_run_has_nothing_to_do_nor_has_one_with_a_touched_but_unchang
 def test_a_changed_setting_reruns_what_depends_on_it(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"explainers": {"gpca": {"iterations": 21}}}))
     planned = finished.dry_run(*SMOKE, "mine.yaml")
-    assert without_ends(planned.jobs) == (
-        jobs("table1_single_baselines", "table2_per_concept", attribute=2)
-        + COLLECTORS + DIAGNOSED + BACKBONES + MODEL + RECOVERY + METHOD + GRADIENTS - jobs("learn_on_frames")
-    )  # fmt: skip
+    again = "predictions/ycb/gpca/ predictions/real_rgbd learners/ model.pt recovery/ saliency/ table2_per_concept"
+    for word in again.split():
+        assert any(word in path for path in planned.outputs), word
+    assert not planned.jobs.keys() & {
+        "register",
+        "train_encoder",
+        "embed",
+        "learn_actively",
+        "learn_on_frames",
+        "diagnose",
+    }
     assert not [path for path in planned.outputs if "predictions/" in path and "gpca_paper" in path]
 
 
 def test_a_figure_of_another_source_is_drawn_alone(finished):
     (finished.folder / "mine.yaml").write_text(json.dumps({"figures": {"source": "ycb"}}))
-    assert (
-        finished.dry_run(*SMOKE, "mine.yaml").jobs
-        == jobs("fig3_concepts", "causes_example", "estimators", "saliency", "page") + METHOD
-    )
+    planned = finished.dry_run(*SMOKE, "mine.yaml")
+    assert {"fig3_concepts", "causes_example", "estimators", "saliency", "fig2_overview"} < planned.jobs.keys()
+    assert not [path for path in planned.outputs if "/tables/" in path or path.endswith((".npz", ".csv"))]
 
 
 def test_every_table_figure_and_stage_is_a_target_by_name(project):

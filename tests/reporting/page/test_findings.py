@@ -66,20 +66,19 @@ def folder(tmp_path):
 def test_every_number_is_that_of_the_files(folder):
     said = {finding.number: finding.text for finding in findings_of(folder, TITLES, RESULTS)}
     assert list(said) == ["94 to 97 %", "98.5 %", "12 %", "70 %", "50 to 80 %", "12 labels"]
-    assert "GP-CA names the perturbed concept in 94 to 97 %" in said["94 to 97 %"]
-    assert "; SHAP 30 %" in said["94 to 97 %"]
-    assert "FOREST comes first among the 2 other explainers that are not told the truth" in said["98.5 %"]
-    assert "98.5 % on average over the datasets, where GPCA_PAPER has 95.5 %" in said["98.5 %"]
-    assert "12 labels chosen by BALD and k-means, and after more than 60 labels drawn" in said["12 labels"]
+    assert "SHAP 30 %" in said["94 to 97 %"]
+    for words in ("FOREST", "the 2 other explainers", "GPCA_PAPER has 95.5 %"):
+        assert words in said["98.5 %"]
+    assert "more than 60 labels" in said["12 labels"]
 
 
 def test_findings_of_causes_and_of_recovery_stand_apart(folder):
     texts = [finding.text for finding in findings_of(folder, TITLES, ("table9_causes", "table8_recovery"))]
     assert len(texts) == 2
-    assert "balanced accuracy of 70 % (95 % interval 65 to 75 %): GP-CA on the pair" in texts[0]
-    assert "GP-CA (aligned source) has 50 %" in texts[0]
-    assert "agrees in 90 %" in texts[0]
-    assert "repairs 70 % of the failed registrations with at most 3 actions; random actions 40 %." in texts[1]
+    for words in ("70 % (95 % interval 65 to 75 %): GP-CA on the pair", "GP-CA (aligned source) has 50 %", "90 %"):
+        assert words in texts[0]
+    for words in ("70 % of the failed", "3 actions", "random actions 40 %"):
+        assert words in texts[1]
 
 
 def test_what_a_run_has_not_is_not_spoken_of(folder):
