@@ -27,8 +27,8 @@ from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
 from gpca.exchange.settings import ExchangeSettings
+from gpca.experiments.registry import experiments
 from gpca.files import whole_file
-from gpca.gradients.settings import GradientSettings
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.readings.registry import GROUPS
 from gpca.readings.settings import ReadingSizes
@@ -154,7 +154,6 @@ class Config:
     learners: Annotated[dict[str, Settings], BY_NAME]
     controls: Annotated[Controls, Keys(required=EVERY)]
     exchange: Annotated[Exchange, Keys(required=EVERY)]
-    gradients: Annotated[GradientSettings, COMPLETE]
     shift: Annotated[sections.Shift, SHIFT]
     readings: Annotated[Readings, Keys(required=EVERY)]
     real_world: RealWorld
@@ -170,10 +169,14 @@ class Config:
 
 def schema_text() -> str:
     """Return the schema file's text."""
+    whole = schema_of(Config)
+    for experiment in experiments():
+        whole["required"].append(experiment.name)
+        whole["properties"][experiment.name] = schema_of(experiment.settings, COMPLETE)
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Configuration of GP-CA Bench",
-        **schema_of(Config),
+        **whole,
         "$defs": {"source": schema_of(Source)},
     }
     return HEAD + yaml.dump(

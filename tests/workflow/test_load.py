@@ -7,7 +7,7 @@ from gpca.registry import load
 
 from .conftest import ROOT
 
-RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
+RULES = sorted((ROOT / "workflow/rules").rglob("*.smk"))
 
 
 @pytest.mark.parametrize(

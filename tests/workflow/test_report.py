@@ -6,7 +6,7 @@ import re
 import pytest
 
 from gpca.reporting.crate import NAME
-from gpca.reporting.registry import registered
+from gpca.experiments.results import registered
 
 from ..reporting.test_crate import faults
 

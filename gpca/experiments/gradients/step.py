@@ -17,9 +17,9 @@ from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.weights import load_model
 from gpca.errors import InputError
-from gpca.gradients.saliency import deletions
-from gpca.gradients.settings import GradientSettings
-from gpca.gradients.tcav import tcav
+from gpca.experiments.gradients.saliency import deletions
+from gpca.experiments.gradients.settings import GradientSettings
+from gpca.experiments.gradients.tcav import tcav
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress

@@ -14,7 +14,7 @@ from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.alignment.methods.registry import left_out, method_entry
 from gpca.controls.settings import TRANSFER, UNSEEN
-from gpca.encoders.registry import DIFFERENTIABLE
+from gpca.experiments.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
@@ -54,7 +54,6 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "control_encoder": _compared_encoders(config["controls"]),
         "timed_control": [name for name in config["controls"]["explainers"] if explainer_entry(name).reads == BARE],
         "transfer_source": list(sources) if transfers(config, sources) else [],
-        "gradient_source": list(sources) if has_gradients(config) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
         "strategy": strategies,
@@ -81,6 +80,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
         "frame_cause_seed": list(config["seeds"])[: frames["causes"]["seeds"]],
+        **{name: value for each in experiments() for name, value in each.names(config, sources).items()},
     }
 
 
@@ -144,7 +144,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         },
         "exchange_estimators": {name: estimator_entry(name).title for name in config["exchange"]["estimators"]},
         "controls": list(config["controls"]["controls"]),
-        "gradients": config["gradients"],
         "controls_title": _title_of_all(shown),
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": learners,
@@ -173,6 +172,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "recovery_title": f"Tables of the virtual camera, {title_of(shown[recovery['objects']])}",
         "treatments": recovery["treatments"],
         "budget": recovery["loop"]["budget"],
+        **{name: value for each in experiments() for name, value in each.shown(config, sources).items()},
     }
 
 
@@ -240,11 +240,6 @@ def reading_groups(config: Mapping) -> list[str]:
     groups, frames = config["readings"]["groups"], config["real_world"]
     trains = config["readings"]["frame_seeds"] and "none" in frames["reductions"]
     return [name for name in groups if name != FRAME_INPUT or trains]
-
-
-def has_gradients(config: Mapping) -> bool:
-    """Return whether the encoder that GP-CA reads has a gradient in the points, once it is trained."""
-    return config["encoders"][config["embedding"]["encoder"]]["backbone"] in DIFFERENTIABLE
 
 
 def _compared_encoders(controls: Mapping) -> list[str]:
