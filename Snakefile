@@ -36,9 +36,9 @@ pathvars:
 
 TOPICS = (
     "common functions objects registrations methods causes estimators frames virtual_frames frame_causes encoders "
-    "uncertainty explainers active_learning diagnostics controls exchange model recovery"
+    "uncertainty explainers active_learning diagnostics controls model recovery"
 )
-EXPERIMENTS = [f"experiments/{experiment.name}" for experiment in experiments()]
+EXPERIMENTS = [experiment.name for experiment in experiments()]
 for topic in [
     *TOPICS.split(),
     *EXPERIMENTS,

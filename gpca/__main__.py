@@ -35,7 +35,6 @@ STEPS = {
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "train_control": "registrations -> embeddings by an encoder that is trained under a control",
     "controls": "registrations and embeddings -> predictions of every explainer under every control",
-    "exchange": "registrations -> explanations based on other registration methods and estimators",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "new_concepts": "registrations, causes and encoders -> learning curves of concepts that no encoder has seen",
@@ -91,7 +90,7 @@ def _run(arguments: list[str], chosen: str | None) -> int:
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
             _keep_freed_memory()
-            module = import_module(_module_of(name))
+            module = import_module(module_of(name))
             module.add_arguments(step)
             step.set_defaults(run=module.run)
     options = parser.parse_args(arguments)
@@ -99,7 +98,8 @@ def _run(arguments: list[str], chosen: str | None) -> int:
     return options.run(options) or 0
 
 
-def _module_of(step: str) -> str:
+def module_of(step: str) -> str:
+    """Return the module of a step."""
     return EXPERIMENTS[step].step if step in EXPERIMENTS else f"gpca.steps.{step.replace('-', '_')}"
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gpca.config.checks.estimators import check_estimators
-from gpca.config.checks.exchange import check_exchange
 from gpca.config.checks.explainers import (
     check_controls,
     check_diagnosis,
@@ -79,7 +78,6 @@ def check(config: dict) -> dict[str, dict]:
     check_strategies(whole)
     check_learners(whole)
     check_controls(whole)
-    check_exchange(whole, *(names_left_out(config, key) for key in ("sources", "methods", "estimators")))
     for experiment in experiments():
         experiment.check(whole, lambda key: names_left_out(config, key))
     check_tolerances(whole)

@@ -5,14 +5,14 @@ The registry of results (:mod:`gpca.reporting.registry`) refers to both by name,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
 from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
-from gpca.alignment.methods.registry import left_out, method_entry
+from gpca.alignment.methods.registry import installed, left_out, method_entry
 from gpca.controls.settings import TRANSFER, UNSEEN
 from gpca.experiments.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
@@ -40,15 +40,10 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "source": list(sources),
         "seed": list(config["seeds"]),
         "first_seed": str(config["seeds"][0]),
-        "method": installed_methods(config["methods"]),
+        "method": installed(config["methods"]),
         "estimator": list(config["estimators"]),
         "explainer": list(config["explainers"]),
         "cause_explainer": list(config["diagnosis"]["explainers"]),
-        "exchange_source": list(config["exchange"]["sources"]),
-        "exchange_seed": list(config["seeds"])[: config["exchange"]["seeds"]],
-        "exchange_estimated": [name for name in config["exchange"]["explainers"] if explainer_entry(name).design],
-        "exchange_registered": [name for name in config["exchange"]["explainers"] if not explainer_entry(name).design],
-        "exchange_method": installed_methods(config["exchange"]["methods"]),
         "control_seed": controlled_seeds(config),
         "control": list(config["controls"]["controls"]),
         "control_encoder": _compared_encoders(config["controls"]),
@@ -122,7 +117,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "model_title": title_of(of_model),
         "methods": {
             name: {"title": entry.title, "is_global": entry.is_global}
-            for name in installed_methods(config["methods"])
+            for name in installed(config["methods"])
             for entry in [method_entry(name)]
         },
         "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
@@ -134,15 +129,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "explainer_titles": explainers,
         "cause_explainers": {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]},
         "control_explainers": {name: explainer_entry(name).title for name in config["controls"]["explainers"]},
-        "exchange_sources": {name: shown[name] for name in config["exchange"]["sources"]},
-        "exchange_explainers": {name: explainer_entry(name).title for name in config["exchange"]["explainers"]},
-        "exchange_methods": {
-            name: method_entry(name).title for name in installed_methods(config["exchange"]["methods"])
-        },
-        "exchange_left_out": {
-            method_entry(name).title: package for name, package in left_out(config["exchange"]["methods"]).items()
-        },
-        "exchange_estimators": {name: estimator_entry(name).title for name in config["exchange"]["estimators"]},
         "controls": list(config["controls"]["controls"]),
         "controls_title": _title_of_all(shown),
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
@@ -174,13 +160,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "budget": recovery["loop"]["budget"],
         **{name: value for each in experiments() for name, value in each.shown(config, sources).items()},
     }
-
-
-def installed_methods(names: Iterable[str]) -> list[str]:
-    """Return the registration methods of these names, without those whose package is missing here."""
-    names = list(names)
-    missing = left_out(names)
-    return [name for name in names if name not in missing]
 
 
 def names_of_backbones(frames: Mapping) -> list[str]:

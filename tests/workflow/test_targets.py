@@ -193,7 +193,7 @@ EDITS = {
     "baselines/causes/trees.py": jobs(diagnose=2) + CAUSES_SHOWN,
     "gpca/controls/variants.py": jobs(train_control=2) + CONTROLS,
     "gpca/controls/judged.py": CONTROLS_SHOWN,
-    "gpca/exchange/estimated.py": EXCHANGED,
+    "gpca/experiments/exchange/estimated.py": EXCHANGED,
 }  # fmt: skip
 
 

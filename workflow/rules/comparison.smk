@@ -10,7 +10,7 @@ COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
-    *("exchange.csv", "readings.csv", "new_concepts.csv"),
+    *("readings.csv", "new_concepts.csv"),
     *(experiment.tidy for experiment in experiments() if experiment.is_run(NAMES)),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]

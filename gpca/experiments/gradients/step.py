@@ -8,7 +8,7 @@ from pathlib import Path
 
 import torch
 
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.arrays import save_arrays
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
@@ -24,7 +24,7 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections, per_seed
+from gpca.settings import checked_sections
 
 SECTIONS = {"gradients": ("gradients",), "encoder": ("encoders", "*"), "gpc": ("explainers", "gpca")}
 

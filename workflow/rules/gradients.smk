@@ -36,7 +36,7 @@ rule follow_gradients:
     benchmark:
         "<benchmarks>/saliency/{source}.tsv"
     conda:
-        "../../envs/gpca.yaml"
+        "../envs/gpca.yaml"
     threads: 1
     resources:
         mem_mb=3000,
@@ -74,7 +74,7 @@ rule gradient_metrics:
         "<benchmarks>/gradients.tsv"
     localrule: True
     conda:
-        "../../envs/gpca.yaml"
+        "../envs/gpca.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -82,4 +82,4 @@ rule gradient_metrics:
     params:
         collector="gpca.experiments.gradients.metrics:collect",
     script:
-        "../../scripts/collect.py"
+        "../scripts/collect.py"
