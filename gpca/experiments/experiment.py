@@ -37,9 +37,9 @@ class Experiment:
     settings: Any
     tidy: str
     needs: tuple[str, ...] = ()
-    names: ByRun
-    shown: ByRun
-    check: Callable[[dict, Callable[[str], set[str]]], None]
+    names: ByRun = lambda config, sources: {}
+    shown: ByRun = lambda config, sources: {}
+    check: Callable[[dict, Callable[[str], set[str]]], None] = lambda config, left_out: None
     lists: Mapping[str, str] = field(default_factory=dict)
     explainers: bool = False
 
