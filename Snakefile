@@ -7,6 +7,7 @@ from gpca.config.jobs import export_to_jobs
 from gpca.config.layers import DEFAULTS, require_sound
 from gpca.config.restart import clear_leftovers
 from gpca.errors import one_line
+from gpca.experiments.registry import experiments
 
 given, module = workflow.config_settings, workflow.modifier
 with one_line():
@@ -35,9 +36,17 @@ pathvars:
 
 TOPICS = (
     "common functions objects registrations methods causes estimators frames virtual_frames frame_causes encoders "
-    "uncertainty explainers active_learning diagnostics controls exchange gradients model recovery results readings comparison targets"
+    "uncertainty explainers active_learning diagnostics controls model recovery"
 )
-for topic in TOPICS.split():
+EXPERIMENTS = [experiment.name for experiment in experiments()]
+for topic in [
+    *TOPICS.split(),
+    *EXPERIMENTS,
+    "results",
+    "readings",
+    "comparison",
+    "targets",
+]:
 
     include: f"workflow/rules/{topic}.smk"
 

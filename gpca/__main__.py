@@ -10,6 +10,7 @@ from pathlib import Path
 from gpca import __version__
 from gpca.arguments import THREADS, OneLineParser
 from gpca.errors import InputError
+from gpca.experiments.registry import experiments
 from gpca.interrupts import certain_interrupts
 from gpca.processor import prepare
 from gpca.standard_streams import say, standard_streams
@@ -34,8 +35,6 @@ STEPS = {
     "attribute": "registrations, embeddings or uncertainty -> predictions of one explainer",
     "train_control": "registrations -> embeddings by an encoder that is trained under a control",
     "controls": "registrations and embeddings -> predictions of every explainer under every control",
-    "exchange": "registrations -> explanations based on other registration methods and estimators",
-    "gradients": "registrations, encoder and embeddings -> what GP-CA's scores respond to: saliency maps and TCAV",
     "without": "registrations -> embeddings by encoders that never saw one of the concepts",
     "active_learning": "embeddings -> learning curves of every acquisition strategy",
     "new_concepts": "registrations, causes and encoders -> learning curves of concepts that no encoder has seen",
@@ -53,6 +52,8 @@ STEPS = {
     "check-config": "configs -> whether a run can use them",
     "check-reference": "folder of a run -> whether its numbers agree with the reference",
 }
+EXPERIMENTS = {experiment.name: experiment for experiment in experiments()}
+STEPS |= {name: experiment.summary for name, experiment in EXPERIMENTS.items()}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -89,12 +90,17 @@ def _run(arguments: list[str], chosen: str | None) -> int:
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
             _keep_freed_memory()
-            module = import_module(f"gpca.steps.{name.replace('-', '_')}")
+            module = import_module(module_of(name))
             module.add_arguments(step)
             step.set_defaults(run=module.run)
     options = parser.parse_args(arguments)
     options.settings = _mapping(options.settings)
     return options.run(options) or 0
+
+
+def module_of(step: str) -> str:
+    """Return the module of a step."""
+    return EXPERIMENTS[step].step if step in EXPERIMENTS else f"gpca.steps.{step.replace('-', '_')}"
 
 
 def _command() -> str:

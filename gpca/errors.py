@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 class InputError(ValueError):
@@ -23,6 +24,24 @@ def require_known(kind: str, name: object, known: Collection[str]) -> None:
     """Raise an InputError that lists the known names of a kind of thing unless this is one of them."""
     if name not in known:
         raise InputError(f"{kind} '{name}'", "unknown", f"choose one of {', '.join(known)}")
+
+
+def with_key(key: str, function: Callable[..., Any], *arguments: object) -> Any:
+    """Call the function and name the config's key in front of its InputError, or of what the system refuses."""
+    try:
+        return function(*arguments)
+    except (InputError, OSError) as fault:
+        raise InputError(f"config key {key}", str(fault)) from fault
+
+
+def require_names(
+    key: str, names: Iterable[str], known: Collection[str], noun: str, left_out: Collection[str] = ()
+) -> None:
+    """Raise an InputError for the first of the names at a key that is not known, or that the config leaves out."""
+    for name in names:
+        if name not in known:
+            fault = f"{noun} '{name}' is left out" if name in left_out else f"no {noun} '{name}'"
+            raise InputError(f"config key {key}", fault, f"choose one of {', '.join(known)}")
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cache
 from inspect import isclass, signature
@@ -65,6 +65,53 @@ def check_settings(settings: dict, *section: str) -> None:
     for key in section:
         part = part.get("properties", {}).get(key) or part["additionalProperties"]
     require_valid(settings, part | {"$defs": whole["$defs"]}, "setting", complete=False)
+
+
+def checked_sections(
+    settings: Mapping[str, dict], sections: Mapping[str, tuple[str, ...]], by_name: Collection[str] = ()
+) -> dict[str, dict]:
+    """Return the parts of ``--settings`` by name, each checked like a section of the config; what is absent is empty.
+
+    Args:
+        settings: name -> part.
+        sections: name -> path of the section.
+        by_name: further parts, which are for :func:`checked_by_name`.
+
+    Raises:
+        InputError: an unknown name, or what :func:`check_settings` refuses.
+    """
+    known = (*sections, *by_name)
+    if unknown := set(settings) - set(known):
+        raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"choose one of {', '.join(known)}")
+    given = {name: settings.get(name) or {} for name in known}
+    for name, section in sections.items():
+        check_settings(given[name], *section)
+    return given
+
+
+def checked_by_name(
+    given: dict[str, Any], section: str, names: Collection[str], require: Callable[[str, Mapping], None]
+) -> dict[str, dict]:
+    """Return the settings of each of the names, none for those that a section of the config does not give.
+
+    Args:
+        given: that section, name -> settings.
+        require: raises an InputError unless a name is known and takes its settings.
+    """
+    given = given or dict.fromkeys(names)
+    check_settings(given, section)
+    for name in (*given, *names):
+        require(name, given.get(name) or {})
+    return {name: given.get(name) or {} for name in names}
+
+
+def checked_with_icp(settings: Mapping[str, Any], *section: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return ``--settings`` that are a section of the config, and those of ICP, which they hold under ``icp``."""
+    given = dict(settings)
+    icp = given.pop("icp", {})
+    check_settings(given, *section)
+    check_settings(icp, "registrations", "icp")
+    return given, icp
 
 
 def require_arguments(subject: str, function: Callable, given: int, settings: Mapping[str, object]) -> None:

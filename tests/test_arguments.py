@@ -5,7 +5,7 @@ from importlib import import_module
 
 import pytest
 
-from gpca.__main__ import STEPS
+from gpca.__main__ import STEPS, module_of
 from gpca.arguments import SURFACE_POINTS, whole_number
 
 from .hostile import refusal
@@ -13,7 +13,7 @@ from .hostile import refusal
 
 def options(step) -> list[Action]:
     parser = ArgumentParser()
-    import_module(f"gpca.steps.{step.replace('-', '_')}").add_arguments(parser)
+    import_module(module_of(step)).add_arguments(parser)
     return parser._actions
 
 

@@ -14,7 +14,7 @@ import yaml
 
 from gpca.__main__ import STEPS
 from gpca.controls.settings import CONTROLS
-from gpca.reporting.registry import registered
+from gpca.experiments.results import registered
 
 from .documents import PAGES, ROOT, anchor_of, commands, our_files, relative
 
@@ -188,7 +188,7 @@ def test_every_key_of_a_source_is_described():
 
 
 def test_the_resources_of_the_cluster_page_are_those_of_the_rules():
-    files = set((ROOT / "workflow/rules").glob("*.smk")) - {ROOT / "workflow/rules/targets.smk"}
+    files = set((ROOT / "workflow/rules").rglob("*.smk")) - {ROOT / "workflow/rules/targets.smk"}
     rules = "".join(path.read_text() for path in files)
     page = (ROOT / "docs/cluster.md").read_text()
     for declared, pattern in {

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gpca.config.checks.estimators import check_estimators
-from gpca.config.checks.exchange import check_exchange
 from gpca.config.checks.explainers import (
     check_controls,
     check_diagnosis,
     check_encoders,
     check_explainers,
-    check_gradients,
     check_learners,
     check_registrations,
     check_strategies,
@@ -27,6 +25,7 @@ from gpca.config.checks.sources import check_named_sources, resolve_sources
 from gpca.config.command_line import with_types
 from gpca.config.layers import with_defaults
 from gpca.config.leave_out import names_left_out, without_false
+from gpca.experiments.registry import experiments
 from gpca.settings import load_schema, require_valid
 from gpca.structured_text import require_plain
 
@@ -79,8 +78,8 @@ def check(config: dict) -> dict[str, dict]:
     check_strategies(whole)
     check_learners(whole)
     check_controls(whole)
-    check_exchange(whole, *(names_left_out(config, key) for key in ("sources", "methods", "estimators")))
-    check_gradients(whole)
+    for experiment in experiments():
+        experiment.check(whole, lambda key: names_left_out(config, key))
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs, sources)

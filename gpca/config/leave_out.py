@@ -10,22 +10,23 @@ from typing import Any
 
 from baselines.registry import explainers
 from gpca.errors import InputError
+from gpca.experiments.registry import experiments
 from gpca.recovery.policies import ALWAYS, POLICIES
 
+EXPLAINED = tuple(f"{each.name}.explainers" for each in experiments() if each.explainers)
 # Mappings of which any entry may be false.
 LEAVABLE = (
     *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
     *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
-    *("exchange.explainers", "readings.groups"),
+    "readings.groups",
+    *EXPLAINED,
 )
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
 SWITCHES = ("active_learning.strategies", "recovery.policies")
 # Lists that lose the names of what is left out elsewhere: the list's key, and that of the mapping.
 LISTED = {
     "kernel_grid.sources": "sources",
-    "exchange.sources": "sources",
-    "exchange.methods": "methods",
-    "exchange.estimators": "estimators",
+    **{f"{each.name}.{key}": mapping for each in experiments() for key, mapping in each.lists.items()},
     "real_world.backbones": "encoders",
     "real_world.condition_backbones": "encoders",
     "real_world.reductions": "reductions",
@@ -56,7 +57,7 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     gone = left_out["encoders"]
     _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    for key in ("explainers", "controls.explainers", "exchange.explainers"):
+    for key in ("explainers", "controls.explainers", *EXPLAINED):
         _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
     acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
     reading = {name for name, entry in POLICIES.items() if entry.explainer in without}

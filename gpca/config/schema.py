@@ -26,9 +26,9 @@ from gpca.controls.settings import ControlSettings
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
-from gpca.exchange.settings import ExchangeSettings
+from gpca.experiments.experiment import Experiment
+from gpca.experiments.registry import experiments
 from gpca.files import whole_file
-from gpca.gradients.settings import GradientSettings
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.readings.registry import GROUPS
 from gpca.readings.settings import ReadingSizes
@@ -63,6 +63,7 @@ NamedSource = Annotated[
 ]
 Tolerances = Annotated[dict[str, Tolerance], Named(dict.fromkeys(UNITS, Tolerance), closed=True)]
 BY_NAME = Bounds(minProperties=1, propertyNames=NAME)
+EXPLAINED = Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
 SHIFT = Keys(
     required=("samples", "severities", "held_out_share", "encoder", "neighbours", "shape_points"), without=("beyond",)
 )
@@ -96,15 +97,7 @@ class Diagnosis:
 class Controls(ControlSettings):
     """The controls, and the explainers under them, with settings beyond those that they have elsewhere."""
 
-    explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Exchange(ExchangeSettings):
-    """What is exchanged beneath explainers, on which sources, and these, with settings beyond those elsewhere."""
-
-    sources: tuple[str, ...]
-    explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
+    explainers: EXPLAINED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,14 +140,12 @@ class Config:
     estimator_pairs: Annotated[EstimatorPairSettings, COMPLETE]
     causes: Annotated[CauseSettings, COMPLETE_CAUSES]
     diagnosis: Diagnosis
-    explainers: Annotated[dict[str, Settings], BY_NAME, Named(EXPLAINERS)]
+    explainers: EXPLAINED
     active_learning: Annotated[sections.ActiveLearning, LEARNING]
     new_concepts: Annotated[sections.NewConcepts, Keys(required=EVERY)]
     kernel_grid: Annotated[sections.Grid, GRID]
     learners: Annotated[dict[str, Settings], BY_NAME]
     controls: Annotated[Controls, Keys(required=EVERY)]
-    exchange: Annotated[Exchange, Keys(required=EVERY)]
-    gradients: Annotated[GradientSettings, COMPLETE]
     shift: Annotated[sections.Shift, SHIFT]
     readings: Annotated[Readings, Keys(required=EVERY)]
     real_world: RealWorld
@@ -170,15 +161,27 @@ class Config:
 
 def schema_text() -> str:
     """Return the schema file's text."""
+    whole = schema_of(Config)
+    for experiment in experiments():
+        whole["required"].append(experiment.name)
+        whole["properties"][experiment.name] = _section_of(experiment)
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Configuration of GP-CA Bench",
-        **schema_of(Config),
+        **whole,
         "$defs": {"source": schema_of(Source)},
     }
     return HEAD + yaml.dump(
         schema, Dumper=_WithoutAliases, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True
     )
+
+
+def _section_of(experiment: Experiment) -> dict[str, Any]:
+    section = schema_of(experiment.settings, COMPLETE)
+    if experiment.explainers:
+        section["required"].append("explainers")
+        section["properties"]["explainers"] = schema_of(EXPLAINED)
+    return section
 
 
 class _WithoutAliases(yaml.SafeDumper):

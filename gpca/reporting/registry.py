@@ -1,4 +1,4 @@
-"""The registry of results: every table and figure, what it is called, and what it is made from (``results.yaml``)."""
+"""An entry of the registry of results: a table or figure, what it is called, and what it is made from."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -14,7 +13,6 @@ from typing import Any, Protocol, TypeVar
 from gpca.registry import load
 from gpca.structured_text import load_own_yaml
 
-REGISTRY = Path(__file__).with_name("results.yaml")
 SUFFIXES = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}  # the files of each kind
 Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values
 
@@ -149,24 +147,12 @@ class HasSection(Protocol):
 InSection = TypeVar("InSection", bound=HasSection)
 
 
-@cache
-def registered() -> tuple[Result, ...]:
-    """Return every entry of the registry, in order."""
-    sections = load_own_yaml(REGISTRY)
-    return tuple(_result(section["section"], entry) for section in sections for entry in section["results"])
-
-
-def results_of(names: Names) -> list[Result]:
-    """Return the tables and figures that a run with these names makes, in the order of the registry.
-
-    Args:
-        names: what the patterns of the registry have in braces; ``source`` lists the sources.
-    """
-    results = []
-    for entry in registered():
-        of_entry = [entry.of_source(source) for source in names["source"]] if "{source}" in entry.name else [entry]
-        results += [result for result in of_entry if result.is_made(names)]
-    return results
+def read_results(path: Path) -> list[tuple[str, list[Result]]]:
+    """Return the sections of a file of the registry, each with its results."""
+    return [
+        (section["section"], [_result(section["section"], entry) for entry in section["results"]])
+        for section in load_own_yaml(path)
+    ]
 
 
 def targets(results: Iterable[Result]) -> dict[str, Result]:

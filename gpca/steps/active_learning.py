@@ -14,7 +14,7 @@ from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curv
 from gpca.active_learning.rounds import Task, initial_gpc, make_task, run_rounds
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream import run_stream
-from gpca.arguments import SEED
+from gpca.arguments import SEED, require_files
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.errors import require_known
@@ -23,7 +23,6 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.steps import require_files
 
 PAPERS = ("random", "bald_kmeans")  # the paper's two strategies, which also meet a rare concept
 

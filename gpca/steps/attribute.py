@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 
 from baselines.registry import explainer_entry, require_settings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.axes import Axes
 from gpca.errors import InputError
@@ -16,7 +16,6 @@ from gpca.explainers.interface import Describing, ExplainerEntry
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.steps import per_seed
 from gpca.uncertainty.conditions import CONDITIONS
 from gpca.uncertainty.outcomes import Outcomes, read_seconds
 

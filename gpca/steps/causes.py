@@ -11,7 +11,7 @@ from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import CauseSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.provenance import record_provenance
-from gpca.steps import checked_with_icp
+from gpca.settings import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:

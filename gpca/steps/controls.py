@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, require_files
 from gpca.controls.experiment import Experiment
 from gpca.controls.rivals import make_rivals
 from gpca.controls.samples import sample_table
@@ -22,7 +22,7 @@ from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections, require_files
+from gpca.settings import checked_sections
 from gpca.uncertainty.settings import UncertaintySettings
 
 SECTIONS = {

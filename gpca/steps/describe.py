@@ -12,7 +12,7 @@ from gpca.causes.dataset import Causes
 from gpca.descriptors.dataset import describe_all
 from gpca.descriptors.settings import DescriptorSettings
 from gpca.provenance import record_provenance
-from gpca.steps import checked_with_icp
+from gpca.settings import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:

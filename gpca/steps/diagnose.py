@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from baselines.registry import CAUSES, explainer_entry, require_settings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import labelled
@@ -20,7 +20,6 @@ from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.steps import per_seed
 
 
 def add_arguments(parser: ArgumentParser) -> None:

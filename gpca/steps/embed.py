@@ -18,7 +18,7 @@ from gpca.encoders.weights import load_model
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
-from gpca.steps import checked_with_icp
+from gpca.settings import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:

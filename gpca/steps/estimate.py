@@ -6,12 +6,12 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.alignment.methods.registry import require_local
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed, require_files
 from gpca.causes.dataset import Causes
 from gpca.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.provenance import record_provenance
-from gpca.steps import checked_by_name, checked_sections, per_seed, require_files
+from gpca.settings import checked_by_name, checked_sections
 from gpca.trials.covariances import REFERENCE
 from gpca.trials.estimation import reference_samples, try_estimators
 from gpca.trials.judge import Judges

@@ -34,7 +34,7 @@ from gpca.frames.plausibility import require_of_objects
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, joined
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections
+from gpca.settings import checked_sections
 from gpca.steps.diagnose import observed_only, training_rows, with_what_it_reads
 
 if TYPE_CHECKING:

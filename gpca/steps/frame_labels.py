@@ -22,7 +22,7 @@ from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections
+from gpca.settings import checked_sections
 
 SECTIONS = {"frame_labels": ("frame_labels",), "active_learning": ("active_learning",)}
 

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import torch
 
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.classifier.kernel_grid import KernelGrid, evaluate_grid, write_grid
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.steps import per_seed
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from baselines.registry import explainer_entry, require_settings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed, require_files
 from gpca.csv_file import write_csv
 from gpca.errors import InputError
 from gpca.progress import progress
@@ -15,7 +15,6 @@ from gpca.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.shift.learners import predict_sets
 from gpca.shift.sets import ShiftedSets
-from gpca.steps import per_seed, require_files
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, require_files
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.gpc import GPC
@@ -24,7 +24,7 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.provenance import record_provenance
 from gpca.recovery.policy import RecoveryPolicy
-from gpca.steps import checked_sections, require_files
+from gpca.settings import checked_sections
 
 SECTIONS = {
     "encoder": ("encoders", "*"),

@@ -22,7 +22,7 @@ from gpca.active_learning.settings import (
     NewConceptSettings,
 )
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, require_files
 from gpca.causes.dataset import Causes
 from gpca.causes.drawing import draw_geometry
 from gpca.causes.labels import LABELS, labels_of
@@ -41,7 +41,7 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections, require_files
+from gpca.settings import checked_sections
 
 SECTIONS = {
     "new_concepts": ("new_concepts",),

@@ -16,8 +16,7 @@ from gpca.provenance import record_provenance
 from gpca.readings.given import SECTIONS, Given, by_backbone, by_method, by_source_and_seed
 from gpca.readings.registry import GROUPS
 from gpca.readings.settings import ReadingSizes, name_of, readings_of
-from gpca.settings import check_settings
-from gpca.steps import checked_sections
+from gpca.settings import check_settings, checked_sections
 
 KINDS: dict[str, Callable[[list[Path]], dict]] = {
     "registrations": by_source_and_seed,

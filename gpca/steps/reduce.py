@@ -5,13 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.encoders.reduction import make_reduction, reduce
 from gpca.errors import InputError
 from gpca.provenance import record_provenance
 from gpca.settings import check_settings
-from gpca.steps import per_seed
 
 SHAPES = {"h": ("S", "d"), "head_logits": ("S", "C"), "sample": ("S",), "split": ("S",)}
 KINDS = {"h": REAL, "head_logits": REAL, "sample": WHOLE, "split": TEXT}

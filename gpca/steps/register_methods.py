@@ -6,12 +6,12 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.alignment.methods.registry import require_settings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed, require_files
 from gpca.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
-from gpca.steps import checked_by_name, checked_sections, per_seed, require_files
+from gpca.settings import checked_by_name, checked_sections
 from gpca.trials.settings import PairSettings
 from gpca.trials.trial import try_methods
 

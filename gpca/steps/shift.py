@@ -8,16 +8,16 @@ from pathlib import Path
 
 import torch
 
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.weights import load_model
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.provenance import record_provenance
+from gpca.settings import checked_sections
 from gpca.shift.samples import make_sets
 from gpca.shift.settings import ShiftSettings
-from gpca.steps import checked_sections, per_seed
 
 SECTIONS = {"shift": ("shift",), "registrations": ("registrations",), "encoder": ("encoders", "*")}
 

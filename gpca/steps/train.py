@@ -13,7 +13,7 @@ import pandas as pd
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, require_files
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import train_encoder
@@ -23,7 +23,7 @@ from gpca.frames.sample_file import read_instances_of
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.reading import read_as
 from gpca.provenance import record_provenance
-from gpca.steps import checked_with_icp, require_files
+from gpca.settings import checked_with_icp
 
 
 def add_arguments(parser: ArgumentParser) -> None:

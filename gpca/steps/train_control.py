@@ -18,7 +18,7 @@ from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections
+from gpca.settings import checked_sections
 
 SECTIONS = {"controls": ("controls",), "encoder": ("encoders", "*")}
 CURVE = ("epoch", "learning_rate", "loss", "accuracy")

@@ -6,10 +6,10 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
-from gpca.steps import checked_with_icp, per_seed
+from gpca.settings import checked_with_icp
 from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.evaluation import design_rows, evaluate_design
 from gpca.uncertainty.outcomes import write_seconds

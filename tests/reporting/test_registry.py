@@ -3,16 +3,15 @@ import json
 
 import pytest
 
+from gpca.experiments import results as registry
+from gpca.experiments.results import registered, results_of
 from gpca.registry import load
-from gpca.reporting import registry
 from gpca.reporting.page.page import rendered_caption
 from gpca.reporting.registry import (
     Input,
     Result,
     build,
     by_section,
-    registered,
-    results_of,
     targets,
     unknown_target,
 )

@@ -79,14 +79,14 @@ class Project:
 
     def snakemake_as_processes(self, *arguments, check=True):
         """Run Snakemake and its jobs as users do, each a process that loads its libraries."""
-        return self._python("-m", "snakemake", *arguments, check=check)
+        return self.python("-m", "snakemake", *arguments, check=check)
 
     def plan(self, *arguments, check=True):
         """Run Snakemake dry."""
         return self.snakemake("-n", *arguments, check=check)
 
     def gpca(self, *arguments, check=True):
-        return self._python("-m", "gpca", *arguments, check=check)
+        return self.python("-m", "gpca", *arguments, check=check)
 
     def dry_run(self, *arguments):
         done = self.plan(*arguments)
@@ -121,7 +121,7 @@ class Project:
         whole = results(self.folder / "results/smoke")
         return {name: content for name, content in whole.items() if name.endswith(suffixes)}
 
-    def _python(self, *arguments, check):
+    def python(self, *arguments, check):
         done = subprocess.run(
             [sys.executable, *map(str, arguments)], cwd=self.folder, env=_environment(), capture_output=True, text=True
         )

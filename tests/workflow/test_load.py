@@ -6,14 +6,14 @@ import pytest
 
 from gpca.config.check import check
 from gpca.config.leave_out import without_false
+from gpca.experiments.results import results_of
+from gpca.experiments.run import names_of
 from gpca.registry import load
-from gpca.reporting.registry import results_of
-from gpca.reporting.run import names_of
 
 from ..config.configs import load as load_config
 from .conftest import ROOT
 
-RULES = sorted((ROOT / "workflow/rules").glob("*.smk"))
+RULES = sorted((ROOT / "workflow/rules").rglob("*.smk"))
 
 
 def all_of(patterns):

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
+from gpca.experiments.results import registered
 from gpca.reporting.crate import NAME
-from gpca.reporting.registry import registered
 
 from ..reporting.test_crate import faults
 

@@ -107,7 +107,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     "baselines/causes/trees.py": ("diagnoses/ycb/pair_forest table9_causes", "diagnoses/ycb/gpca predictions"),
     "gpca/controls/variants.py": ("controls/ control_embeddings/ transfer", "predictions embeddings encoders"),
     "gpca/controls/judged.py": ("controls.csv table10_controls transfer", "controls/ predictions diagnoses/"),
-    "gpca/exchange/estimated.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
+    "gpca/experiments/exchange/estimated.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
 }
 
 

@@ -6,7 +6,7 @@ from baselines.registry import CAUSES, explainer_entry, explainer_module
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.objects.procedural import FAMILIES
-from gpca.reporting.run import names_of, settings_of
+from gpca.experiments.run import names_of, settings_of
 
 # An own kind of source is a file in sources/ that writes <results>/objects/<name>.npz and adds itself to SOURCES.
 CONFIGURED_SOURCES = list(SOURCES)

@@ -4,13 +4,14 @@ from os.path import relpath
 from gpca.code_files import ROOT
 from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import read_published
+from gpca.experiments.registry import experiments
 
 COLLECTED = [
     *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
-    *("exchange.csv", "readings.csv", "new_concepts.csv"),
-    *(["gradients.csv"] if NAMES["gradient_source"] else []),
+    *("readings.csv", "new_concepts.csv"),
+    *(experiment.tidy for experiment in experiments() if experiment.is_run(NAMES)),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

@@ -1,5 +1,5 @@
 # Every explainer -> its predictions, one schema for all; the tidy metrics and timings of these.
-from gpca.reporting.run import explainer_of, files_behind
+from gpca.experiments.run import explainer_of, files_behind
 
 
 rule predictions:

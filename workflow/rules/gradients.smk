@@ -24,7 +24,9 @@ rule follow_gradients:
             f"<results>/embeddings/{{{{source}}}}/{GRADIENT_ENCODER}/none/seed{{seed}}.npz",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.gradients", encoder_module(GRADIENT_ENCODER)),
+        code=code_files(
+            "gpca.experiments.gradients.step", encoder_module(GRADIENT_ENCODER)
+        ),
     output:
         deletions=collect("<results>/saliency/{{source}}/seed{seed}.csv", seed=SEEDS),
         maps=collect("<results>/saliency/{{source}}/seed{seed}.npz", seed=SEEDS),
@@ -63,7 +65,7 @@ rule gradient_metrics:
             source=NAMES["gradient_source"],
             seed=SEEDS,
         ),
-        code=collector_code("gpca.gradients.metrics:collect"),
+        code=collector_code("gpca.experiments.gradients.metrics:collect"),
     output:
         "<results>/gradients.csv",
     log:
@@ -78,6 +80,6 @@ rule gradient_metrics:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.gradients.metrics:collect",
+        collector="gpca.experiments.gradients.metrics:collect",
     script:
         "../scripts/collect.py"

@@ -1,5 +1,5 @@
 # Every table and figure of the registry, gpca/reporting/results.yaml: a rule of its name for each.
-from gpca.reporting.registry import results_of
+from gpca.experiments.results import results_of
 
 RESULTS = results_of(NAMES)
 

@@ -18,6 +18,13 @@ REGISTRY: Registry[MethodEntry] = Registry("registration method", folder, "METHO
 methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
+def installed(names: Iterable[str]) -> list[str]:
+    """Return the methods of these names that can run here."""
+    names = list(names)
+    missing = left_out(names)
+    return [name for name in names if name not in missing]
+
+
 def left_out(names: Iterable[str]) -> dict[str, str]:
     """Return those of the methods that cannot run here, each with the package that is missing."""
     packages = {name: method_entry(name).package for name in names}

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from gpca.alignment.methods.registry import require_local
-from gpca.config.checks.named import with_key
-from gpca.errors import InputError
+from gpca.errors import InputError, with_key
 from gpca.uncertainty.estimators.registry import require_estimator_settings
 
 

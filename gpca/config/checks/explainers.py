@@ -9,11 +9,9 @@ from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
-from gpca.config.checks.named import require_names, with_key
 from gpca.controls.settings import ControlSettings
 from gpca.encoders.registry import require_backbone
-from gpca.encoders.settings import DGCNNOptions, EncoderSettings
-from gpca.errors import InputError
+from gpca.errors import InputError, require_names, with_key
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import check_settings
 
@@ -82,17 +80,6 @@ def check_controls(config: dict) -> None:
         if entry.design and not entry.observed_only:
             fault = "needs more Monte-Carlo ICP than that of the observed pair, which is all that a control runs"
             raise InputError(f"config key {key}", fault, "leave it out")
-
-
-def check_gradients(config: dict) -> None:
-    """Check that enough points are left for the encoder where most are deleted."""
-    encoder = EncoderSettings(**config["encoders"][config["embedding"]["encoder"]])
-    if encoder.backbone != "dgcnn":
-        return
-    share, neighbours = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
-    if round((1 - share) * encoder.draw_points) < neighbours:
-        fault = f"deleting {share:g} of {encoder.draw_points} points leaves fewer than the encoder's {neighbours}"
-        raise InputError("config key gradients.deleted", fault, "delete fewer")
 
 
 def check_strategies(config: dict) -> None:

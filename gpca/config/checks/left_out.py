@@ -7,8 +7,9 @@ from collections.abc import Collection
 from baselines.registry import explainers
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.alignment.methods.registry import methods
-from gpca.config.checks.named import require_names
 from gpca.config.leave_out import names_left_out
+from gpca.errors import require_names
+from gpca.experiments.registry import experiments
 from gpca.recovery.actions import ACTIONS
 from gpca.recovery.policies import ALWAYS, POLICIES
 from gpca.settings import load_schema
@@ -32,7 +33,7 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
         "controls.explainers": ("explainer", explainers()),
-        "exchange.explainers": ("explainer", explainers()),
+        **{f"{each.name}.explainers": ("explainer", explainers()) for each in experiments() if each.explainers},
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
         "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
         "recovery.actions": ("action", ACTIONS),

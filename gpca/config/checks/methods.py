@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Set
 
 from gpca.alignment.methods.registry import left_out, require_global, require_settings
-from gpca.config.checks.named import require_names, with_key
-from gpca.errors import InputError
+from gpca.errors import InputError, require_names, with_key
 
 
 def check_methods(config: dict, methods_left_out: Set[str]) -> None:

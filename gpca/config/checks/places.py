@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from gpca.config.checks.named import with_key
-from gpca.errors import InputError
+from gpca.errors import InputError, with_key
 from gpca.objects.source import require_place
 
 # Folders of results/ that no run may take: reference runs are kept in one, logs beside all runs in the other.

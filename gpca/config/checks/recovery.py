@@ -6,8 +6,7 @@ from collections.abc import Set
 from typing import Any
 
 from baselines.registry import explainer_entry, require_settings
-from gpca.config.checks.named import require_names, with_key
-from gpca.errors import InputError
+from gpca.errors import InputError, require_names, with_key
 from gpca.frames.situations import SituationSettings
 from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import policy_entry

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gpca.config.checks.named import with_key
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.settings import OPTIONS, EncoderSettings
-from gpca.errors import InputError
+from gpca.errors import InputError, with_key
 
 
 def check_sizes(config: dict) -> None:

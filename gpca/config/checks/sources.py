@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from gpca.config.checks.named import require_names, with_key
+from gpca.errors import require_names, with_key
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.source import resolve
 

@@ -11,9 +11,9 @@ import numpy as np
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.controls.rivals import Embed, Rival, described_for
-from gpca.exchange.estimated import OBSERVED, Estimates, Registrar
-from gpca.exchange.registered import registered_by
-from gpca.exchange.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
+from gpca.experiments.exchange.estimated import OBSERVED, Estimates, Registrar
+from gpca.experiments.exchange.registered import registered_by
+from gpca.experiments.exchange.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
 from gpca.names import SPLITS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

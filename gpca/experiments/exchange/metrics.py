@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
-from gpca.exchange.settings import ESTIMATOR, FAILURE, LABELS, METHOD
+from gpca.experiments.exchange.settings import ESTIMATOR, FAILURE, LABELS, METHOD
 
 if TYPE_CHECKING:
     import pandas as pd

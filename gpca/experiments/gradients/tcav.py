@@ -15,8 +15,8 @@ import numpy as np
 import torch
 
 from gpca.classifier.gpc import GPC
-from gpca.gradients.saliency import log_odds
-from gpca.gradients.settings import GradientSettings
+from gpca.experiments.gradients.saliency import log_odds
+from gpca.experiments.gradients.settings import GradientSettings
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import generator
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import torch
 
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.arrays import save_arrays
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
@@ -17,14 +17,14 @@ from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.weights import load_model
 from gpca.errors import InputError
-from gpca.gradients.saliency import deletions
-from gpca.gradients.settings import GradientSettings
-from gpca.gradients.tcav import tcav
+from gpca.experiments.gradients.saliency import deletions
+from gpca.experiments.gradients.settings import GradientSettings
+from gpca.experiments.gradients.tcav import tcav
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.progress import progress
 from gpca.provenance import record_provenance
-from gpca.steps import checked_sections, per_seed
+from gpca.settings import checked_sections
 
 SECTIONS = {"gradients": ("gradients",), "encoder": ("encoders", "*"), "gpc": ("explainers", "gpca")}
 

@@ -2,7 +2,7 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.exchange.metrics import collect
+from gpca.experiments.exchange.metrics import collect
 
 CONCEPTS = ("noise", "pose", "overlap")
 

@@ -8,7 +8,7 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import make_model
-from gpca.gradients.saliency import (
+from gpca.experiments.gradients.saliency import (
     CENTRE,
     GRADIENT,
     chosen_rows,
@@ -18,7 +18,7 @@ from gpca.gradients.saliency import (
     point_gradient,
     saliencies,
 )
-from gpca.gradients.settings import GradientSettings
+from gpca.experiments.gradients.settings import GradientSettings
 from gpca.pairs.perturbation import CONCEPTS
 
 ENCODING = EncoderSettings(draw_points=48, draws=1, options={"k": 6, "point_features": 8})

@@ -2,7 +2,7 @@
 
 Both take these arguments and raise the same error:
 
-    metrics: The tidy metrics that :func:`gpca.exchange.metrics.collect` makes.
+    metrics: The tidy metrics that :func:`gpca.experiments.exchange.metrics.collect` makes.
     sources: The ``{"title": str, "stand_in": bool}`` of each name.
     explainers: The title of each name, in order.
     InputError: The metrics hold none of these.
@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL
-from gpca.exchange.metrics import ANOTHER, MONTE_CARLO
+from gpca.experiments.exchange.metrics import ANOTHER, MONTE_CARLO
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, missing_packages, rows_where, span

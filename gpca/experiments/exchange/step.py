@@ -9,19 +9,19 @@ from pathlib import Path
 import torch
 
 from gpca.alignment.methods.registry import require_settings
-from gpca.arguments import SEED
+from gpca.arguments import SEED, per_seed
 from gpca.controls.rivals import make_rivals
 from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
-from gpca.exchange.asked import DESIGN, require_exchangeable
-from gpca.exchange.experiment import Exchange
-from gpca.exchange.settings import ExchangeSettings
+from gpca.experiments.exchange.asked import DESIGN, require_exchangeable
+from gpca.experiments.exchange.exchange import Exchange
+from gpca.experiments.exchange.settings import ExchangeSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.provenance import record_provenance
-from gpca.steps import checked_by_name, checked_sections, per_seed
+from gpca.settings import checked_by_name, checked_sections
 from gpca.trials.judge import Judges
 from gpca.uncertainty.estimators.registry import require_estimator_settings
 from gpca.uncertainty.settings import UncertaintySettings

@@ -4,9 +4,9 @@ import pytest
 
 from gpca.arrays import save_arrays
 from gpca.errors import InputError
-from gpca.gradients.metrics import DELETION_COLUMNS
+from gpca.experiments.gradients.figure import draw_saliency
+from gpca.experiments.gradients.metrics import DELETION_COLUMNS
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.saliency import draw_saliency
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def files(registrations, tmp_path):
 def test_one_sample_of_each_concept_is_drawn_named_right_where_there_is_one(files, tmp_path, monkeypatch):
     titles = []
     monkeypatch.setattr(
-        "gpca.reporting.figures.saliency.save_figure",
+        "gpca.experiments.gradients.figure.save_figure",
         lambda figure, *paths: titles.extend(axes.get_title() for axes in figure.axes),
     )
     draw_saliency(*files, "Tiny", tmp_path / "a.pdf", tmp_path / "a.png")

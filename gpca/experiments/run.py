@@ -5,16 +5,16 @@ The registry of results (:mod:`gpca.reporting.registry`) refers to both by name,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
 from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
-from gpca.alignment.methods.registry import left_out, method_entry
+from gpca.alignment.methods.registry import installed, left_out, method_entry
 from gpca.controls.settings import TRANSFER, UNSEEN
-from gpca.encoders.registry import DIFFERENTIABLE
+from gpca.experiments.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
@@ -40,21 +40,15 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "source": list(sources),
         "seed": list(config["seeds"]),
         "first_seed": str(config["seeds"][0]),
-        "method": installed_methods(config["methods"]),
+        "method": installed(config["methods"]),
         "estimator": list(config["estimators"]),
         "explainer": list(config["explainers"]),
         "cause_explainer": list(config["diagnosis"]["explainers"]),
-        "exchange_source": list(config["exchange"]["sources"]),
-        "exchange_seed": list(config["seeds"])[: config["exchange"]["seeds"]],
-        "exchange_estimated": [name for name in config["exchange"]["explainers"] if explainer_entry(name).design],
-        "exchange_registered": [name for name in config["exchange"]["explainers"] if not explainer_entry(name).design],
-        "exchange_method": installed_methods(config["exchange"]["methods"]),
         "control_seed": controlled_seeds(config),
         "control": list(config["controls"]["controls"]),
         "control_encoder": _compared_encoders(config["controls"]),
         "timed_control": [name for name in config["controls"]["explainers"] if explainer_entry(name).reads == BARE],
         "transfer_source": list(sources) if transfers(config, sources) else [],
-        "gradient_source": list(sources) if has_gradients(config) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
         "strategy": strategies,
@@ -81,6 +75,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
         "frame_cause_seed": list(config["seeds"])[: frames["causes"]["seeds"]],
+        **{name: value for each in experiments() for name, value in each.names(config, sources).items()},
     }
 
 
@@ -122,7 +117,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "model_title": title_of(of_model),
         "methods": {
             name: {"title": entry.title, "is_global": entry.is_global}
-            for name in installed_methods(config["methods"])
+            for name in installed(config["methods"])
             for entry in [method_entry(name)]
         },
         "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
@@ -134,17 +129,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "explainer_titles": explainers,
         "cause_explainers": {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]},
         "control_explainers": {name: explainer_entry(name).title for name in config["controls"]["explainers"]},
-        "exchange_sources": {name: shown[name] for name in config["exchange"]["sources"]},
-        "exchange_explainers": {name: explainer_entry(name).title for name in config["exchange"]["explainers"]},
-        "exchange_methods": {
-            name: method_entry(name).title for name in installed_methods(config["exchange"]["methods"])
-        },
-        "exchange_left_out": {
-            method_entry(name).title: package for name, package in left_out(config["exchange"]["methods"]).items()
-        },
-        "exchange_estimators": {name: estimator_entry(name).title for name in config["exchange"]["estimators"]},
         "controls": list(config["controls"]["controls"]),
-        "gradients": config["gradients"],
         "controls_title": _title_of_all(shown),
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": learners,
@@ -173,14 +158,8 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "recovery_title": f"Tables of the virtual camera, {title_of(shown[recovery['objects']])}",
         "treatments": recovery["treatments"],
         "budget": recovery["loop"]["budget"],
+        **{name: value for each in experiments() for name, value in each.shown(config, sources).items()},
     }
-
-
-def installed_methods(names: Iterable[str]) -> list[str]:
-    """Return the registration methods of these names, without those whose package is missing here."""
-    names = list(names)
-    missing = left_out(names)
-    return [name for name in names if name not in missing]
 
 
 def names_of_backbones(frames: Mapping) -> list[str]:
@@ -240,11 +219,6 @@ def reading_groups(config: Mapping) -> list[str]:
     groups, frames = config["readings"]["groups"], config["real_world"]
     trains = config["readings"]["frame_seeds"] and "none" in frames["reductions"]
     return [name for name in groups if name != FRAME_INPUT or trains]
-
-
-def has_gradients(config: Mapping) -> bool:
-    """Return whether the encoder that GP-CA reads has a gradient in the points, once it is trained."""
-    return config["encoders"][config["embedding"]["encoder"]]["backbone"] in DIFFERENTIABLE
 
 
 def _compared_encoders(controls: Mapping) -> list[str]:

@@ -2,8 +2,8 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.gradients.metrics import collect
-from gpca.reporting.tables.gradients import saliency_deletion, tcav
+from gpca.experiments.gradients.metrics import collect
+from gpca.experiments.gradients.tables import saliency_deletion, tcav
 
 SOURCES = {"tiny": {"title": "Tiny", "stand_in": False}}
 CONDITIONS = {"samples": 3, "deleted": [0.25], "vectors": 2, "level": 0.05}

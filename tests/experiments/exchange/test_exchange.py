@@ -15,11 +15,11 @@ from gpca.alignment.twist import exp
 from gpca.attribution.scores import Attribution
 from gpca.controls.rivals import Rival
 from gpca.errors import InputError
-from gpca.exchange.asked import require_exchangeable
-from gpca.exchange.estimated import OBSERVED, Registrar
-from gpca.exchange.experiment import UNTAUGHT, Exchange
-from gpca.exchange.registered import registered_by
-from gpca.exchange.settings import ExchangeSettings
+from gpca.experiments.exchange.asked import require_exchangeable
+from gpca.experiments.exchange.estimated import OBSERVED, Registrar
+from gpca.experiments.exchange.exchange import UNTAUGHT, Exchange
+from gpca.experiments.exchange.registered import registered_by
+from gpca.experiments.exchange.settings import ExchangeSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.trials.examples import true_twist

@@ -17,7 +17,7 @@ from gpca.classifier.gpc import GPC
 from gpca.elementary import log_sum_exp
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import draw_points
-from gpca.gradients.settings import GradientSettings
+from gpca.experiments.gradients.settings import GradientSettings
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.gradients.settings import GradientSettings
-from gpca.gradients.tcav import ONE_OBJECT, concept_examples, tcav, two_sided_p
+from gpca.experiments.gradients.settings import GradientSettings
+from gpca.experiments.gradients.tcav import ONE_OBJECT, concept_examples, tcav, two_sided_p
 from gpca.pairs.perturbation import CONCEPTS
 
 WEIGHTS = torch.eye(3, 8, dtype=torch.float64)

@@ -9,7 +9,7 @@ import numpy as np
 from gpca.arrays import REAL, WHOLE, load_arrays
 from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
-from gpca.gradients.metrics import DELETION_COLUMNS
+from gpca.experiments.gradients.metrics import DELETION_COLUMNS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views

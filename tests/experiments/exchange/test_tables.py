@@ -4,7 +4,7 @@ import pytest
 
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
-from gpca.reporting.tables.exchange import table14_estimator_explanations, table14_method_matrix
+from gpca.experiments.exchange.tables import table14_estimator_explanations, table14_method_matrix
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
 EXPLAINERS = {"gpca": "GP-CA", "shap": "SHAP"}

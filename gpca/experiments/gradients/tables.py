@@ -2,7 +2,7 @@
 
 Both take the same arguments and raise the same error:
 
-    metrics: What :func:`gpca.gradients.metrics.collect` returned.
+    metrics: What :func:`gpca.experiments.gradients.metrics.collect` returned.
     sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
     conditions: The config's section ``gradients``.
     InputError: The metrics hold none of these sources.
@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from gpca.gradients.metrics import SALIENCY, TCAV, percent
+from gpca.experiments.gradients.metrics import SALIENCY, TCAV, percent
 from gpca.objects.title import title_of
 from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

@@ -1,0 +1,42 @@
+"""What GP-CA's scores react to: saliency of points, and TCAV."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from gpca.encoders.registry import DIFFERENTIABLE
+from gpca.errors import InputError
+from gpca.experiments.experiment import Experiment
+from gpca.experiments.gradients.settings import GradientSettings
+
+
+def check(config: dict, _left_out: Callable[[str], set[str]]) -> None:
+    """Check that enough points are left for the encoder where most are deleted."""
+    from gpca.encoders.settings import DGCNNOptions, EncoderSettings  # they load numba
+
+    encoder = EncoderSettings(**config["encoders"][config["embedding"]["encoder"]])
+    if encoder.backbone != "dgcnn":
+        return
+    share, neighbours = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
+    if round((1 - share) * encoder.draw_points) < neighbours:
+        fault = f"deleting {share:g} of {encoder.draw_points} points leaves fewer than the encoder's {neighbours}"
+        raise InputError("config key gradients.deleted", fault, "delete fewer")
+
+
+def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the sources: all of them where the trained encoder that GP-CA reads has a gradient in the points."""
+    backbone = config["encoders"][config["embedding"]["encoder"]]["backbone"]
+    return {"gradient_source": list(sources) if backbone in DIFFERENTIABLE else []}
+
+
+EXPERIMENT = Experiment(
+    name="gradients",
+    summary="registrations, encoder and embeddings -> what GP-CA's scores respond to: saliency maps and TCAV",
+    settings=GradientSettings,
+    tidy="gradients.csv",
+    needs=("gradient_source",),
+    names=names,
+    shown=lambda config, _sources: {"gradients": config["gradients"]},
+    check=check,
+)

@@ -1,0 +1,35 @@
+"""The registry of results: every table and figure of ``gpca/reporting/results.yaml`` and of the experiments."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from gpca import reporting
+from gpca.experiments.registry import experiments
+from gpca.reporting.registry import Names, Result, read_results
+
+REGISTRY = Path(reporting.__file__).with_name("results.yaml")
+
+
+@cache
+def registered() -> tuple[Result, ...]:
+    """Return every entry, section by section; those of the experiments stand last in theirs."""
+    sections: dict[str, list[Result]] = {}
+    for path in (REGISTRY, *(each.results for each in experiments())):
+        for section, results in read_results(path):
+            sections.setdefault(section, []).extend(results)
+    return tuple(result for results in sections.values() for result in results)
+
+
+def results_of(names: Names) -> list[Result]:
+    """Return the tables and figures that a run with these names makes, in the order of the registry.
+
+    Args:
+        names: what the patterns of the registry have in braces; ``source`` lists the sources.
+    """
+    results = []
+    for entry in registered():
+        of_entry = [entry.of_source(source) for source in names["source"]] if "{source}" in entry.name else [entry]
+        results += [result for result in of_entry if result.is_made(names)]
+    return results
