@@ -93,7 +93,7 @@ endef
 	         "wheels exist for Linux on x86-64 with Python 3.11 and 3.12 (here: $$(uname -sm), $$($$python -V))" >&2
 	    exit 2
 	fi
-	.venv/bin/python -m gpca.environment
+	.venv/bin/python -m gpca.process.environment
 	touch $@
 
 lock: ## renew environment.lock and environment.hashes from what pyproject.toml names, in a fresh environment

@@ -45,9 +45,9 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
         """Train the encoder on the labelled pairs, and return what attaches its embeddings."""
-        from gpca.descriptors.registered import MOTION
         from gpca.encoders.settings import EncoderSettings
         from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
+        from gpca.features.registered import MOTION
 
         draw = PairDraw(self._prefix + "points", self._prefix + "motion")
 

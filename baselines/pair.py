@@ -1,7 +1,7 @@
 """Explainers that see the pair, both clouds and what ICP did, and not the aligned source alone.
 
 `gpca_pair` is the paper's classifier with other eyes: a row of its own, never "GP-CA (paper)". What it reads does not
-depend on which object is registered (:func:`gpca.descriptors.registered.relations`). Beside it stand the plainest form
+depend on which object is registered (:func:`gpca.features.registered.relations`). Beside it stand the plainest form
 of the same idea, a forest on distances, and a rival that knows the density of the cloud and nothing else.
 """
 
@@ -21,7 +21,7 @@ class PairDescription:
 
     Args:
         source, seed: name the draws from the clouds.
-        group: one of :data:`gpca.descriptors.registered.WIDTHS`.
+        group: one of :data:`gpca.features.registered.WIDTHS`.
         points: drawn from each cloud.
     """
 
@@ -33,7 +33,7 @@ class PairDescription:
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the descriptors, unless they are attached already."""
-        from gpca.descriptors.registered import describe_registrations
+        from gpca.features.registered import describe_registrations
 
         return measured(
             registrations,

@@ -24,7 +24,7 @@ from time import perf_counter
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from gpca.processor import prepare  # noqa: E402
+from gpca.process.processor import prepare  # noqa: E402
 
 SEED = 100  # no config's
 

@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from gpca.processor import prepare  # noqa: E402
+from gpca.process.processor import prepare  # noqa: E402
 
 NOMINAL, FAILED = 0.02, 0.03
 REPEATS = 1000
@@ -54,9 +54,9 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
 
     from gpca.alignment.canonical_frame import CanonicalFrame
     from gpca.alignment.rigid import inverse, transform
-    from gpca.descriptors.groups import MOTION
+    from gpca.features.groups import MOTION
     from gpca.pairs.dataset import Registrations
-    from gpca.progress import progress
+    from gpca.process.progress import progress
 
     file = f"{options.name}/seed{options.seed}"
     registrations = Registrations.load(options.frames / f"registrations/{file}.npz")
@@ -106,7 +106,7 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
 
 
 def motion_end() -> int:
-    from gpca.descriptors.dataset import WIDTHS
+    from gpca.features.dataset import WIDTHS
 
     return WIDTHS["distances"] + WIDTHS["planes"] + WIDTHS["motion"]
 

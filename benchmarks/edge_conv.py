@@ -19,7 +19,7 @@ from time import perf_counter
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from gpca.processor import prepare
+from gpca.process.processor import prepare
 
 PASSES = ("train", "infer")
 NETWORKS = ("per edge", "per point")

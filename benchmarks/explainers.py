@@ -24,7 +24,7 @@ from time import perf_counter
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from gpca.processor import prepare  # noqa: E402
+from gpca.process.processor import prepare  # noqa: E402
 
 SEED, SOURCE = 0, "coffee_cup"
 GPC_SETTINGS = {"iterations": 20}  # of the fit, which is not measured

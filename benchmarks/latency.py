@@ -29,7 +29,7 @@ from time import perf_counter
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from gpca.processor import prepare  # noqa: E402
+from gpca.process.processor import prepare  # noqa: E402
 
 WARM_UP = 3
 TRAINING = 45  # registrations that the classifier is fitted to

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.files import whole_file
+from gpca.io.files import whole_file
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:

@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 from benchmarks import markdown  # noqa: E402 (the script runs from a plain checkout)
 from gpca.errors import InputError  # noqa: E402
-from gpca.files import whole_file  # noqa: E402
+from gpca.io.files import whole_file  # noqa: E402
 
 DEFINITIONS = Path(__file__).with_name("numbers.yaml")
 REFERENCE = ROOT / "results/reference/real"

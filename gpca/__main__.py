@@ -8,12 +8,12 @@ from importlib import import_module
 from pathlib import Path
 
 from gpca import __version__
-from gpca.arguments import THREADS, OneLineParser
 from gpca.errors import InputError
 from gpca.experiments.registry import experiments
-from gpca.interrupts import certain_interrupts
-from gpca.processor import prepare
-from gpca.standard_streams import say, standard_streams
+from gpca.process.arguments import THREADS, OneLineParser
+from gpca.process.interrupts import certain_interrupts
+from gpca.process.processor import prepare
+from gpca.process.standard_streams import say, standard_streams
 
 STEPS = {
     "objects": "meshes or clouds of a source -> canonical clouds",
@@ -54,6 +54,25 @@ STEPS = {
 }
 EXPERIMENTS = {experiment.name: experiment for experiment in experiments()}
 STEPS |= {name: experiment.summary for name, experiment in EXPERIMENTS.items()}
+_IN = "gpca.experiments."
+MODULES = {
+    **{name: experiment.step for name, experiment in EXPERIMENTS.items()},
+    **{name: f"{_IN}{name}.step" for name in ("active_learning", "new_concepts", "frame_labels", "kernel_grid")},
+    **{name: f"{_IN}{name}.step" for name in ("runtime", "frame_causes", "controls")},
+    "recover": _IN + "recovery.step",
+    "diagnose": _IN + "diagnosis.step",
+    "register_methods": _IN + "registration_methods.step",
+    "estimate": _IN + "estimators.step",
+    "readings": _IN + "specification_curve.step",
+    "shift": _IN + "out_of_distribution.shift_step",
+    "learners": _IN + "out_of_distribution.learners_step",
+    "train_control": _IN + "controls.train_step",
+    "without": _IN + "active_learning.without_step",
+    **{
+        name: f"gpca.commands.{name.replace('-', '_')}"
+        for name in ("explain", "ship", "label", "check-config", "check-reference")
+    },
+}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -100,7 +119,7 @@ def _run(arguments: list[str], chosen: str | None) -> int:
 
 def module_of(step: str) -> str:
     """Return the module of a step."""
-    return EXPERIMENTS[step].step if step in EXPERIMENTS else f"gpca.steps.{step.replace('-', '_')}"
+    return MODULES.get(step, f"gpca.steps.{step}")
 
 
 def _command() -> str:
@@ -125,8 +144,8 @@ def _keep_freed_memory() -> None:
 
 
 def _mapping(text: str) -> dict:
-    from gpca.json_file import parse_json
-    from gpca.structured_text import require_plain
+    from gpca.io.json_file import parse_json
+    from gpca.io.structured_text import require_plain
 
     try:
         settings = parse_json(text)

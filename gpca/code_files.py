@@ -13,7 +13,7 @@ BESIDE = {  # what a module reads from its own folder
     "gpca.comparison.published": "published.csv",
     "gpca.comparison.reasons": "reasons.csv",
     "gpca.reporting.figures.style": "matplotlibrc",
-    "gpca.reporting.page.page": "templates/*",
+    "gpca.page.page": "templates/*",
 }
 
 

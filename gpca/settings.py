@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 from gpca.errors import InputError
-from gpca.structured_text import load_own_yaml
 
 if TYPE_CHECKING:
     from jsonschema.exceptions import ValidationError
@@ -49,7 +48,9 @@ SCHEMA = Path(__file__).parent / "config" / "config.schema.yaml"
 @cache
 def load_schema() -> dict:
     """Return the JSON schema of a configuration: one object for all who ask."""
-    return load_own_yaml(SCHEMA)
+    import yaml
+
+    return yaml.load(SCHEMA.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
 
 def check_settings(settings: dict, *section: str) -> None:

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from gpca.processor import THREAD_VARIABLES, prepare
+from gpca.process.processor import THREAD_VARIABLES, prepare
 
 # One thread, as in a job of the workflow, and before numba is imported: on a busy machine its threads, with so little
 # work each, spend most of their time waiting for one another.
@@ -64,8 +64,8 @@ def diagnoser():
 
     from gpca.causes.settings import CauseSettings
     from gpca.classifier.settings import GPCSettings
-    from gpca.descriptors.dataset import WIDTHS
-    from gpca.descriptors.settings import DescriptorSettings
+    from gpca.features.dataset import WIDTHS
+    from gpca.features.settings import DescriptorSettings
     from gpca.model.learning import Lessons, learn
 
     random, label_N = np.random.default_rng(0), np.array(["nominal", "noise", "pose"] * 4)

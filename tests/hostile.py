@@ -32,7 +32,7 @@ def refusal(arguments: Sequence[str | Path], folder: Path, *words: str) -> str:
         folder: the working directory; nothing may be written anywhere below it.
         words: what the line has to name, such as the file, the fault and the remedy.
     """
-    from gpca.compilation import NOTICE  # which is there or not by what earlier tests have compiled
+    from gpca.process.compilation import NOTICE  # which is there or not by what earlier tests have compiled
 
     before = _content(folder)
     outcome = _run([str(argument) for argument in arguments], folder)

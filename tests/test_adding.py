@@ -102,7 +102,7 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     from gpca.active_learning.rounds import initial_gpc, make_task, run_rounds
     from gpca.active_learning.settings import ActiveLearningSettings
     from gpca.classifier.settings import GPCSettings
-    from gpca.reporting.tables.active_learning import table3_extended
+    from gpca.experiments.active_learning.tables import table3_extended
 
     monkeypatch.setitem(acquisition.STRATEGIES, "bald_dense", None)  # taken out again at the end
     exec(block("gpca/active_learning/acquisition.py"), dict(vars(acquisition)))

@@ -100,11 +100,11 @@ STEPS = {
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
     "new_concepts": (
-        {"gpca/causes/drawing.py", "gpca/descriptors/dataset.py", "gpca/active_learning/oracle.py"},
+        {"gpca/causes/drawing.py", "gpca/features/dataset.py", "gpca/active_learning/oracle.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
     "frame_labels": (
-        {"gpca/active_learning/new_concepts.py", "gpca/descriptors/registered.py"},
+        {"gpca/active_learning/new_concepts.py", "gpca/features/registered.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
     ),
     "uncertainty": (

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from gpca.__main__ import STEPS
-from gpca.controls.settings import CONTROLS
+from gpca.experiments.controls.settings import CONTROLS
 from gpca.experiments.results import registered
 
 from .documents import PAGES, ROOT, anchor_of, commands, our_files, relative

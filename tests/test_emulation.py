@@ -14,7 +14,7 @@ from .test_processor import needs_the_level
 
 QEMU = shutil.which("qemu-x86_64")
 PROGRAM = (
-    "from gpca.processor import prepare; prepare(); "
+    "from gpca.process.processor import prepare; prepare(); "
     "import json; from tests.emulated import fits; print(json.dumps(fits()))"
 )
 

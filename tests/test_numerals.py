@@ -2,8 +2,8 @@
 
 import pytest
 
-from gpca.csv_file import finite_number
 from gpca.errors import InputError
+from gpca.io.csv_file import finite_number
 from gpca.numerals import decimal, whole
 from gpca.seeds import seed_of_file
 

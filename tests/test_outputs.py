@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from gpca.errors import InputError
-from gpca.files import require_outputs
+from gpca.io.files import require_outputs
 
 from .hostile import refusal
 

@@ -11,11 +11,11 @@ import pytest
 import yaml
 
 import gpca
-from gpca.files import sha256_of_file
+from gpca.commands.ship import LARGEST_BYTES
+from gpca.io.files import sha256_of_file
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.location import SHIPPED
-from gpca.steps.ship import LARGEST_BYTES
 
 from .documents import ROOT
 
@@ -140,9 +140,9 @@ from pathlib import Path
 from gpca.code_files import code_files
 from gpca.comparison.published import PUBLISHED, read_published
 from gpca.comparison.reasons import REASONS
-from gpca.provenance import record_provenance
+from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.style import MATPLOTLIBRC
-from gpca.reporting.page.page import TEMPLATES
+from gpca.page.page import TEMPLATES
 from gpca.settings import SCHEMA, load_schema
 assert load_schema() and len(read_published())
 files = [PUBLISHED, REASONS, MATPLOTLIBRC, TEMPLATES / "index.html.jinja", SCHEMA, *code_files("gpca.steps.attribute")]

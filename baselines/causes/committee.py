@@ -8,8 +8,8 @@ from baselines.causes.described import DescriptorClassifier
 from baselines.causes.gaussian_processes import CausePairGPCA
 from baselines.causes.trees import boosted_trees, randomised_trees
 from gpca.causes.labels import LABELS
-from gpca.descriptors.groups import GROUPS
 from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, ScoringExplainer
+from gpca.features.groups import GROUPS
 from gpca.pairs.dataset import Registrations
 
 

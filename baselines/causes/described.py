@@ -1,4 +1,4 @@
-"""Explainers of causes that learn from the descriptors of a pair (:mod:`gpca.descriptors`) with any classifier."""
+"""Explainers of causes that learn from the descriptors of a pair (:mod:`gpca.features`) with any classifier."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class DescriptorClassifier(ClassifierExplainer):
 
     Args:
         classifier: an unfitted classifier with ``predict_proba``.
-        groups: names in :data:`gpca.descriptors.groups.GROUPS`.
+        groups: names in :data:`gpca.features.groups.GROUPS`.
         columns: of all of them together, those that it reads; None for all.
     """
 

@@ -10,8 +10,8 @@ from baselines.attached import attached
 from baselines.causes.nominal import NominalThreshold
 from gpca.attribution.scores import Attribution
 from gpca.causes.labels import LABELS
-from gpca.descriptors.groups import MOTION
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
+from gpca.features.groups import MOTION
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -20,7 +20,7 @@ class Gate(ScoringExplainer):
     """An alarm by one of the numbers of the motion, times a sign.
 
     Args:
-        name: in :data:`gpca.descriptors.groups.MOTION`.
+        name: in :data:`gpca.features.groups.MOTION`.
         sign: −1 where small values are bad.
     """
 

@@ -13,9 +13,9 @@ from baselines.causes.described import joined
 from baselines.concept_classifier import known_concepts
 from gpca.causes.labels import LABELS
 from gpca.causes.truth import NOMINAL
-from gpca.descriptors.groups import GROUPS
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
+from gpca.features.groups import GROUPS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 

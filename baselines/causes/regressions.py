@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from baselines.causes.described import DescriptorClassifier
 from baselines.concept_classifier import standardised_regression
-from gpca.descriptors.groups import DENSITIES, RESIDUALS
 from gpca.explainers.interface import ExplainerEntry
+from gpca.features.groups import DENSITIES, RESIDUALS
 
 
 def residuals(source: str, seed: int, inverse_regularisation: float = 1.0) -> DescriptorClassifier:

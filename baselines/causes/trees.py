@@ -7,8 +7,8 @@ fitness and spread. ``pair_boosting`` reads every descriptor.
 from __future__ import annotations
 
 from baselines.causes.described import DescriptorClassifier
-from gpca.descriptors.groups import GROUPS
 from gpca.explainers.interface import ExplainerEntry
+from gpca.features.groups import GROUPS
 from gpca.seeds import seed_of
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.csv_file import numbers, read_csv, write_csv
+from gpca.io.csv_file import numbers, read_csv, write_csv
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,8 +12,8 @@ import numpy as np
 from gpca.active_learning.acquisition import Pool, select
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.csv_file import read_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import read_csv
 from gpca.numerals import whole
 from gpca.seeds import generator
 

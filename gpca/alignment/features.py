@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.environment import require_open3d
+from gpca.process.environment import require_open3d
 
 RADIUS = 0.25  # diameters: five times the spacing of some 500 points on an object
 MOST_NEIGHBOURS = 100

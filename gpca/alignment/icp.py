@@ -55,7 +55,7 @@ class ICP:
     def __init__(
         self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings, kernel: Any = None
     ) -> None:
-        from gpca.environment import require_open3d
+        from gpca.process.environment import require_open3d
 
         self._o3d = require_open3d()
         self._settings = settings

@@ -7,7 +7,7 @@ import numpy as np
 from gpca.alignment.icp_motion import move
 from gpca.alignment.icp_neighbours import nearest
 from gpca.alignment.icp_target import LISTED
-from gpca.compilation import INNER_LOOP, njit
+from gpca.process.compilation import INNER_LOOP, njit
 
 CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last iteration; Open3D's default
 

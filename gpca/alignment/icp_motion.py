@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.compilation import INNER_LOOP, njit
+from gpca.process.compilation import INNER_LOOP, njit
 
 
 @njit(**INNER_LOOP)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.icp_target import LISTED
-from gpca.compilation import INNER_LOOP, njit
+from gpca.process.compilation import INNER_LOOP, njit
 
 
 @njit(forceinline=True, **INNER_LOOP)

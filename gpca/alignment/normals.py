@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.environment import require_open3d
+from gpca.process.environment import require_open3d
 
 NEIGHBOURS = 20  # as Open3D takes for the covariances of generalized ICP
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import TIMING_COLUMNS, concepts_of, read_predictions, require_samples
-from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import numbers, read_csv, write_csv
 from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:

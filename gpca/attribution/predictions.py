@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import numbers, read_csv, write_csv
 
 if TYPE_CHECKING:
     import pandas as pd

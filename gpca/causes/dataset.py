@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.arrays import REAL, load_arrays, save_arrays
-from gpca.axes import Axes
 from gpca.causes.shapley import ALL, SUBSETS
 from gpca.causes.truth import LARGEST_ERROR, Truth
 from gpca.errors import InputError
+from gpca.io.arrays import REAL, load_arrays, save_arrays
+from gpca.io.axes import Axes
 from gpca.pairs.dataset import CLOUDS, REGISTRATION_COLUMNS, Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.settings import FEWEST_STARTS

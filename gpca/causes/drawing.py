@@ -17,7 +17,7 @@ from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.shapley import ALL, NONE
 from gpca.causes.subjects import Subject, measure_clean_pairs, read_subjects, split_by_object
 from gpca.objects.canonical import ObjectClouds
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator
 
 ENDS = (NONE,) * ALL + (ALL,)  # they tell the state, and so whether the others are worth their time

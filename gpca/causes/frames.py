@@ -34,7 +34,7 @@ from gpca.frames.clean_view import clean_view, rendered_side
 from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

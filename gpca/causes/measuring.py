@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
-from gpca.axes import Axes
 from gpca.causes.counterfactuals import Counterfactuals, Registrar
 from gpca.causes.dataset import COLUMNS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
 from gpca.causes.subjects import Subject
 from gpca.causes.truth import Truth, joined
+from gpca.io.axes import Axes
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
 from gpca.seeds import generator

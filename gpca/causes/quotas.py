@@ -10,8 +10,8 @@ import numpy as np
 
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL, Truth
-from gpca.csv_file import write_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 
 Group = tuple[str, bool]  # state or, of the failed, the dominant cause; whether there are several causes

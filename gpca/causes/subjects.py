@@ -13,12 +13,12 @@ from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import NONE
 from gpca.errors import InputError
-from gpca.names import SPLITS
+from gpca.io.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.surface import instance_of
 from gpca.objects.symmetry import find_symmetries
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
 

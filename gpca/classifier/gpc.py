@@ -23,7 +23,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import SparseGPs
 from gpca.classifier.standardization import Standardization
 from gpca.errors import InputError
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
 

@@ -20,8 +20,8 @@ from gpca.comparison.claims import PREDICTIONS, Claim, Compared
 from gpca.comparison.published import UNITS, Counterpart
 from gpca.comparison.values import RUNTIME, of_seeds, runtime_mean
 from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
-from gpca.csv_file import read_numbers
 from gpca.errors import InputError
+from gpca.io.csv_file import read_numbers
 
 if TYPE_CHECKING:
     import pandas as pd

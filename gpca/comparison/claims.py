@@ -8,7 +8,7 @@ from itertools import product
 from pathlib import Path
 
 from gpca.comparison.published import Counterpart
-from gpca.structured_text import load_own_yaml
+from gpca.io.structured_text import load_own_yaml
 
 CLAIMS = Path(__file__).with_name("claims.yaml")
 PREDICTIONS = "predictions"  # stands for a file: the calibration that is computed from predictions

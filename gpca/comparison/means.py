@@ -12,8 +12,8 @@ from types import MappingProxyType
 
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.attribution.metrics import mean_interval
-from gpca.csv_file import ANY, finite_number, read_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import ANY, finite_number, read_csv
 
 TIMES = "*seconds*"
 # What kind a value is of, by its file and its metric or column; the first that fits.

@@ -26,8 +26,8 @@ from gpca.config.command_line import with_types
 from gpca.config.layers import with_defaults
 from gpca.config.leave_out import names_left_out, without_false
 from gpca.experiments.registry import experiments
+from gpca.io.structured_text import require_plain
 from gpca.settings import load_schema, require_valid
-from gpca.structured_text import require_plain
 
 
 def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:

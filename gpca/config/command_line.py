@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gpca.structured_text import read_scalar
+from gpca.io.structured_text import read_scalar
 
 
 def with_types(config: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:

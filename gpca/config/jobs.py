@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.code_files import ROOT
-from gpca.processor import pin_instructions
-from gpca.provenance import CONFIG_VARIABLE, sha256_of_settings
+from gpca.process.processor import pin_instructions
+from gpca.process.provenance import CONFIG_VARIABLE, sha256_of_settings
 
 # Where data lies, and how results are judged: two runs that differ in nothing else are runs of one config.
 OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
@@ -24,7 +24,7 @@ def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
     environment is not activated. PYTHONPATH begins with `source_folder`, unless Python looks there anyway; and with
     PYTHONSAFEPATH a ``gpca`` in the working directory, such as that of another checkout, is not taken for it. The
     hashes of the config's sections, but those that no result depends on, are for the provenance. Libraries may use no
-    instructions but those of the common level (:mod:`gpca.processor`).
+    instructions but those of the common level (:mod:`gpca.process.processor`).
 
     Args:
         config: the whole configuration of the run.

@@ -8,7 +8,7 @@ from typing import Any
 
 from gpca.code_files import ROOT
 from gpca.errors import InputError
-from gpca.structured_text import read_mapping
+from gpca.io.structured_text import read_mapping
 
 DEFAULTS = tuple(ROOT / "config" / name for name in ("sources.yaml", "readings.yaml", "config.yaml"))
 TEMPLATE = "__use_yte__"  # lets Snakemake run code that stands in a config
@@ -18,7 +18,7 @@ def read_file(path: str | Path) -> dict[str, Any]:
     """Return the config of one file; nothing that Snakemake would run, repair or leave out in silence gets through.
 
     Raises:
-        InputError: as :func:`gpca.structured_text.read_mapping`, and for a template.
+        InputError: as :func:`gpca.io.structured_text.read_mapping`, and for a template.
     """
     config = read_mapping(path)
     if TEMPLATE in config:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
 
-from gpca.provenance import CONFIG_VARIABLE
+from gpca.process.provenance import CONFIG_VARIABLE
 
 LEFT = ("locks", "scripts/*", "shadow/*", "shell_tmp.*")  # by a killed Snakemake in its own folder
 _held: list[IO[str]] = []  # until this process ends

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 import yaml
 
-from gpca.active_learning.frame_settings import FrameLabelSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.verdicts import Tolerance
@@ -22,18 +21,19 @@ from gpca.config.explainer_section import CAUSE_EXPLAINERS, EXPLAINERS
 from gpca.config.json_schema import COMPLETE, EVERY, Keys, Named, schema_of
 from gpca.config.robot_sections import RealWorld, Recovery
 from gpca.config.source_section import NAME, Place, Source
-from gpca.controls.settings import ControlSettings
-from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError
+from gpca.experiments.controls.settings import ControlSettings
 from gpca.experiments.experiment import Experiment
+from gpca.experiments.frame_labels.settings import FrameLabelSettings
+from gpca.experiments.registration_methods.settings import EstimatorPairSettings, PairSettings
 from gpca.experiments.registry import experiments
-from gpca.files import whole_file
+from gpca.experiments.specification_curve.registry import GROUPS
+from gpca.experiments.specification_curve.settings import ReadingSizes
+from gpca.features.settings import DescriptorSettings
+from gpca.io.files import whole_file
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.readings.registry import GROUPS
-from gpca.readings.settings import ReadingSizes
 from gpca.settings import SCHEMA, Bounds
-from gpca.trials.settings import EstimatorPairSettings, PairSettings
 
 HEAD = "# Made from the settings classes by `python -m gpca.config.schema`: change these and regenerate it.\n"
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba

@@ -7,14 +7,14 @@ from typing import Annotated, Literal
 
 from gpca.active_learning.settings import ActiveLearningSettings, NewConceptSettings, StreamSettings
 from gpca.causes.settings import CauseSettings
-from gpca.classifier.kernel_grid import KernelGrid
 from gpca.classifier.settings import GPCSettings
 from gpca.config.json_schema import COMPLETE, Keys
 from gpca.encoders.reduction import PCA, UMAP, Autoencoder
 from gpca.encoders.settings import EncoderSettings
+from gpca.experiments.kernel_grid.grid import KernelGrid
+from gpca.experiments.out_of_distribution.settings import ShiftSettings
 from gpca.pairs.perturbation import Concept, Severities
 from gpca.settings import Bounds, Count, NotNegative, OpenShare, PositiveShare
-from gpca.shift.settings import ShiftSettings
 from gpca.uncertainty.settings import UncertaintySettings
 
 SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]

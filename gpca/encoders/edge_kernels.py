@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.compilation import OVER_CLOUDS, njit, prange
+from gpca.process.compilation import OVER_CLOUDS, njit, prange
 
 
 @njit(**OVER_CLOUDS)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.compilation import OVER_CLOUDS, njit, prange
+from gpca.process.compilation import OVER_CLOUDS, njit, prange
 
 _BLOCK = 64  # rows that are summed in the arrays' own precision before they are added in double
 

@@ -1,6 +1,6 @@
 """Layers on many points: linear maps by NumPy's product on the processor, and batch norm without its own statistics.
 
-The product is OpenBLAS's: with its instructions pinned (:mod:`gpca.processor`) it gives the same bytes on every
+The product is OpenBLAS's: with its instructions pinned (:mod:`gpca.process.processor`) it gives the same bytes on every
 machine, at the speed of torch's own product, MKL's. MKL gives the same bytes on Intel's and AMD's processors only by
 code that takes twice the time.
 """

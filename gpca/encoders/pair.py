@@ -1,6 +1,6 @@
 """Encoders of a registered pair: both clouds at once, each point told how it lies to the other cloud.
 
-Both take what :func:`gpca.descriptors.points.describe_points` says of the points, and the motion of ICP, which they
+Both take what :func:`gpca.features.points.describe_points` says of the points, and the motion of ICP, which they
 hand on beside what they make of the points.
 """
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import torch
 
-from gpca.files import whole_file
-from gpca.limits import LARGEST_NUMBER
+from gpca.io.files import whole_file
+from gpca.io.limits import LARGEST_NUMBER
 
 
 def read_tensors(path: str | Path) -> Any:

@@ -23,7 +23,7 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
 HIDDEN = 256  # units of a head of two layers

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from gpca.axes import Axes, require_axes
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, require_like, write_tensors
 from gpca.encoders.training import Classifier, make_model
 from gpca.errors import InputError
-from gpca.limits import require_file
+from gpca.io.axes import Axes, require_axes
+from gpca.io.limits import require_file
 from gpca.pairs.perturbation import CONCEPTS
 
 

@@ -19,7 +19,8 @@ class Experiment:
     """The declaration of an experiment.
 
     Attributes:
-        name: of its folder, its section of the config, its file of rules and its step.
+        name: of its section of the config, its file of rules and its files of results.
+        folder: of its code, where that is named otherwise.
         summary: files that its step reads -> those that it writes, in a line.
         settings: the type of its section of the config; every key has to be given.
         tidy: its file of tidy numbers.
@@ -36,6 +37,7 @@ class Experiment:
     summary: str
     settings: Any
     tidy: str
+    folder: str = ""
     needs: tuple[str, ...] = ()
     names: ByRun = lambda config, sources: {}
     shown: ByRun = lambda config, sources: {}
@@ -46,12 +48,12 @@ class Experiment:
     @property
     def step(self) -> str:
         """The module that runs it."""
-        return f"{__package__}.{self.name}.step"
+        return f"{__package__}.{self.folder or self.name}.step"
 
     @property
     def results(self) -> Path:
         """Its part of the registry of tables and figures."""
-        return Path(__file__).parent / self.name / "results.yaml"
+        return Path(__file__).parent / (self.folder or self.name) / "results.yaml"
 
     def is_run(self, names: Mapping[str, Any]) -> bool:
         """Return whether a run with these names has it."""

@@ -13,16 +13,16 @@ from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.alignment.methods.registry import installed, left_out, method_entry
-from gpca.controls.settings import TRANSFER, UNSEEN
+from gpca.experiments.controls.settings import TRANSFER, UNSEEN
+from gpca.experiments.kernel_grid.tables import PRINTED
+from gpca.experiments.real_world.tables import CLASSIC, encoder_title
 from gpca.experiments.registry import experiments
+from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.readings.registry import FRAME_INPUT, GROUPS
 from gpca.recovery.policies import policy_entry
-from gpca.reporting.tables.backbones import CLASSIC, encoder_title
-from gpca.reporting.tables.kernel_grid import PRINTED
 from gpca.uncertainty.estimators.registry import estimator_entry
 
 

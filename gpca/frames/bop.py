@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.files import read_image
 from gpca.frames.scene_files import REMEDY, read_camera, read_images, read_pose
+from gpca.io.files import read_image
 from gpca.numerals import whole
 
 FEWEST_POINTS = 64

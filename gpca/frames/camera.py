@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from gpca.alignment.rigid import rigid_motion, rotate
-from gpca.environment import require_open3d
+from gpca.process.environment import require_open3d
 from gpca.settings import Bounds, Positive
 
 Pixels = Annotated[int, Bounds(minimum=16, maximum=4096)]

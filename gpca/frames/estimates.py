@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse, rigid_motion
-from gpca.csv_file import ANY, numbers, read_csv
 from gpca.errors import InputError
 from gpca.frames.results_file import Estimates, nearest_to
+from gpca.io.csv_file import ANY, numbers, read_csv
 
 COLUMNS = ("obj_id", "rx", "ry", "rz", "tx", "ty", "tz")
 FARTHEST_MM = 1e4  # no estimator is off by more

@@ -62,7 +62,7 @@ class GlobalRegistration:
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):
-        from gpca.environment import require_open3d
+        from gpca.process.environment import require_open3d
 
         self._o3d = require_open3d()
         self._settings = settings

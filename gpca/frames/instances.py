@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import require_rigid
-from gpca.arrays import TEXT, WHOLE, load_arrays, save_arrays
 from gpca.errors import InputError
-from gpca.files import MOST_PIXELS
 from gpca.frames.scene_files import require_camera
+from gpca.io.arrays import TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.files import MOST_PIXELS
 from gpca.seeds import generator
 
 MADE_BY = "python -m gpca instances"

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.environment import require_open3d
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.reading import CentredModel, Dataset, distinct_surfaces, read_models, with_shared_models
@@ -15,6 +14,7 @@ from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.source import folders
 from gpca.objects.surface import Surface
+from gpca.process.environment import require_open3d
 
 MOST_FACES = 2000  # of a mesh; what decimation moves is far below the noise of depth
 

@@ -23,7 +23,7 @@ from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_centre
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries, read_symmetries
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
 

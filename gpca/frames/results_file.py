@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import require_rotation, rigid_motion
-from gpca.csv_file import ANY, read_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import ANY, read_csv
 from gpca.numerals import decimal, whole
 
 COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")

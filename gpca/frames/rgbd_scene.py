@@ -12,13 +12,13 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
-from gpca.files import whole_folder
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at, shade
 from gpca.frames.resting import rest, stable_poses
+from gpca.io.files import whole_folder
 from gpca.objects.canonical import canonical_cloud, diameter
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.settings import Bounds, Count
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.dataset import Registrations
 
 if TYPE_CHECKING:

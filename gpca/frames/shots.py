@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, rotate, transform
-from gpca.environment import require_open3d
 from gpca.frames.bop import back_project
 from gpca.frames.camera import Camera
+from gpca.process.environment import require_open3d
 
 NEIGHBOURS, OUTLIER_RATIO = 20, 2.0  # Open3D's usual values for the removal of statistical outliers
 NEAR = 0.05  # diameters; a measured point that is so near lies on the model

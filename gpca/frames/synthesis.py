@@ -9,15 +9,15 @@ import numpy as np
 
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.alignment.rigid import inverse, scale_translation, transform
-from gpca.environment import require_open3d
 from gpca.frames.instances import Instances
 from gpca.frames.occlusion import occlude
-from gpca.names import SPLITS
+from gpca.io.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
 from gpca.pairs.synthesis import RegistrationSettings, align_pair, as_registrations
-from gpca.progress import progress
+from gpca.process.environment import require_open3d
+from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.settings import OpenShare, Share
 

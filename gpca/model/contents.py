@@ -11,11 +11,11 @@ import torch
 
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.covariances import make_covariance
-from gpca.descriptors.dataset import WIDTHS
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import require_like
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
+from gpca.features.dataset import WIDTHS
 from gpca.model.familiarity import MEASURES
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS

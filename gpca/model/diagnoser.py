@@ -12,11 +12,11 @@ from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
 from gpca.causes.truth import FAILED, LARGEST_ERROR, NOMINAL
-from gpca.descriptors.dataset import describe
-from gpca.descriptors.groups import GROUPS
-from gpca.descriptors.pair import ObservedPair
-from gpca.descriptors.settings import DescriptorSettings
 from gpca.explainers.pair_classifier import PairClassifier
+from gpca.features.dataset import describe
+from gpca.features.groups import GROUPS
+from gpca.features.pair import ObservedPair
+from gpca.features.settings import DescriptorSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings

@@ -13,11 +13,11 @@ from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.classifier.settings import GPCSettings
-from gpca.descriptors.dataset import Descriptors
-from gpca.descriptors.groups import GROUPS
-from gpca.descriptors.settings import DescriptorSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import PairClassifier
+from gpca.features.dataset import Descriptors
+from gpca.features.groups import GROUPS
+from gpca.features.settings import DescriptorSettings
 from gpca.model.diagnoser import SMALLEST_ERROR, Diagnoser
 
 RIDGE = 10.0  # of the regression of the error, in samples

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.limits import require_file
+from gpca.io.limits import require_file
 
 VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to take where no other is named
 RESULTS = Path("results")  # of the working directory: the package may be installed far from any results

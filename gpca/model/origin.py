@@ -9,9 +9,9 @@ from functools import cache
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.json_file import read_json
+from gpca.io.json_file import read_json
+from gpca.io.structured_text import load_own_yaml
 from gpca.objects.canonical import ObjectClouds
-from gpca.structured_text import load_own_yaml
 
 LICENSES = Path(__file__).with_name("licenses.yaml")
 REMEDY = "ship a model from the folder of the run that made it"
@@ -55,7 +55,7 @@ class Origin:
     """How a model was made.
 
     Attributes:
-        record: its provenance, as :func:`gpca.provenance.record_provenance` wrote it.
+        record: its provenance, as :func:`gpca.process.provenance.record_provenance` wrote it.
         sources: what it learned, in the order of the record.
     """
 

@@ -9,7 +9,7 @@ import numpy as np
 from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
-from gpca.limits import require_file
+from gpca.io.limits import require_file
 from gpca.numerals import decimal
 from gpca.objects import mesh_folder, pcd
 from gpca.objects.canonical import bounding_centre, canonical_cloud

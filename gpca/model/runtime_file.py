@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
+from gpca.io.csv_file import numbers, read_csv
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from gpca import seeds
-from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.environment import require_open3d
 from gpca.errors import InputError
-from gpca.names import is_name
+from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.names import is_name
 from gpca.objects.surface import Surface
+from gpca.process.environment import require_open3d
 
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0

@@ -11,7 +11,7 @@ from time import monotonic
 from urllib.parse import urlsplit
 
 from gpca.errors import InputError
-from gpca.files import sha256_of_file, whole_file
+from gpca.io.files import sha256_of_file, whole_file
 
 TIMEOUT_S = 30
 # A server that sends a byte now and then would keep a run waiting for ever. After a minute a download has to have come

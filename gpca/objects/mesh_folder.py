@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.limits import require_file
+from gpca.io.limits import require_file
 from gpca.objects.canonical import require_points
 from gpca.objects.mesh_text import CORNERS, require_whole
 from gpca.objects.surface import Surface

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.limits import require_memory
+from gpca.io.limits import require_memory
 from gpca.numerals import whole
 from gpca.objects.canonical import require_points
 

@@ -17,7 +17,7 @@ from types import ModuleType
 
 from gpca import objects
 from gpca.errors import InputError
-from gpca.files import sha256_of_file
+from gpca.io.files import sha256_of_file
 from gpca.objects import archive, download, procedural
 from gpca.objects.surface import Surface
 

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.limits import require_file
+from gpca.io.limits import require_file
 from gpca.objects import archive, pcd
 from gpca.objects.mesh_folder import files_in, metres_per
 from gpca.objects.surface import Surface, instance_of, view_order

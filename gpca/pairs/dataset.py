@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
-from gpca.arrays import REAL, TEXT, WHOLE, axes_in, load_arrays, save_arrays
-from gpca.axes import Axes
 from gpca.errors import InputError
-from gpca.names import SPLITS
+from gpca.io.arrays import REAL, TEXT, WHOLE, axes_in, load_arrays, save_arrays
+from gpca.io.axes import Axes
+from gpca.io.names import SPLITS
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -187,7 +187,7 @@ def joined(parts: Sequence[Registrations]) -> Registrations:
 def load_embeddings(
     path: str | Path, registrations: Registrations, shapes: Mapping[str, tuple[int | str, ...]], made_by: str
 ) -> dict[str, np.ndarray]:
-    """Read arrays of the registrations from a file of embeddings; see :func:`gpca.arrays.load_arrays`.
+    """Read arrays of the registrations from a file of embeddings; see :func:`gpca.io.arrays.load_arrays`.
 
     Raises:
         InputError: also where the file is of other samples, or of another source or seed.

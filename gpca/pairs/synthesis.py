@@ -10,13 +10,13 @@ import numpy as np
 
 from gpca.alignment.icp import ICP, ICPSettings
 from gpca.alignment.rigid import scale_translation, transform
-from gpca.axes import Axes
-from gpca.environment import require_open3d
-from gpca.names import SPLITS
+from gpca.io.axes import Axes
+from gpca.io.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, Perturbed, Severities
-from gpca.progress import progress
+from gpca.process.environment import require_open3d
+from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.settings import Bounds
 

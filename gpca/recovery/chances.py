@@ -18,7 +18,7 @@ class Trial:
     """What was known of a registration when an action was tried on it, and whether that made its pose right.
 
     Attributes:
-        known_F: see :func:`gpca.recovery.rehearsal.known`.
+        known_F: see :func:`gpca.experiments.recovery.rehearsal.known`.
         action: its name; `NOTHING` where the registration was left as it was.
     """
 

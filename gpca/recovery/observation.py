@@ -8,7 +8,7 @@ import numpy as np
 
 from gpca.alignment.pose_error import CORRECT, adds_error
 from gpca.alignment.rigid import inverse, rotation_angle_rad
-from gpca.descriptors.distances import LocalPlanes
+from gpca.features.distances import LocalPlanes
 from gpca.frames.shots import agreement, fuse
 from gpca.recovery.actions import CLOUD_POINTS, MODEL_POINTS, Holding, Robot, search
 

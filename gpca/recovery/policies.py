@@ -24,7 +24,8 @@ class Case:
     Attributes:
         actions: those that were taken, in order.
         scores_T_C, bald_T: what its explainer said at the start and after each action; None where it reads none.
-        known_F: all that is known of the registration (:func:`gpca.recovery.rehearsal.known`), for who learns from it.
+        known_F: all that is known of the registration (:func:`gpca.experiments.recovery.rehearsal.known`), for whoever
+            learns from it.
         cause: of a failure, for the oracle alone; empty for all others.
         random: the case's own numbers for policies, from their start: the same at every decision.
     """

@@ -10,8 +10,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+from gpca.io.structured_text import load_own_yaml
 from gpca.registry import load
-from gpca.structured_text import load_own_yaml
 
 SUFFIXES = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}  # the files of each kind
 Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values

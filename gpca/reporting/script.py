@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager, redirect_stderr
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.provenance import record_provenance
+from gpca.process.provenance import record_provenance
 
 
 @contextmanager

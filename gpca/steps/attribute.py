@@ -8,13 +8,13 @@ from pathlib import Path
 from time import perf_counter
 
 from baselines.registry import explainer_entry, require_settings
-from gpca.arguments import SEED, per_seed
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
-from gpca.axes import Axes
 from gpca.errors import InputError
 from gpca.explainers.interface import Describing, ExplainerEntry
+from gpca.io.axes import Axes
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED, per_seed
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 from gpca.uncertainty.conditions import CONDITIONS
 from gpca.uncertainty.outcomes import Outcomes, read_seconds

@@ -5,12 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.arguments import SEED
 from gpca.attribution.predictions import write_timings
 from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import CauseSettings
 from gpca.objects.canonical import ObjectClouds
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED
+from gpca.process.provenance import record_provenance
 from gpca.settings import checked_with_icp
 
 

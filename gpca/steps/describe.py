@@ -6,12 +6,12 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import Causes
-from gpca.descriptors.dataset import describe_all
-from gpca.descriptors.settings import DescriptorSettings
-from gpca.provenance import record_provenance
+from gpca.features.dataset import describe_all
+from gpca.features.settings import DescriptorSettings
+from gpca.process.arguments import SEED
+from gpca.process.provenance import record_provenance
 from gpca.settings import checked_with_icp
 
 

@@ -9,15 +9,15 @@ from time import perf_counter
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED
-from gpca.arrays import save_arrays
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
+from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.reading import read_as
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED
+from gpca.process.provenance import record_provenance
 from gpca.settings import checked_with_icp
 
 

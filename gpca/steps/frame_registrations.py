@@ -6,15 +6,15 @@ from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from gpca.arguments import SEED
 from gpca.attribution.predictions import write_timings
-from gpca.csv_file import write_csv
 from gpca.frames.instances import Instances
 from gpca.frames.plausibility import require_of_objects
 from gpca.frames.synthesis import FrameSettings, make_frame_registrations
+from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 
 

@@ -6,13 +6,13 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.arguments import SURFACE_POINTS
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.meshes import datasets_of, files_behind
 from gpca.frames.plausibility import points_on_model
 from gpca.frames.reading import distinct_surfaces, read_instances, read_models, with_shared_models
 from gpca.objects.canonical import sample_objects
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SURFACE_POINTS
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 
 

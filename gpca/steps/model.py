@@ -8,21 +8,21 @@ from pathlib import Path
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED, require_files
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.descriptors.dataset import Descriptors
-from gpca.descriptors.settings import DescriptorSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.weights import load_model
+from gpca.features.dataset import Descriptors
+from gpca.features.settings import DescriptorSettings
 from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
 from gpca.model.learning import Lessons, joined, learn
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED, require_files
+from gpca.process.provenance import record_provenance
 from gpca.recovery.policy import RecoveryPolicy
 from gpca.settings import checked_sections
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.arguments import SURFACE_POINTS
 from gpca.objects.canonical import write_objects
 from gpca.objects.source import data_files, resolve, surfaces
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SURFACE_POINTS
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 
 

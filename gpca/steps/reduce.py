@@ -5,11 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.arguments import SEED, per_seed
-from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.encoders.reduction import make_reduction, reduce
 from gpca.errors import InputError
-from gpca.provenance import record_provenance
+from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.process.arguments import SEED, per_seed
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 
 SHAPES = {"h": ("S", "d"), "head_logits": ("S", "C"), "sample": ("S",), "split": ("S",)}

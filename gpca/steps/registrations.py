@@ -5,11 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gpca.arguments import SEED
 from gpca.attribution.predictions import write_timings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 
 

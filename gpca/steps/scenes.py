@@ -14,7 +14,7 @@ from gpca.frames.resting import stable_poses
 from gpca.frames.rgbd_scene import SceneSettings, write_scenes
 from gpca.objects import procedural
 from gpca.objects.surface import Surface
-from gpca.provenance import record_provenance
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 
 

@@ -13,16 +13,16 @@ import pandas as pd
 import torch
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED, require_files
-from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import train_encoder
 from gpca.encoders.weights import load_model, write_weights
 from gpca.errors import InputError
 from gpca.frames.sample_file import read_instances_of
+from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.reading import read_as
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED, require_files
+from gpca.process.provenance import record_provenance
 from gpca.settings import checked_with_icp
 
 

@@ -9,16 +9,16 @@ from time import perf_counter
 import pandas as pd
 import torch
 
-from gpca.arguments import SEED
-from gpca.arrays import save_arrays
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, with_label
-from gpca.csv_file import write_csv
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import Task, embed, train_encoder
 from gpca.encoders.weights import write_weights
-from gpca.provenance import record_provenance
+from gpca.io.arrays import save_arrays
+from gpca.io.csv_file import write_csv
+from gpca.process.arguments import SEED
+from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings
 
 

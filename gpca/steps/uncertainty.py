@@ -6,9 +6,9 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.alignment.icp import ICPSettings
-from gpca.arguments import SEED, per_seed
 from gpca.pairs.dataset import Registrations
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED, per_seed
+from gpca.process.provenance import record_provenance
 from gpca.settings import checked_with_icp
 from gpca.uncertainty.designs import DESIGNS
 from gpca.uncertainty.evaluation import design_rows, evaluate_design

@@ -12,7 +12,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from gpca.names import SPLITS
+from gpca.io.names import SPLITS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import SEVERITIES
 from gpca.seeds import seed_of

@@ -7,7 +7,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.progress import progress
+from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.uncertainty.designs import DESIGNS, Pair
 from gpca.uncertainty.outcomes import Outcomes

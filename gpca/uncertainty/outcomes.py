@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.axes import Axes
-from gpca.csv_file import numbers, read_csv, write_csv
 from gpca.errors import InputError
+from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.axes import Axes
+from gpca.io.csv_file import numbers, read_csv, write_csv
 from gpca.pairs.dataset import Registrations
 
 

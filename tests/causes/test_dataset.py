@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from gpca.arrays import save_arrays
 from gpca.causes.dataset import COLUMNS, Causes
 from gpca.errors import InputError
+from gpca.io.arrays import save_arrays
 
 
 @pytest.fixture

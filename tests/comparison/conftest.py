@@ -9,7 +9,7 @@ import yaml
 
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.code_files import ROOT
-from gpca.processor import describe
+from gpca.process.processor import describe
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["reference"]
 HEADS = ("source", "explainer", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")

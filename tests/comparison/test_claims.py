@@ -6,7 +6,7 @@ from gpca.comparison import claims as claims_file
 from gpca.comparison.claims import CLAIMS, PREDICTIONS, read_claims
 from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import UNITS, read_published
-from gpca.structured_text import load_own_yaml
+from gpca.io.structured_text import load_own_yaml
 
 from .test_published import FILES
 

@@ -10,7 +10,7 @@ from gpca.__main__ import main
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.code_files import ROOT
 from gpca.comparison.reference import Allowance, check_reference
-from gpca.processor import describe
+from gpca.process.processor import describe
 
 from .conftest import HEADS, SETTINGS, write
 

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from gpca.config.layers import with_defaults
-from gpca.structured_text import LARGEST_BYTES
+from gpca.io.structured_text import LARGEST_BYTES
 
 from ..hostile import refusal
 from .configs import load

@@ -6,8 +6,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from gpca.arrays import save_arrays
 from gpca.frames.instances import Instances
+from gpca.io.arrays import save_arrays
 
 from ..hostile import refusal
 

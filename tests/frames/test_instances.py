@@ -3,9 +3,9 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from gpca.arrays import save_arrays
 from gpca.errors import InputError
 from gpca.frames.instances import Instances
+from gpca.io.arrays import save_arrays
 
 
 def test_no_scene_is_in_training_and_test(tiny):

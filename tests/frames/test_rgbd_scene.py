@@ -5,11 +5,11 @@ import pytest
 
 from gpca.alignment.rigid import transform
 from gpca.errors import InputError
-from gpca.files import read_image
 from gpca.frames.camera import DepthNoise
 from gpca.frames.plausibility import points_on_model
 from gpca.frames.resting import stable_poses
 from gpca.frames.rgbd_scene import SceneSettings, lay_table, write_scenes
+from gpca.io.files import read_image
 
 from .tiny import PERFECT, scene_settings, surfaces
 

@@ -7,7 +7,7 @@ import pytest
 
 from gpca.alignment.rigid import transform
 from gpca.alignment.twist import exp
-from gpca.descriptors.dataset import WIDTHS
+from gpca.features.dataset import WIDTHS
 from gpca.model.diagnoser import Diagnoser, Diagnosis
 
 SMALL_MOTION = exp(np.array([[0.05, -0.02, 0.03, 0.01, 0.02, -0.01]]))[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from gpca.arrays import save_arrays
+from gpca.io.arrays import save_arrays
 
 from ..hostile import refusal
 

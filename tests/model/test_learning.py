@@ -7,9 +7,9 @@ from scipy import stats
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL
 from gpca.classifier.settings import GPCSettings
-from gpca.descriptors.dataset import WIDTHS, Descriptors
-from gpca.descriptors.settings import DescriptorSettings
 from gpca.errors import InputError
+from gpca.features.dataset import WIDTHS, Descriptors
+from gpca.features.settings import DescriptorSettings
 from gpca.model.learning import Lessons, fit_error, joined, learn, threshold_of
 
 SETTINGS = GPCSettings(learning_rate=0.1, iterations=40, inducing=8, draws=200)

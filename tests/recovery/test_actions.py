@@ -3,9 +3,9 @@ import pytest
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
+from gpca.experiments.recovery.cases import RobotIn, register_after, register_held
 from gpca.recovery import actions
 from gpca.recovery.actions import ACTIONS, action_of, best_start
-from gpca.recovery.cases import RobotIn, register_after, register_held
 
 from ..documents import block
 from .conftest import LOOP

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gpca.recovery.cases import RobotIn
+from gpca.experiments.recovery.cases import RobotIn
 from gpca.recovery.observation import OBSERVED, observe
 
 

@@ -41,7 +41,7 @@ def stage_files(registrations, tmp_path_factory):
 
     Pose of sample p has score 0.5 + p / 100, all are named right, and test sample p has an uncertainty of p / 10.
     """
-    from gpca.arrays import save_arrays
+    from gpca.io.arrays import save_arrays
     from gpca.pairs.perturbation import CONCEPTS
 
     folder = tmp_path_factory.mktemp("stages")

@@ -6,17 +6,17 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.arrays import save_arrays
 from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
-from gpca.files import read_image
+from gpca.experiments.recovery.example_figure import draw_recovery_example
+from gpca.experiments.recovery.policy_figure import draw_mitigation, read_policy
+from gpca.experiments.recovery.queue_figure import draw_queued_labels
+from gpca.experiments.recovery.rates_figure import draw_recovery_rates
+from gpca.experiments.recovery.tables import table8_recovery
+from gpca.io.arrays import save_arrays
+from gpca.io.files import read_image
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.policy import draw_mitigation, read_policy
-from gpca.reporting.figures.queued_labels import draw_queued_labels
-from gpca.reporting.figures.recovery_example import draw_recovery_example
-from gpca.reporting.figures.recovery_rates import draw_recovery_rates
-from gpca.reporting.tables.recovery import table8_recovery
 
 TITLE = "Tables, YCB"
 POLICIES = {"gpca": "GP-CA", "random": "Random action", "absent": "Absent"}

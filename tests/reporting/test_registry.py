@@ -5,16 +5,9 @@ import pytest
 
 from gpca.experiments import results as registry
 from gpca.experiments.results import registered, results_of
+from gpca.page.page import rendered_caption
 from gpca.registry import load
-from gpca.reporting.page.page import rendered_caption
-from gpca.reporting.registry import (
-    Input,
-    Result,
-    build,
-    by_section,
-    targets,
-    unknown_target,
-)
+from gpca.reporting.registry import Input, Result, build, by_section, targets, unknown_target
 
 NAMES = {"source": ["ycb", "mine"], "seed": [0, 1], "first_seed": "0", "explainer": ["gpca", "forest"], "gpca": "gpca"}
 ENTRIES = {result.name: result for result in registered()}

@@ -5,9 +5,9 @@ import pytest
 
 from gpca.comparison.published import printed_seconds, read_published
 from gpca.errors import InputError
+from gpca.experiments.runtime.figure import ALL_STAGES, _stages, draw_runtime
+from gpca.experiments.runtime.tables import table7_runtime
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
-from gpca.reporting.figures.runtime import ALL_STAGES, _stages, draw_runtime
-from gpca.reporting.tables.runtime import table7_runtime
 
 
 def rows(device="CPU", hardware="A processor, 2 cores", components=tuple(COMPONENTS), start=0.001):

@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from gpca.__main__ import main
-from gpca.arrays import save_arrays
+from gpca.io.arrays import save_arrays
 
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from gpca.__main__ import main
-from gpca.arrays import save_arrays
 from gpca.encoders.tensor_file import write_tensors
+from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
 
 from .command_lines import STEP_OPTIONS, arguments, refused

@@ -7,9 +7,9 @@ import pytest
 from gpca.__main__ import main
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS
-from gpca.diagnosis.frames import KINDS, STATE, TRUTH, collect
 from gpca.errors import InputError
-from gpca.reporting.tables.causes import table9_frames
+from gpca.experiments.diagnosis.tables import table9_frames
+from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH, collect
 
 from ..hostile import refusal
 from .command_lines import CAUSES, ENCODER

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gpca.__main__ import main
-from gpca.arrays import save_arrays
+from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
 
 from .command_lines import refused, removed, untouched, written

@@ -6,7 +6,7 @@ import pytest
 
 from gpca.__main__ import main
 from gpca.attribution.metrics import read_metrics
-from gpca.readings.registry import GROUPS
+from gpca.experiments.specification_curve.registry import GROUPS
 
 GPC = {"iterations": 2, "inducing": 4, "draws": 20}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.__main__ import main
-from gpca.arrays import save_arrays
+from gpca.io.arrays import save_arrays
 
 from .command_lines import arguments, arrays_changed, refused, removed, settings, untouched
 

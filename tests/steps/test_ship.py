@@ -12,11 +12,11 @@ import yaml
 
 from gpca.__main__ import main
 from gpca.code_files import ROOT
-from gpca.diagnosis.intervals import COLUMNS
+from gpca.commands import ship
+from gpca.experiments.diagnosis.intervals import COLUMNS
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.origin import licenses_of
-from gpca.steps import ship
 
 from .command_lines import content, removed, written
 

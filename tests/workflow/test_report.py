@@ -6,7 +6,7 @@ import re
 import pytest
 
 from gpca.experiments.results import registered
-from gpca.reporting.crate import NAME
+from gpca.page.crate import NAME
 
 from ..reporting.test_crate import faults
 

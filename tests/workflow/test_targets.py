@@ -65,9 +65,12 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
         "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
-    "gpca/shift/samples.py": ("shifted/ learners/ reliability", "predictions active_learning diagnoses/ model.pt"),
+    "gpca/experiments/out_of_distribution/samples.py": (
+        "shifted/ learners/ reliability",
+        "predictions active_learning diagnoses/ model.pt",
+    ),
     "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
-    "gpca/reporting/figures/kernel_grid.py": ("figures/kernel_learning_curves", "kernels/ kernels.csv tables/"),
+    "gpca/experiments/kernel_grid/figure.py": ("figures/kernel_learning_curves", "kernels/ kernels.csv tables/"),
     "gpca/active_learning/acquisition.py": (
         "active_learning/ycb new_concepts/ frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",
@@ -78,7 +81,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "registrations/ encoders/ycb embeddings/ycb predictions/ycb/gpca/ active_learning/ table2_per_concept kernels",
     ),
     "gpca/alignment/methods/teaser.py": ("methods/ycb table11_severity", "causes/ycb predictions estimates exchange"),
-    "gpca/reporting/tables/registration.py": ("table11_registration table11_severity", "methods/ figures/"),
+    "gpca/experiments/registration_methods/tables.py": ("table11_registration table11_severity", "methods/ figures/"),
     "baselines/softmax_head.py": (
         "predictions/ycb/softmax_head recovery/ controls/",
         "predictions/ycb/gpca predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
@@ -88,7 +91,10 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     "gpca/frames/occlusion.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
     "gpca/frames/bop.py": ("scenes/ instances/ frame_causes/ recovery/", "predictions/ycb encoders/ycb causes/ycb"),
     "gpca/recovery/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
-    "gpca/reporting/tables/explainers.py": ("table1_extended table2_per_concept", "predictions metrics.csv figures/"),
+    "gpca/experiments/concept_attribution/tables.py": (
+        "table1_extended table2_per_concept",
+        "predictions metrics.csv figures/",
+    ),
     "gpca/encoders/dgcnn.py": (
         "encoders/ycb embeddings/ycb predictions/ycb/gpca/ predictions/ycb/concept_vectors shifted/ cause_encoders/ycb "
         "control_embeddings/ saliency/ table2_per_concept",
@@ -99,15 +105,24 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "objects/coffee_cup registrations/coffee_cup predictions/coffee_cup objects_coffee_cup",
         "objects/ycb registrations/ycb kernels/ scenes instances exchange/ recovery",
     ),
-    "gpca/descriptors/entropy.py": (
+    "gpca/features/entropy.py": (
         "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt exchange/",
         "predictions causes/ recovery methods/",
     ),
     "gpca/uncertainty/estimators/censi.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
     "baselines/causes/trees.py": ("diagnoses/ycb/pair_forest table9_causes", "diagnoses/ycb/gpca predictions"),
-    "gpca/controls/variants.py": ("controls/ control_embeddings/ transfer", "predictions embeddings encoders"),
-    "gpca/controls/judged.py": ("controls.csv table10_controls transfer", "controls/ predictions diagnoses/"),
-    "gpca/experiments/exchange/estimated.py": ("exchange/ table14_method_matrix", "estimates/ methods/ predictions"),
+    "gpca/experiments/controls/variants.py": (
+        "controls/ control_embeddings/ transfer",
+        "predictions embeddings encoders",
+    ),
+    "gpca/experiments/controls/judged.py": (
+        "controls.csv table10_controls transfer",
+        "controls/ predictions diagnoses/",
+    ),
+    "gpca/experiments/substitution/estimated.py": (
+        "exchange/ table14_method_matrix",
+        "estimates/ methods/ predictions",
+    ),
 }
 
 
@@ -116,13 +131,13 @@ def test_the_files_that_a_module_makes_depend_on_it_and_no_others(planned, modul
     assert_made(planned.remade(module), *EDITS[module], planned)
 
 
-@pytest.mark.parametrize("name", ["gpca/reporting/page/findings.py", "gpca/reporting/page/templates/page.js"])
+@pytest.mark.parametrize("name", ["gpca/page/findings.py", "gpca/page/templates/page.js"])
 def test_what_the_page_alone_uses_makes_the_page_alone(planned, name):
     assert planned.behind(name) == {"page": 1}
 
 
 def test_a_group_of_readings_is_run_again_for_its_own_code_alone(planned):
-    again = planned.behind("gpca/readings/severities.py")
+    again = planned.behind("gpca/experiments/specification_curve/severities.py")
     assert [again[rule] for rule in ("reading", "reading_values", "comparison", "table13_readings")] == [1, 1, 1, 1]
 
 

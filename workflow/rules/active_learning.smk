@@ -3,7 +3,7 @@ rule embed_without:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
         code=code_files(
-            "gpca.steps.without", encoder_module(config["embedding"]["encoder"])
+            "gpca.experiments.active_learning.without_step", encoder_module(config["embedding"]["encoder"])
         ),
     output:
         "<results>/embeddings/{source}/without/seed{seed}.npz",
@@ -35,7 +35,7 @@ rule learn_actively:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
         embeddings=f"<results>/embeddings/{{source}}/{EMBEDDING}/seed{{seed}}.npz",
         without="<results>/embeddings/{source}/without/seed{seed}.npz",
-        code=code_files("gpca.steps.active_learning"),
+        code=code_files("gpca.experiments.active_learning.step"),
     output:
         collect(
             "<results>/active_learning/{{source}}/{strategy}/seed{{seed}}.csv",
@@ -114,7 +114,7 @@ rule learn_new_concepts:
         cause_encoder="<results>/cause_encoders/{source}/seed{seed}.pt",
         cause_embeddings="<results>/cause_embeddings/{source}/seed{seed}.npz",
         code=code_files(
-            "gpca.steps.new_concepts",
+            "gpca.experiments.new_concepts.step",
             encoder_module(NEW_ENCODER),
             backbone_module(DIAGNOSIS["encoder"]),
         ),
@@ -182,7 +182,7 @@ rule learn_on_frames:
             f"<results>/embeddings/{FRAMES}/{{encoder}}/none/seed{{{{seed}}}}.npz",
             encoder=config["real_world"]["backbones"],
         ),
-        code=code_files("gpca.steps.frame_labels"),
+        code=code_files("gpca.experiments.frame_labels.step"),
     output:
         collect(
             f"<results>/frame_labels/{FRAMES}/{{strategy}}/seed{{{{seed}}}}.csv",

@@ -116,7 +116,7 @@ rule diagnose:
             seed=SEEDS,
         ),
         code=lambda wildcards: code_files(
-            "gpca.steps.diagnose", explainer_module(wildcards.cause_explainer, CAUSES)
+            "gpca.experiments.diagnosis.step", explainer_module(wildcards.cause_explainer, CAUSES)
         ),
     output:
         predictions=collect(
@@ -160,7 +160,7 @@ rule cause_metrics:
         causes_files=collect(
             "<results>/causes/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS
         ),
-        code=collector_code("gpca.diagnosis.metrics:collect"),
+        code=collector_code("gpca.experiments.diagnosis.metrics:collect"),
     output:
         "<results>/causes.csv",
     log:
@@ -175,7 +175,7 @@ rule cause_metrics:
         mem_mb=2000,
         runtime=10,
     params:
-        collector="gpca.diagnosis.metrics:collect",
+        collector="gpca.experiments.diagnosis.metrics:collect",
     script:
         "../scripts/collect.py"
 
@@ -184,7 +184,7 @@ rule cause_intervals:
     input:
         prediction_files=rules.cause_metrics.input.prediction_files,
         causes_files=rules.cause_metrics.input.causes_files,
-        code=collector_code("gpca.diagnosis.intervals:collect"),
+        code=collector_code("gpca.experiments.diagnosis.intervals:collect"),
     output:
         "<results>/cause_intervals.csv",
     log:
@@ -199,6 +199,6 @@ rule cause_intervals:
         mem_mb=2000,
         runtime=10,
     params:
-        collector="gpca.diagnosis.intervals:collect",
+        collector="gpca.experiments.diagnosis.intervals:collect",
     script:
         "../scripts/collect.py"

@@ -108,7 +108,7 @@ rule page:
             source=UNCERTAIN,
         ),
         code=code_files(
-            "gpca.reporting.page.page", "gpca.reporting.crate", "gpca.reporting.script"
+            "gpca.page.page", "gpca.page.crate", "gpca.reporting.script"
         ),
     output:
         page="<results>/index.html",

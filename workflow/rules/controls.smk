@@ -1,5 +1,5 @@
 # Registrations -> encoders trained under a control -> what every explainer says under all of them.
-from gpca.controls.settings import RETRAINED, TRAININGS, UNSEEN
+from gpca.experiments.controls.settings import RETRAINED, TRAININGS, UNSEEN
 
 CONTROLS = config["controls"]
 CONTROL_SEEDS = NAMES["control_seed"]
@@ -22,7 +22,7 @@ rule controls:
 rule train_control:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
-        code=code_files("gpca.steps.train_control", encoder_module(CONTROL_ENCODER)),
+        code=code_files("gpca.experiments.controls.train_step", encoder_module(CONTROL_ENCODER)),
     output:
         embeddings="<results>/control_embeddings/{control}/{source}/seed{seed}.npz",
         curve="<results>/control_embeddings/{control}/{source}/seed{seed}.csv",
@@ -62,7 +62,7 @@ rule explain_controls:
             control=retrained(wildcards),
         ),
         code=code_files(
-            "gpca.steps.controls",
+            "gpca.experiments.controls.step",
             encoder_module(CONTROL_ENCODER),
             *map(explainer_module, CONTROL_EXPLAINERS),
         ),
@@ -101,7 +101,7 @@ rule explain_controls:
 rule control_metrics:
     input:
         prediction_files=rules.controls.input,
-        code=collector_code("gpca.controls.metrics:collect"),
+        code=collector_code("gpca.experiments.controls.metrics:collect"),
     output:
         "<results>/controls.csv",
     log:
@@ -116,7 +116,7 @@ rule control_metrics:
         mem_mb=2000,
         runtime=10,
     params:
-        collector="gpca.controls.metrics:collect",
+        collector="gpca.experiments.controls.metrics:collect",
     script:
         "../scripts/collect.py"
 
@@ -124,7 +124,7 @@ rule control_metrics:
 use rule control_metrics as control_intervals with:
     input:
         prediction_files=rules.controls.input,
-        code=collector_code("gpca.controls.intervals:collect"),
+        code=collector_code("gpca.experiments.controls.intervals:collect"),
     output:
         "<results>/control_intervals.csv",
     log:
@@ -132,7 +132,7 @@ use rule control_metrics as control_intervals with:
     benchmark:
         "<benchmarks>/control_intervals.tsv"
     params:
-        collector="gpca.controls.intervals:collect",
+        collector="gpca.experiments.controls.intervals:collect",
 
 
 use rule control_metrics as control_severities with:
@@ -143,7 +143,7 @@ use rule control_metrics as control_severities with:
             source=SOURCES,
             seed=CONTROL_SEEDS,
         ),
-        code=collector_code("gpca.controls.severity:collect"),
+        code=collector_code("gpca.experiments.controls.severity:collect"),
     output:
         "<results>/control_severities.csv",
     log:
@@ -151,7 +151,7 @@ use rule control_metrics as control_severities with:
     benchmark:
         "<benchmarks>/control_severities.tsv"
     params:
-        collector="gpca.controls.severity:collect",
+        collector="gpca.experiments.controls.severity:collect",
         severities=config["registrations"]["severities"],
         bins=CONTROLS["bins"],
         success=CONTROLS["success"],

@@ -16,7 +16,7 @@ rule fit_kernel_grid:
             f"<results>/embeddings/{{{{source}}}}/{EMBEDDING}/seed{{seed}}.npz",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.kernel_grid"),
+        code=code_files("gpca.experiments.kernel_grid.step"),
     output:
         collect("<results>/kernels/{{source}}/seed{seed}.csv", seed=SEEDS),
     log:
@@ -46,7 +46,7 @@ rule kernels:
             source=NAMES["kernel_source"],
             seed=SEEDS,
         ),
-        code=collector_code("gpca.classifier.kernel_grid:collect_grids"),
+        code=collector_code("gpca.experiments.kernel_grid.grid:collect_grids"),
     output:
         "<results>/kernels.csv",
     log:
@@ -61,7 +61,7 @@ rule kernels:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.classifier.kernel_grid:collect_grids",
+        collector="gpca.experiments.kernel_grid.grid:collect_grids",
     script:
         "../scripts/collect.py"
 
@@ -100,7 +100,7 @@ rule shift:
             source=[name for name in SOURCES if name != wildcards.source][:1],
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.shift", encoder_module(ENCODER)),
+        code=code_files("gpca.experiments.out_of_distribution.shift_step", encoder_module(ENCODER)),
     output:
         collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
     log:
@@ -136,7 +136,7 @@ rule shift:
 rule fit_learners:
     input:
         sets=collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
-        code=code_files("gpca.steps.learners", *map(explainer_module, LEARNER_SETTINGS)),
+        code=code_files("gpca.experiments.out_of_distribution.learners_step", *map(explainer_module, LEARNER_SETTINGS)),
     output:
         collect(
             "<results>/learners/{{source}}/{learner}/seed{seed}.csv",
@@ -168,7 +168,7 @@ rule diagnostics:
     input:
         prediction_files=rules.learners.input,
         set_files=rules.shifted.input,
-        code=collector_code("gpca.shift.metrics:collect_diagnostics"),
+        code=collector_code("gpca.experiments.out_of_distribution.metrics:collect_diagnostics"),
     output:
         "<results>/diagnostics.csv",
     log:
@@ -183,6 +183,6 @@ rule diagnostics:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.shift.metrics:collect_diagnostics",
+        collector="gpca.experiments.out_of_distribution.metrics:collect_diagnostics",
     script:
         "../scripts/collect.py"

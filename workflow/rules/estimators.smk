@@ -1,5 +1,5 @@
 # Registrations with measured causes -> what every estimator says of their uncertainty -> estimators.csv.
-from gpca.trials.covariances import REFERENCE
+from gpca.experiments.estimators.covariances import REFERENCE
 from gpca.uncertainty.estimators.registry import estimator_module
 
 ESTIMATORS = [REFERENCE, *NAMES["estimator"]]
@@ -20,7 +20,7 @@ rule estimate:
         objects="<results>/objects/{source}.npz",
         causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
         code=code_files(
-            "gpca.steps.estimate",
+            "gpca.experiments.estimators.step",
             *map(estimator_module, NAMES["estimator"]),
             *map(method_module, config["estimator_pairs"]["methods"]),
         ),
@@ -66,7 +66,7 @@ rule estimate:
 rule estimator_metrics:
     input:
         files=rules.estimates.input,
-        code=collector_code("gpca.trials.calibration:collect_estimates"),
+        code=collector_code("gpca.experiments.estimators.calibration:collect_estimates"),
     output:
         "<results>/estimators.csv",
     log:
@@ -81,6 +81,6 @@ rule estimator_metrics:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.trials.calibration:collect_estimates",
+        collector="gpca.experiments.estimators.calibration:collect_estimates",
     script:
         "../scripts/collect.py"

@@ -28,7 +28,7 @@ rule explain_exchanged:
             seed=EXCHANGE_SEEDS,
         ),
         code=code_files(
-            "gpca.experiments.exchange.step",
+            "gpca.experiments.substitution.step",
             encoder_module(CONTROL_ENCODER),
             *map(explainer_module, EXCHANGE_EXPLAINERS),
             *map(method_module, EXCHANGE_METHODS),
@@ -79,7 +79,7 @@ rule explain_exchanged:
 use rule control_metrics as exchange_metrics with:
     input:
         prediction_files=rules.exchanges.input,
-        code=collector_code("gpca.experiments.exchange.metrics:collect"),
+        code=collector_code("gpca.experiments.substitution.metrics:collect"),
     output:
         "<results>/exchange.csv",
     log:
@@ -87,4 +87,4 @@ use rule control_metrics as exchange_metrics with:
     benchmark:
         "<benchmarks>/exchange.tsv"
     params:
-        collector="gpca.experiments.exchange.metrics:collect",
+        collector="gpca.experiments.substitution.metrics:collect",

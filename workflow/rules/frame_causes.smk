@@ -20,7 +20,7 @@ rule measure_frame_causes:
             "<results>/cause_embeddings/{source}/seed{{seed}}.npz", source=SOURCES
         ),
         code=code_files(
-            "gpca.steps.frame_causes",
+            "gpca.experiments.frame_causes.step",
             backbone_module(DIAGNOSIS["encoder"]),
             *(explainer_module(name, CAUSES) for name in DIAGNOSIS["explainers"]),
         ),
@@ -73,7 +73,7 @@ rule frame_causes:
         prediction_files=collect(
             "<results>/frame_diagnoses/seed{seed}.csv", seed=NAMES["frame_cause_seed"]
         ),
-        code=collector_code("gpca.diagnosis.frames:collect"),
+        code=collector_code("gpca.experiments.frame_causes.metrics:collect"),
     output:
         "<results>/frame_causes.csv",
     log:
@@ -88,6 +88,6 @@ rule frame_causes:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.diagnosis.frames:collect",
+        collector="gpca.experiments.frame_causes.metrics:collect",
     script:
         "../scripts/collect.py"

@@ -153,7 +153,7 @@ rule real_world:
             encoder=REAL_WORLD["backbones"],
             seed=SEEDS,
         ),
-        code=collector_code("gpca.active_learning.frame_metrics:collect"),
+        code=collector_code("gpca.experiments.frame_labels.metrics:collect"),
     output:
         "<results>/real_world.csv",
     log:
@@ -168,7 +168,7 @@ rule real_world:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.active_learning.frame_metrics:collect",
+        collector="gpca.experiments.frame_labels.metrics:collect",
         targets=config["frame_labels"]["targets"],
     script:
         "../scripts/collect.py"

@@ -26,7 +26,7 @@ rule register_methods:
         registrations=collect(
             "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
-        code=code_files("gpca.steps.register_methods", *map(method_module, METHODS)),
+        code=code_files("gpca.experiments.registration_methods.step", *map(method_module, METHODS)),
     output:
         rows=collect(
             "<results>/methods/{{source}}/{method}/seed{seed}.csv",
@@ -69,7 +69,7 @@ rule register_methods:
 rule registration_methods:
     input:
         files=rules.methods.input,
-        code=collector_code("gpca.trials.metrics:collect_trials"),
+        code=collector_code("gpca.experiments.registration_methods.metrics:collect_trials"),
     output:
         "<results>/registration_methods.csv",
     log:
@@ -84,7 +84,7 @@ rule registration_methods:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.trials.metrics:collect_trials",
+        collector="gpca.experiments.registration_methods.metrics:collect_trials",
         severities=config["registrations"]["severities"],
     script:
         "../scripts/collect.py"

@@ -94,7 +94,7 @@ rule time_stages:
     input:
         **MODEL_INPUTS,
         model="<results>/model.pt",
-        code=code_files("gpca.steps.runtime", encoder_module(MODEL_ENCODER)),
+        code=code_files("gpca.experiments.runtime.step", encoder_module(MODEL_ENCODER)),
     output:
         "<results>/runtime.csv",
     log:

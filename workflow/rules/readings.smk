@@ -1,5 +1,5 @@
 # Files of a run -> the printed numbers under every reading of what the paper leaves unstated -> readings.csv.
-from gpca.readings.registry import FRAME_INPUT, GROUPS
+from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
 
 READINGS = config["readings"]
 READING_SIZES = {name: READINGS[name] for name in ("seeds", "encoders", "samples")}
@@ -21,7 +21,7 @@ rule reading:
     input:
         unpack(read_by_readings),
         code=lambda wildcards: code_files(
-            "gpca.steps.readings",
+            "gpca.experiments.specification_curve.step",
             GROUPS[wildcards.reading_group].module,
             *(
                 [encoder_module(encoder)]

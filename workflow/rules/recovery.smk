@@ -28,7 +28,7 @@ rule recover:
     input:
         data=data_files(STANDING),
         code=code_files(
-            "gpca.steps.recover",
+            "gpca.experiments.recovery.step",
             encoder_module(config["embedding"]["encoder"]),
             *map(explainer_module, RECOVERY_EXPLAINERS),
             *source_modules(STANDING),
@@ -61,7 +61,7 @@ rule recover:
 rule recovery:
     input:
         files=collect("<results>/recovery/seed{seed}.csv", seed=SEEDS),
-        code=collector_code("gpca.recovery.metrics:collect_recovery"),
+        code=collector_code("gpca.experiments.recovery.metrics:collect_recovery"),
     output:
         "<results>/recovery.csv",
     log:
@@ -76,7 +76,7 @@ rule recovery:
         mem_mb=1000,
         runtime=10,
     params:
-        collector="gpca.recovery.metrics:collect_recovery",
+        collector="gpca.experiments.recovery.metrics:collect_recovery",
         treatments=RECOVERY["treatments"],
         costs=RECOVERY["costs"],
         budget=RECOVERY["loop"]["budget"],

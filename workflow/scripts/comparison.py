@@ -9,8 +9,8 @@ from gpca.comparison.readings import judge_readings, with_readings
 from gpca.comparison.reasons import read_reasons
 from gpca.comparison.values import measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
-from gpca.csv_file import write_csv
-from gpca.files import whole_file
+from gpca.io.csv_file import write_csv
+from gpca.io.files import whole_file
 from gpca.reporting.script import job
 from gpca.reporting.tables.comparison import comparison_markdown
 

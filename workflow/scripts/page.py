@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from gpca.reporting.crate import write_crate
-from gpca.reporting.page.findings import Titles
-from gpca.reporting.page.page import Run, Shown, write_page
+from gpca.page.crate import write_crate
+from gpca.page.findings import Titles
+from gpca.page.page import Run, Shown, write_page
 from gpca.reporting.script import job
 
 with job(snakemake):

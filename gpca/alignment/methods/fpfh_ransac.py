@@ -12,7 +12,7 @@ from gpca.alignment.methods.interface import (
     Pair,
     as_array,
 )
-from gpca.environment import require_open3d
+from gpca.process.environment import require_open3d
 from gpca.settings import Share
 
 

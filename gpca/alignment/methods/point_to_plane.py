@@ -11,7 +11,7 @@ from typing import Literal
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
 from gpca.alignment.methods.local import align_by_open3d
-from gpca.environment import require_open3d
+from gpca.process.environment import require_open3d
 
 Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss"]
 # Diameters. At 0.02, the middle of the protocol's noise, all that a poor start leaves apart counts as an outlier: Tukey

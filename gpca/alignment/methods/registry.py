@@ -9,8 +9,8 @@ import numpy as np
 
 import gpca.alignment.methods as folder
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome, Pair
-from gpca.environment import require_open3d
 from gpca.errors import InputError
+from gpca.process.environment import require_open3d
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 

@@ -9,9 +9,9 @@ from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
-from gpca.controls.settings import ControlSettings
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError, require_names, with_key
+from gpca.experiments.controls.settings import ControlSettings
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import check_settings
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Set
 
 from baselines.registry import require_settings
-from gpca.active_learning.frame_settings import in_percent
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError, require_names, with_key
+from gpca.experiments.frame_labels.settings import in_percent
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.source import REAL_WORLD, has_estimates, resolve_datasets
 from gpca.objects import procedural

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.arrays import REAL, WHOLE, load_arrays
-from gpca.csv_file import numbers, read_csv
 from gpca.errors import InputError
 from gpca.experiments.gradients.metrics import DELETION_COLUMNS
+from gpca.io.arrays import REAL, WHOLE, load_arrays
+from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views

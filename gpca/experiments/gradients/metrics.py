@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
-from gpca.csv_file import numbers, read_csv
+from gpca.io.csv_file import numbers, read_csv
 
 if TYPE_CHECKING:
     import pandas as pd

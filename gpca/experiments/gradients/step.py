@@ -8,11 +8,8 @@ from pathlib import Path
 
 import torch
 
-from gpca.arguments import SEED, per_seed
-from gpca.arrays import save_arrays
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.csv_file import write_csv
 from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.weights import load_model
@@ -20,10 +17,13 @@ from gpca.errors import InputError
 from gpca.experiments.gradients.saliency import deletions
 from gpca.experiments.gradients.settings import GradientSettings
 from gpca.experiments.gradients.tcav import tcav
+from gpca.io.arrays import save_arrays
+from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.progress import progress
-from gpca.provenance import record_provenance
+from gpca.process.arguments import SEED, per_seed
+from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
 from gpca.settings import checked_sections
 
 SECTIONS = {"gradients": ("gradients",), "encoder": ("encoders", "*"), "gpc": ("explainers", "gpca")}

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gpca.compilation import njit
+from gpca.process.compilation import njit
 
 AWAY = 0.7  # Discs that face away are this much smaller, lest the far wall stand out over a rim.
 BLEND = 1.5  # Discs within this many radii of the nearest are one surface: their normals are averaged.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gpca.files import whole_file
+from gpca.io.files import whole_file
 
 MATPLOTLIBRC = str(Path(__file__).with_name("matplotlibrc"))
 COLUMN_WIDTH_IN = 3.5  # One column of an IEEE paper is this wide.

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gpca.files import whole_file
+from gpca.io.files import whole_file
 
 EMPTY = "–"  # A dash stands where there is no number.
 LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.

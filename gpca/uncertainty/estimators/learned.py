@@ -13,13 +13,7 @@ import numpy as np
 
 from gpca.alignment.twist import exp, log
 from gpca.seeds import generator
-from gpca.uncertainty.estimators.cello import (
-    FEWEST_EXAMPLES,
-    Reduction,
-    along_axes,
-    described,
-    twists_along_axes,
-)
+from gpca.uncertainty.estimators.cello import FEWEST_EXAMPLES, Reduction, along_axes, described, twists_along_axes
 from gpca.uncertainty.estimators.interface import (
     Estimator,
     EstimatorEntry,

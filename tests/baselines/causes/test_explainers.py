@@ -10,9 +10,9 @@ from baselines.registry import CAUSES, explainer_entry, explainer_module, explai
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.labels import LABELS, labelled
 from gpca.causes.truth import BORDERLINE, NOMINAL
-from gpca.descriptors.dataset import describe_all
-from gpca.descriptors.settings import DescriptorSettings
 from gpca.errors import InputError
+from gpca.features.dataset import describe_all
+from gpca.features.settings import DescriptorSettings
 
 FAST = {
     "gpca": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},

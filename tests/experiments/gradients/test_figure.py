@@ -2,10 +2,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.arrays import save_arrays
 from gpca.errors import InputError
 from gpca.experiments.gradients.figure import draw_saliency
 from gpca.experiments.gradients.metrics import DELETION_COLUMNS
+from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
 
 

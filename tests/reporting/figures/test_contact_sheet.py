@@ -7,8 +7,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from gpca.arrays import save_arrays
 from gpca.errors import InputError
+from gpca.io.arrays import save_arrays
 from gpca.reporting.figures import contact_sheet
 from gpca.reporting.figures.contact_sheet import draw_contact_sheet, render_cloud
 from gpca.seeds import generator

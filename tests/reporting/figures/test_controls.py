@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.controls.intervals import COLUMNS as INTERVALS
-from gpca.controls.severity import COLUMNS as SEVERITIES
-from gpca.controls.severity import REGISTRATION
 from gpca.errors import InputError
-from gpca.reporting.figures.severity_curves import SUCCEEDS, draw_severity_curves
-from gpca.reporting.figures.transfer import draw_transfer
+from gpca.experiments.controls.intervals import COLUMNS as INTERVALS
+from gpca.experiments.controls.severity import COLUMNS as SEVERITIES
+from gpca.experiments.controls.severity import REGISTRATION
+from gpca.experiments.controls.severity_figure import SUCCEEDS, draw_severity_curves
+from gpca.experiments.controls.transfer_figure import draw_transfer
 
 EXPLAINERS = {"good": "Good", "poor": "Poor (forest)"}
 SOURCES = {"ycb": "YCB", "cups": "Cups"}

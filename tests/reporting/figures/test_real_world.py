@@ -7,21 +7,16 @@ import pytest
 from gpca.attribution.metrics import collect, write_metrics
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
-from gpca.csv_file import write_csv
 from gpca.errors import InputError
-from gpca.files import read_image
+from gpca.experiments.real_world.confusions import draw_real_world_confusions
+from gpca.experiments.real_world.example import choose_sample, covered, draw_real_world_example, title_of_frame
+from gpca.experiments.real_world.failures import _mistakes, draw_real_world_failures
+from gpca.experiments.real_world.frame_views import draw_scores, read_samples
 from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
+from gpca.io.csv_file import write_csv
+from gpca.io.files import read_image
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.reporting.figures.frame_views import draw_scores, read_samples
-from gpca.reporting.figures.real_world_confusions import draw_real_world_confusions
-from gpca.reporting.figures.real_world_example import (
-    choose_sample,
-    covered,
-    draw_real_world_example,
-    title_of_frame,
-)
-from gpca.reporting.figures.real_world_failures import _mistakes, draw_real_world_failures
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +40,7 @@ def results(tiny, tmp_path_factory):
     )
     write_predictions(predictions, registrations, filled)
     write_metrics(collect([predictions]), folder / "metrics.csv")
-    from gpca.arrays import save_arrays
+    from gpca.io.arrays import save_arrays
 
     save_arrays(
         folder / "objects.npz",

@@ -56,7 +56,7 @@ def test_letters_are_truetype_and_nothing_is_dated(figure, tmp_path):
 
 
 def test_an_edit_of_the_matplotlibrc_redraws_every_figure():
-    assert "gpca/reporting/figures/matplotlibrc" in code_files("gpca.reporting.figures.kernel_grid")
+    assert "gpca/reporting/figures/matplotlibrc" in code_files("gpca.experiments.kernel_grid.figure")
     assert "gpca/reporting/figures/matplotlibrc" not in code_files("gpca.classifier.gpc")
 
 

@@ -1,0 +1,153 @@
+"""Step ``label``: a person names the cause of the registrations that the classifier is least sure of.
+
+Each question shows a picture and the scores; the answer is a concept, known or new, or one of the commands below. It is
+in the labels file before the next question comes; the same command continues where labeling was stopped. Answers can
+come from a file or a pipe.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from gpca.active_learning.labelling import SKIPPED, LabelFile, Question, Session, require_name
+from gpca.attribution.predictions import write_predictions
+from gpca.attribution.scores import Attribution
+from gpca.classifier.settings import GPCSettings
+from gpca.errors import InputError
+from gpca.io.files import require_outputs
+from gpca.io.limits import require_file
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.arguments import COUNT
+from gpca.process.provenance import record_provenance
+from gpca.reporting.figures.query import draw_query
+from gpca.settings import check_settings
+
+COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this one", "/quit": "stop here"}
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` are those of the classifier, as of the explainer ``gpca``."""
+    parser.add_argument("registrations", type=Path)
+    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings as written by the step embed")
+    parser.add_argument("--labels", required=True, type=Path, help="CSV to which the answers are appended")
+    parser.add_argument(
+        "--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labeled at the start"
+    )
+    parser.add_argument("--initial", type=COUNT, default=60, help="samples labeled at the start (default 60)")
+    parser.add_argument("--batch", type=COUNT, default=4, help="questions between retrainings (default 4)")
+    parser.add_argument("--questions", type=COUNT, default=20, help="largest number of questions (default 20)")
+    parser.add_argument(
+        "--strategy", default="bald_kmeans", help="strategy that picks the questions (default bald_kmeans)"
+    )
+    parser.add_argument("--picture", type=Path, default=Path("query.png"), help="image, redrawn for every question")
+    parser.add_argument("--answers", type=Path, help="file with one answer per line, instead of the terminal")
+    parser.add_argument(
+        "--predictions", type=Path, help="CSV of what the classifier says about every sample at the end"
+    )
+
+
+def run(options: Namespace) -> None:
+    """Ask, write, retrain, until the questions, the answers or the samples are used up."""
+    torch.set_num_threads(options.threads)
+    check_settings(options.settings, "explainers", "gpca")
+    read = [options.registrations, options.embeddings, *([options.answers] if options.answers else [])]
+    require_outputs([path for path in (options.labels, options.picture, options.predictions) if path], read)
+    registrations, h_S_d = _load(options)
+    keys = list(zip(registrations.split.tolist(), registrations.sample.tolist(), strict=True))
+    start = _start(registrations, keys, options)
+    labels = LabelFile(options.labels, dict.fromkeys(keys))
+    settings = GPCSettings(**({"learning_rate": 0.2, "iterations": 150} | options.settings))
+    session = Session(h_S_d, keys, start, labels, settings, options.strategy)
+    answers = _answers(options.answers)
+    asked = 0
+    print(f"{len(start)} labeled at the start, {len(session.answered)} answered before, {len(keys)} samples")
+    print("answer with a concept or with " + ", ".join(f"{name} ({what})" for name, what in COMMANDS.items()))
+    while asked < options.questions and (questions := session.ask(min(options.batch, options.questions - asked))):
+        for question in questions:
+            asked += 1
+            answer = _ask(session, registrations, question, options.picture, answers)
+            if answer in (None, "/quit"):
+                return _finish(session, registrations, options)
+            labels.add(keys[question.row], SKIPPED if answer == "/skip" else answer)
+        _retrain(session)
+    return _finish(session, registrations, options)
+
+
+def _load(options: Namespace) -> tuple[Registrations, np.ndarray]:
+    registrations = Registrations.load(options.registrations)
+    return registrations, read_embedding(options.embeddings, registrations)["embedding"]
+
+
+def _start(registrations: Registrations, keys: list, options: Namespace) -> dict:
+    """Return the first training samples of the known concepts, as many of each, with their labels."""
+    each = max(1, options.initial // len(options.known))
+    train = registrations.rows("train")
+    rows = [row for concept in options.known for row in train[registrations.concept[train] == concept][:each]]
+    return {keys[row]: str(registrations.concept[row]) for row in rows}
+
+
+def _answers(path: Path | None):
+    if path is None:
+        return sys.stdin
+    require_file(path, "no such file", "give a text file with one answer per line")
+    return path.open(encoding="utf-8")
+
+
+def _ask(session: Session, registrations: Registrations, question: Question, picture: Path, answers) -> str | None:
+    """Show one question until it is answered; None at the end of the answers."""
+    row = question.row
+    split, sample = session.keys[row]
+    title = f"{split} sample {sample}: {registrations.object_name[row]}"
+    draw_query(registrations.cloud(row), registrations.target(row), title, picture)
+    columns = zip(session.gpc.classes, question.scores_C, question.variances_C, strict=True)
+    told = ", ".join(f"{name} {score:.2f} (variance {variance:.3f})" for name, score, variance in columns)
+    print(f"\n{title}\n  {told}; BALD {question.bald:.3f}; picture {picture}")
+    while True:
+        print("  cause? ", end="", flush=True)
+        line = answers.readline()
+        if not line:
+            print()
+            return None
+        answer = line.strip()
+        if not answers.isatty():
+            print(answer)
+        if answer == "/retrain":
+            _retrain(session)
+            continue
+        if answer in COMMANDS:
+            return answer
+        try:
+            require_name(answer)
+        except InputError as fault:
+            if answers is not sys.stdin or not sys.stdin.isatty():
+                raise
+            print(f"  {fault}")
+            continue
+        return answer
+
+
+def _retrain(session: Session) -> None:
+    learnt = session.retrain()
+    answers = "1 answer" if learnt == 1 else f"{learnt} answers"
+    print(f"  learned {answers}; concepts: {', '.join(session.gpc.classes)}")
+
+
+def _finish(session: Session, registrations: Registrations, options: Namespace) -> None:
+    session.retrain()
+    answered = session.answered
+    counts = ", ".join(f"{c} {list(answered.values()).count(c)}" for c in dict.fromkeys(answered.values())) or "none"
+    print(f"\n{options.labels}: {counts}")
+    if options.predictions:
+        scores_N_C, variances_N_C, bald_N = session.gpc.attribute(session.h_S_d)
+        said = Attribution.of_scores(session.gpc.classes, scores_N_C, seconds=0.0)
+        said = replace(said, variances_N_C=variances_N_C, bald_N=bald_N)
+        inputs = [options.registrations, options.embeddings, *([options.labels] if options.labels.is_file() else [])]
+        with record_provenance([options.predictions], inputs, options.settings):
+            write_predictions(options.predictions, registrations, said)

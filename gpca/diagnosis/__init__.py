@@ -1,1 +1,0 @@
-"""How well explainers say what is wrong with a registration, measured against the truth of its causes."""

@@ -1,0 +1,1 @@
+"""A new concept from few labels, by every acquisition strategy (paper Table III)."""

@@ -1,0 +1,52 @@
+"""Encoders that are trained under a control, and the embeddings that explainers read there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
+from gpca.experiments.controls.settings import ControlSettings
+from gpca.experiments.controls.variants import of_unseen_objects
+from gpca.pairs.dataset import Registrations
+
+
+def encode(
+    control: str,
+    registrations: Registrations,
+    source: str,
+    seed: int,
+    settings: ControlSettings,
+    encoder: EncoderSettings,
+    checkpoint: Path | None = None,
+) -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
+    """Train an encoder as the paper's is trained, but for the control, and embed the samples of its variant.
+
+    With matched density every draw from a cloud has a random number of points; the clouds are whole, as each epoch
+    draws anew. Of unseen objects it sees neither training nor test samples; so do those that are trained otherwise, by
+    such draws or with a head of two layers.
+
+    Returns:
+        the arrays of a file of embeddings, and the training curve.
+    """
+    if control in ("density", "random_draws"):
+        fewest, most = settings.draw_points
+        encoder = replace(encoder, fewest_points=fewest, draw_points=most)
+    if control == "two_layer_head":
+        encoder = replace(encoder, head="two_layer")
+    if control != "density":
+        registrations = of_unseen_objects(registrations, settings.folds, source, seed)
+    name = f"{source} under {control}"
+    model, curve = train_encoder(registrations, name, seed, encoder, checkpoint)
+    h_S_d, logits_S_C = embed(model, registrations, name, seed, encoder)
+    of_sample = {"sample": registrations.sample, "split": registrations.split}
+    return {"h": h_S_d, "head_logits": logits_S_C, **of_sample}, curve
+
+
+def nothing() -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
+    """Return what there is where a control is left out: arrays without samples, and no epoch."""
+    empty = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
+    return {**empty, "sample": np.zeros(0, int), "split": np.zeros(0, "U5")}, []

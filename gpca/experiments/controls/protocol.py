@@ -1,0 +1,222 @@
+"""Every explainer under every control: what it says of the test samples of one source and seed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import reduce
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.predictions import prediction_frame
+from gpca.experiments.controls.costs import ASKED, Costs
+from gpca.experiments.controls.rivals import Embed, Rival, described_for
+from gpca.experiments.controls.settings import (
+    PAPER,
+    RELABELLED,
+    RETRAINED,
+    SEEN,
+    TRANSFER,
+    UNSEEN,
+    ControlSettings,
+    trained_otherwise,
+)
+from gpca.experiments.controls.variants import left_out, relabelled, shows_known_object, variant
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.interface import BARE, Describing, Encoding
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.evaluation import evaluate_design
+from gpca.uncertainty.settings import UncertaintySettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PARTS, FEWEST_OF_PART = 5, 60  # of the training samples whose labels are shuffled
+LABELS = ("control", "tested", "explainer")  # columns before those of a prediction file
+Attach = Callable[[Registrations], Registrations]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What all controls of one source and seed have in common.
+
+    Attributes:
+        source, seed: name what is random.
+        settings: of the controls.
+        backbone: of the encoder.
+        uncertainty: of Monte-Carlo ICP, for explainers that read a covariance; its ICP is that of the registrations.
+        rivals: by name.
+        embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
+        embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one,
+            and by those that are trained otherwise, of the samples of unseen objects.
+        costs: what the explainers took under the paper's protocol.
+    """
+
+    source: str
+    seed: int
+    settings: ControlSettings
+    backbone: str
+    uncertainty: UncertaintySettings
+    rivals: Mapping[str, Rival]
+    embed: Embed
+    embeddings: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    costs: Costs = field(default_factory=Costs)
+
+    def run(self, registrations: Registrations, others: Mapping[str, Registrations]) -> pd.DataFrame:
+        """Return a row for each control, explainer and test sample.
+
+        Args:
+            registrations: of the source, by the paper's protocol.
+            others: those of the other sources, for transfer.
+
+        Returns:
+            the columns of a prediction file after ``control``, ``tested`` (the source of the sample) and ``explainer``.
+            A control that the registrations do not admit has no rows, and is named on stderr.
+        """
+        import pandas as pd
+
+        plain = self._described(replace(registrations, attached=dict(self.embeddings[PAPER])), self.source)
+        embeds = self._learnt(PAPER, plain)
+        plain = _attached(embeds, plain)
+        tests = self._tests(PAPER, plain)
+        admitted = [control for control in self.settings.controls if self._admits(control, registrations, others)]
+        if TRANSFER in admitted:
+            tests |= {
+                (TRANSFER, name): _attached(embeds, self._asked(name, of_other)) for name, of_other in others.items()
+            }
+        frames = list(self._explained(PAPER, plain, tests, self.rivals))
+        self._time_asking(plain, embeds)
+        for control in admitted:
+            if control != TRANSFER:
+                changed = self._changed(control, plain, embeds)
+                frames += self._explained(control, changed, self._tests(control, changed), self.rivals)
+                if control == UNSEEN:
+                    frames += self._trained_otherwise(changed)
+        return pd.concat(frames, ignore_index=True)
+
+    def _admits(self, control: str, registrations: Registrations, others: Mapping) -> bool:
+        why = left_out(control, registrations, self.settings, self.backbone)
+        if control == TRANSFER and not others:
+            why = "it needs at least two sources"
+        if why:
+            print(f"controls of {self.source}: '{control}' is skipped: {why}", file=sys.stderr)
+        return not why
+
+    def _asked(self, source: str, registrations: Registrations) -> Registrations:
+        """Return the test samples of another source as the paper's encoder of this one sees them."""
+        test = registrations.subset(registrations.rows("test"))
+        return self._described(self._embedded(test, source), source)
+
+    def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
+        """Return the registrations under a control, with all that explainers read attached."""
+        changed = variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
+        if control == UNSEEN:  # what was measured of each stays
+            changed = replace(changed, attached={**changed.attached, **self.embeddings[control]})
+        elif control in RETRAINED:
+            changed = self._described(replace(changed, attached=dict(self.embeddings[control])), self.source)
+        elif control == "reversed":
+            return _attached(embeds, self._described(self._embedded(changed, self.source), self.source))
+        return _attached(self._learnt(control, changed), changed) if control in RETRAINED else changed
+
+    def _learnt(self, control: str, registrations: Registrations) -> dict[str, Attach]:
+        """Return what attaches the embeddings by the rivals' own encoders, learned from the training samples."""
+        train = registrations.subset(registrations.rows("train"))
+        embeds = {}
+        for name, rival in self.rivals.items():
+            explainer = rival.make()
+            if isinstance(explainer, Encoding):
+                with self.costs.learning(control, name):
+                    embeds[name] = explainer.learn_encoder(train)
+        return embeds
+
+    def _time_asking(self, plain: Registrations, embeds: Mapping[str, Attach]) -> None:
+        """Measure what has to be known of a registration before an explainer that reads nothing else is asked."""
+        test = plain.subset(plain.rows("test")[:ASKED])
+        for name, rival in self.rivals.items():
+            if rival.reads == BARE:
+                bare, explainer = replace(test, attached={}), rival.make()
+                with self.costs.asking(name, len(test)):
+                    described = explainer.describe(bare) if isinstance(explainer, Describing) else bare
+                    _attached({name: embeds[name]} if name in embeds else {}, described)
+
+    def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
+        """Return the test samples by what they are tests of and their source; those of known objects apart."""
+        test = changed.subset(changed.rows("test"))
+        if control != UNSEEN:
+            return {(control, self.source): test}
+        known = shows_known_object(changed)[changed.split == "test"]
+        of_rows = {UNSEEN: np.flatnonzero(~known), SEEN: np.flatnonzero(known)}
+        return {(name, self.source): test.subset(rows) for name, rows in of_rows.items() if len(rows)}
+
+    def _trained_otherwise(self, changed: Registrations) -> Iterator[pd.DataFrame]:
+        """Yield what GP-CA says of known and of unseen objects on encoders that are trained otherwise."""
+        for way in self.settings.encoders:
+            if way in self.embeddings:
+                own = replace(changed, attached={**changed.attached, **self.embeddings[way]})
+                forms = {trained_otherwise(n, way): rival for n, rival in self.rivals.items() if n in GPCA_FORMS}
+                yield from self._explained(UNSEEN, own, self._tests(UNSEEN, own), forms)
+
+    def _embedded(self, registrations: Registrations, source: str) -> Registrations:
+        h_S_d, logits_S_C = self.embed(registrations, source)
+        return replace(registrations, attached={"embedding": h_S_d, "head_logits": logits_S_C})
+
+    def _described(self, registrations: Registrations, source: str) -> Registrations:
+        """Attach what the explainers measure of each registration, once for all controls of its clouds."""
+        described = registrations
+        if any(rival.reads.startswith("uncertainty/") for rival in self.rivals.values()):
+            outcomes, *seconds = evaluate_design("observed", described, source, self.seed, self.uncertainty)
+            described = outcomes.attach_to(described, *seconds)
+        return described_for(self.rivals, described)
+
+    def _explained(
+        self,
+        control: str,
+        learnt: Registrations,
+        tests: Mapping[tuple[str, str], Registrations],
+        rivals: Mapping[str, Rival],
+    ) -> Iterator[pd.DataFrame]:
+        """Yield what each explainer says of the test samples after learning from the training samples."""
+        for train, asked in self._lessons(control, learnt.subset(learnt.rows("train")), tests):
+            for name, rival in rivals.items():
+                explainer = rival.make()
+                if control in RELABELLED and getattr(explainer, "trained_with_encoder", False):
+                    continue
+                with self.costs.learning(control, name):
+                    explainer.fit(train)
+                for of_test, test in asked.items():
+                    attribution = explainer.explain(test.without_labels())
+                    self.costs.explained(of_test[0], name, attribution.seconds_N)
+                    frame = prediction_frame(test, attribution)
+                    for place, entry in enumerate(zip(LABELS, (*of_test, name), strict=True)):
+                        frame.insert(place, *entry)
+                    yield frame
+
+    def _lessons(
+        self, control: str, train: Registrations, tests: Mapping[tuple[str, str], Registrations]
+    ) -> Iterator[tuple[Registrations, Mapping[tuple[str, str], Registrations]]]:
+        """Yield training samples, and the test samples that are asked of what has learned from them.
+
+        Labels that say nothing make an explainer name a whole cluster of samples by chance. So they are shuffled in
+        parts, of which each is learned from alone and asked about a part of the test samples.
+        """
+        if control not in RELABELLED:
+            yield train, tests
+        elif control != "shuffled":
+            yield relabelled(control, train, self.source, self.seed), tests
+        else:
+            parts = max(1, min(PARTS, len(train) // FEWEST_OF_PART))
+            for part in range(parts):
+                of_part = relabelled(control, _dealt(train, part, parts), self.source, self.seed, part)
+                yield of_part, {name: _dealt(test, part, parts) for name, test in tests.items()}
+
+
+def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Registrations:
+    return reduce(lambda found, embed: embed(found), embeds.values(), registrations)
+
+
+def _dealt(registrations: Registrations, part: int, parts: int) -> Registrations:
+    """Return one part of the samples, which are dealt out in threes: one object under every concept."""
+    return registrations.subset(np.flatnonzero(np.arange(len(registrations)) // len(CONCEPTS) % parts == part))

@@ -1,0 +1,102 @@
+"""How severe each perturbation was, whether its registration succeeded, and what explainers make of it, in bins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.metrics import source_method_seed
+from gpca.errors import InputError
+from gpca.experiments.controls.judged import read_controls
+from gpca.experiments.controls.samples import OF_CONCEPT, read_samples
+from gpca.experiments.controls.settings import PAPER
+from gpca.io.csv_file import read_numbers
+from gpca.pairs.perturbation import Severities
+from gpca.pairs.synthesis import RegistrationSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+REGISTRATION = "registration"  # in the place of an explainer: the share of registrations that succeed
+ROUNDED = 1e-5  # files have six decimals
+COLUMNS = ("concept", "method", "low", "high", "other_low", "other_high", "samples", "value")
+
+
+def collect(
+    prediction_files: Iterable[str | Path],
+    sample_files: Iterable[str | Path],
+    severities: dict[str, list[float]],
+    bins: int,
+    success: float,
+) -> pd.DataFrame:
+    """Return accuracy of every explainer and the share of registrations that succeed, by severity, over all sources.
+
+    Args:
+        prediction_files, sample_files: named ``…/{source}/seed{seed}.csv``.
+        severities: range of each, as the config has them.
+        bins: of each range, equally wide; those of pose have two ranges, rotation and translation.
+        success: error below which a registration has succeeded.
+
+    Raises:
+        InputError: an unusable file, a severity outside its range, a test sample without severities.
+    """
+    import pandas as pd
+
+    ranges = RegistrationSettings.from_dict({"severities": severities}).severities
+    judged = read_controls(prediction_files)
+    judged = judged[judged["control"] == PAPER]
+    samples = []
+    for path in sample_files:
+        _, source, seed = source_method_seed(path)
+        own = read_samples(path).assign(source=source, seed=seed)
+        samples.append(_with_bins(path, own, ranges, bins))
+    table = pd.concat(samples, ignore_index=True)
+    found = judged.merge(table, on=["source", "seed", "sample"], suffixes=("", "_of_sample"), validate="many_to_one")
+    if len(found) != len(judged):
+        raise InputError("samples of the controls", "lack test samples of the predictions", "regenerate both")
+    outcomes = table.assign(explainer=REGISTRATION, right=table["error"] < success)
+    everything = pd.concat([outcomes, found[outcomes.columns]])
+    records = []
+    for concept, names in OF_CONCEPT.items():
+        of_concept = everything[everything["concept"] == concept]
+        for (method, *places), rows in of_concept.groupby(["explainer", *map(_bin, names)], sort=False):
+            edges = [_edges(ranges, name, bins)[i : i + 2] for name, i in zip(names, places, strict=True)]
+            bounds = np.concatenate([*edges, [np.nan] * 2])[:4]
+            records.append((concept, method, *bounds, len(rows), float(rows["right"].mean())))
+    found = pd.DataFrame(records, columns=list(COLUMNS))
+    return found.sort_values(list(COLUMNS[:6]), kind="stable", ignore_index=True)
+
+
+def read_severities(path: str | Path) -> pd.DataFrame:
+    """Read what :func:`collect` returned; only pose has bounds of a second severity, its translation.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
+    """
+    return read_numbers(path, COLUMNS, COLUMNS[2:], optional=("other_low", "other_high"))
+
+
+def _edges(ranges: Severities, name: str, bins: int) -> np.ndarray:
+    low, high = getattr(ranges, name)
+    return np.linspace(low, high, bins + 1)
+
+
+def _bin(severity: str) -> str:
+    return f"bin_{severity}"
+
+
+def _with_bins(path, samples: pd.DataFrame, ranges: Severities, bins: int) -> pd.DataFrame:
+    """Return the samples with the number of the bin of each severity; 0 where it was not applied."""
+    for concept, names in OF_CONCEPT.items():
+        for name in names:
+            edges = _edges(ranges, name, bins)
+            applied = samples["concept"] == concept
+            outside = samples[name][applied & ~samples[name].between(edges[0] - ROUNDED, edges[-1] + ROUNDED)]
+            if len(outside):
+                fault = f"'{name}' contains {outside.iloc[0]:g}, outside its bins from {edges[0]:g} to {edges[-1]:g}"
+                raise InputError(path, fault, "regenerate it from the same config")
+            samples[_bin(name)] = np.clip(np.searchsorted(edges, samples[name], side="right") - 1, 0, bins - 1)
+    return samples

@@ -1,0 +1,168 @@
+"""Makes Table X: every explainer where a shortcut is closed, and from each source to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import TYPE_CHECKING
+
+from gpca.attribution.confidence import REPEATS
+from gpca.experiments.controls.settings import PAPER, TRANSFER, UNSEEN, WRONG_LABELS
+from gpca.experiments.diagnosis.judged import POOLED
+from gpca.objects.title import stand_in_clause, title_of
+from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where, span
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TITLES = {
+    PAPER: "Paper's protocol (%)",
+    "density": "Matched density",
+    UNSEEN: "Unseen objects",
+    TRANSFER: "Other sources",
+    "reversed": "ICP reversed",
+    **{name: f"{100 * share:g} % wrong labels" for name, share in WRONG_LABELS.items()},
+    "shuffled": "Shuffled labels",
+}
+CHANGE = "_change"  # behind a control's name: the key of the column of its differences
+WRONG = "_wrong"  # behind the key of an AUROC: the column of the answers that it has to find
+BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
+ALL_TOGETHER = (POOLED, "All together")
+
+
+def table10_controls(
+    intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str], controls: Sequence[str]
+) -> Table:
+    """Return accuracy under every control with its change against the paper's protocol, pooled and by source.
+
+    Args:
+        intervals: What :func:`gpca.experiments.controls.intervals.collect` returned.
+        sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+        explainers: The title of each name, in order.
+        controls: The names of those that were run.
+
+    Raises:
+        InputError: The intervals hold none of these.
+    """
+    table = TableBuilder("table10_controls", {"source": "Dataset", "explainer": "Explainer"})
+    names = [PAPER, *(name for name in TITLES if name in controls)]
+    for source, title in (ALL_TOGETHER, *((name, title_of(entry)) for name, entry in sources.items())):
+        for explainer, words in explainers.items():
+            rows = rows_where(intervals, source=source, method=explainer)
+            table.add_row([(source, title), (explainer, words)], _cells(rows, source, names))
+    table.require_rows("intervals", "have no controls", "run their explainers first")
+    table.compare_down([name for name in names if name != "shuffled"], same=1)
+    columns = {name: Column(TITLES[name], interval=False) for name in names}
+    columns |= {
+        name + CHANGE: Column(f"{TITLES[name]}: change", limits=(-100.0, 100.0), beside=name) for name in names[1:]
+    }
+    for name, words in _AUROCS.items() if UNSEEN in names else ():
+        key = f"{name}_auroc"
+        columns[key] = Column(words, 2, False, (0.0, 1.0))
+        columns[key + WRONG] = OfSamples(f"{words}: wrong", 0, False, (0.0, inf), beside=key)
+    return table.build(
+        caption="Accuracy (%) of single-concept attribution with a shortcut closed (change in brackets)"
+        + stand_in_clause(sources.values()),
+        column_head="control",
+        columns=columns,
+        footnotes=(
+            f"{_seeds_of(table, names)} In brackets: points gained or lost against the paper's protocol, and "
+            f"{BOOTSTRAP}. The change is paired: it is taken over the seeds and objects that the control has, so that "
+            "it differs from the difference of the two levels where the control has fewer seeds. Bold: best of a "
+            "dataset under a control.",
+            "Matched density: every cloud has a random number of points, in training and test. Unseen objects: encoder "
+            "and explainer learned from other objects. Other sources: they learned from one other source. Wrong "
+            "labels: among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
+            "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
+            "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
+            "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "
+            "encoder and learns no labels, and a source that does not admit a control.",
+        ),
+    )
+
+
+_AUROCS = {PAPER: "AUROC, paper's", UNSEEN: "AUROC, unseen"}
+
+
+@dataclass(frozen=True)
+class OfSamples(Column):
+    """Shows a number of test samples, and of how many."""
+
+    def text(self, cell: Cell) -> str:
+        """Return e.g. ``24 of 1800``."""
+        return f"{cell.mean:.0f} of {cell.test_samples}"
+
+
+def _seeds_of(table: TableBuilder, names: Sequence[str]) -> str:
+    """Return over how many seeds the paper's protocol is, and which controls are over others."""
+    of = {name: [cell.seeds for (_, key), cell in table.cells.items() if key == name] for name in names}
+    seeds = {name: span(numbers) for name, numbers in of.items() if numbers}
+    usual = seeds.pop(PAPER, str(table.most_seeds()))
+    others = [f"{TITLES[name]}: {plural(number, 'seed')}" for name, number in seeds.items() if number != usual]
+    return f"Over {plural(usual, 'seed')}" + (f" ({', '.join(others)})." if others else ".")
+
+
+def _cells(rows: pd.DataFrame, source: str, names: Sequence[str]) -> dict[str, Cell | None]:
+    cells: dict[str, Cell | None] = {}
+    for name in names:
+        trained_on = POOLED if name == TRANSFER else source
+        of_control = rows_where(rows, control=name, trained_on=trained_on).set_index("metric")
+        if "accuracy" not in of_control.index:
+            continue
+        accuracy = of_control.loc["accuracy"]
+        cells[name] = cell_of(accuracy)
+        cells[name + CHANGE] = cell_of(accuracy, "change") if name != PAPER else None
+        if name in _AUROCS and "auroc_error" in of_control.index:
+            key, samples = f"{name}_auroc", int(accuracy["samples"])
+            cells[key] = cell_of(of_control.loc["auroc_error"], scale=1)
+            cells[key + WRONG] = plain_cell(round((1 - accuracy["value"]) * samples), int(accuracy["seeds"]), samples)
+    return cells
+
+
+def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
+    """Return the accuracy of every explainer (rows, by the source that it learned from) on each source (columns).
+
+    Args:
+        intervals, sources, explainers: As of :func:`table10_controls`.
+
+    Raises:
+        InputError: The intervals hold none of these.
+    """
+    table = TableBuilder("table10_transfer", {"explainer": "Explainer", "trained_on": "Learned from"})
+    titles = {name: title_of(entry) for name, entry in sources.items()}
+    accuracy = rows_where(intervals, metric="accuracy")
+    for explainer, words in explainers.items():
+        of_explainer = rows_where(accuracy, method=explainer)
+        for trained_on, title in titles.items():
+            cells: dict[str, Cell | None] = {}
+            for tested in titles:
+                control = PAPER if tested == trained_on else TRANSFER
+                found = rows_where(of_explainer, control=control, source=tested, trained_on=trained_on)
+                cells[tested] = cell_of(found.iloc[0]) if len(found) else None
+            table.add_row([(explainer, words), (trained_on, title)], cells)
+        elsewhere = rows_where(of_explainer, control=TRANSFER, trained_on=POOLED).set_index("source")
+        cells = {name: cell_of(elsewhere.loc[name]) for name in (*titles, POOLED) if name in elsewhere.index}
+        table.add_row([(explainer, words), (POOLED, "another (mean)")], cells)
+    table.require_rows("intervals", "have no transfer", "run the controls of two sources first")
+    return table.build(
+        caption="Accuracy (%) from each source to each other" + stand_in_clause(sources.values()),
+        column_head="tested",
+        columns={**{name: Column(f"on {title}") for name, title in titles.items()}, POOLED: Column("mean")},
+        footnotes=(
+            "Encoder and explainer learned from one source and are asked about the test samples of another; what they "
+            f"learned from is the paper's protocol. Over {plural(table.most_seeds(), 'seed')}; in brackets "
+            f"{BOOTSTRAP}.",
+        ),
+    )
+
+
+def cell_of(row: pd.Series, value: str = "value", scale: float = 100) -> Cell:
+    """Return a value, or the change, of a row of the intervals, in percent; without an interval where it has none."""
+    prefix = "change_" if value == "change" else ""
+    bounds = (scale * row[f"{prefix}low"], scale * row[f"{prefix}high"])
+    known = bounds if all(map(isfinite, bounds)) else None
+    half_width = (bounds[1] - bounds[0]) / 2
+    return Cell(scale * row[value], half_width, int(row["seeds"]), int(row["samples"]), bounds=known)

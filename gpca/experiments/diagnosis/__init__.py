@@ -1,0 +1,1 @@
+"""How well explainers name the measured causes of failed registrations (Table IX)."""

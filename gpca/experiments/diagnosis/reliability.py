@@ -1,0 +1,99 @@
+"""Draws whether a probability is to be believed: how often what it was given to came true."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.errors import InputError
+from gpca.experiments.diagnosis.judged import Judged
+from gpca.experiments.diagnosis.measures import BINS as BINS_OF_NOMINAL
+from gpca.reporting.figures.panels import finish_panels, small_panels
+from gpca.reporting.figures.style import BLUE, GREY, LIGHT_GREY, SMALL_PT
+
+FEWEST = 5  # A bin with fewer samples has no point.
+HEADROOM = 2.0  # The axis of the numbers is so many times as high as the highest bar, on its scale.
+
+
+def draw_nominal_reliability(
+    judged: Mapping[tuple[str, str, int], Judged],
+    sources: Mapping[str, str],
+    explainers: Mapping[str, str],
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw the share of nominal registrations over the score of "nominal", all sources and seeds together.
+
+    Args:
+        judged: what :func:`gpca.experiments.diagnosis.judged.read_judged` returns; borderline samples are left out.
+        sources: the title of each source, in order.
+        explainers: the title of each explainer, in order; those without predictions are left out.
+        pdf_path: the figure.
+        png_path: the same figure.
+
+    Raises:
+        InputError: no predictions of these sources and explainers.
+    """
+    parts = {
+        name: [samples for (source, own, _), samples in judged.items() if own == name and source in sources]
+        for name in explainers
+    }
+    shown = [name for name in explainers if parts[name]]
+    if not shown:
+        raise InputError("diagnoses", "have no predictions of these sources and explainers", "run them first")
+    figure, panels = small_panels(len(shown), panel_height_in=1.85)
+    for panel, name in zip(panels, shown, strict=True):
+        label_S = np.concatenate([samples.label for samples in parts[name]])
+        score_S = np.concatenate([samples.nominal for samples in parts[name]])
+        clear_S = label_S != BORDERLINE
+        came_true_S = label_S[clear_S] == NOMINAL
+        gap = draw_reliability_panel(panel, score_S[clear_S], came_true_S, BINS_OF_NOMINAL, "share that is nominal")
+        panel.set_title(f"{explainers[name]}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
+    handles, labels = panels[0].get_legend_handles_labels()
+    drawn = {source for source, own, _ in judged if own in shown}
+    title = ", ".join(title for name, title in sources.items() if name in drawn)
+    finish_panels(figure, panels, title, handles, labels, 'score of "nominal"', "share", pdf_path, png_path)
+
+
+def draw_reliability_panel(
+    panel, probability_S: np.ndarray, true_S: np.ndarray, bins: int, label: str = "accuracy"
+) -> float:
+    """Draw in each bin the share that came true, and the number of samples; return the expected calibration error.
+
+    The panel is square, and its diagonal calibrated. The numbers are bars with an axis of their own at the right.
+
+    Args:
+        panel: axes of matplotlib.
+        probability_S: of S samples, between 0 and 1.
+        true_S: whether each came true.
+        bins: how many, of equal width.
+        label: of the curve, in the legend.
+    """
+    bin_S = np.minimum((probability_S * bins).astype(int), bins - 1)
+    counts_B = np.bincount(bin_S, minlength=bins)
+    drawn = counts_B >= FEWEST
+    true_B = np.bincount(bin_S, weights=true_S, minlength=bins)[drawn] / counts_B[drawn]
+    mean_B = np.bincount(bin_S, weights=probability_S, minlength=bins)[drawn] / counts_B[drawn]
+    centres_B = (np.arange(bins) + 0.5) / bins
+    counts = panel.twinx()
+    counts.bar(centres_B, counts_B, width=1 / bins, color=LIGHT_GREY)
+    counts.set_yscale("log")
+    most = 10 ** np.ceil(np.log10(counts_B.max()))
+    counts.set_ylim(0.8, 0.8 * (most / 0.8) ** HEADROOM)
+    counts.set_yticks([10**power for power in range(int(np.log10(most)) + 1)])
+    counts.yaxis.set_major_formatter("{x:g}")
+    counts.minorticks_off()
+    counts.tick_params(colors=GREY, length=2, pad=1)
+    counts.set_zorder(panel.get_zorder() - 1)
+    panel.patch.set_visible(False)
+    panel.bar(0.5, 0, color=LIGHT_GREY, label="samples (right axis)")
+    panel.plot([0, 1], [0, 1], color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
+    panel.plot(mean_B, true_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, label=label)
+    panel.set(xlim=(0, 1.02), ylim=(0, 1.02), box_aspect=1)
+    counts.set_box_aspect(1)
+    panel.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+    panel.set_yticks([0, 0.5, 1], ["0", "0.5", "1"])
+    return float(np.abs(np.bincount(bin_S, weights=probability_S - true_S, minlength=bins)).sum() / len(true_S))

@@ -1,0 +1,76 @@
+"""Step ``diagnose``: one explainer of causes on all seeds of a source -> its predictions."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from baselines.registry import CAUSES, explainer_entry, require_settings
+from gpca.attribution.predictions import read_timings, write_predictions, write_timings
+from gpca.causes.dataset import Causes
+from gpca.causes.labels import labelled
+from gpca.causes.truth import BORDERLINE
+from gpca.errors import InputError
+from gpca.explainers.interface import ExplainerEntry
+from gpca.features.dataset import Descriptors
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.process.arguments import SEED, per_seed
+from gpca.process.provenance import record_provenance
+from gpca.settings import check_settings
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names, one of each per seed; ``--settings`` are the explainer's in the config."""
+    parser.add_argument("--explainer", required=True)
+    parser.add_argument("--source", required=True)
+    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
+    parser.add_argument("--causes", required=True, type=Path, nargs="+")
+    parser.add_argument(
+        "--read", required=True, type=Path, nargs="+", help="the descriptors or embeddings that the explainer reads"
+    )
+    parser.add_argument("--read-timings", required=True, type=Path, nargs="+", help="CSVs of the time spent on these")
+    parser.add_argument("--predictions", required=True, type=Path, nargs="+")
+    parser.add_argument("--timings", required=True, type=Path, nargs="+")
+
+
+def run(options: Namespace) -> None:
+    """Fit on the training rows that have a label and explain every row, seed by seed."""
+    require_settings(options.explainer, options.settings, CAUSES)
+    check_settings(options.settings, "diagnosis", "explainers", options.explainer)
+    entry = explainer_entry(options.explainer, CAUSES)
+    files = ("causes", "read", "read_timings", "predictions", "timings")
+    for seed, causes_file, read, read_timing, predictions, timings in per_seed(options, *files):
+        explainer = entry.make(options.source, seed, **options.settings)
+        inputs = [causes_file, read, read_timing]
+        with record_provenance([predictions, timings], inputs, options.settings, seed=seed):
+            causes = Causes.load(causes_file, (options.source, seed))
+            registrations = with_what_it_reads(labelled(causes), entry, read)
+            seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
+            explainer.fit(registrations.subset(training_rows(registrations, causes_file)))
+            attribution = explainer.explain(observed_only(registrations))
+            write_predictions(predictions, causes.registrations, attribution)
+            write_timings(timings, registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
+
+
+def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
+    rows = np.flatnonzero((registrations.split == "train") & (registrations.concept != BORDERLINE))
+    if not len(rows):
+        raise InputError(path, "has no training samples with a label", "raise causes.train")
+    return rows
+
+
+def observed_only(registrations: Registrations) -> Registrations:
+    """Return the registrations without anything that tells what is wrong with them."""
+    hidden = registrations.without_labels()
+    return replace(hidden, attached={name: array for name, array in hidden.attached.items() if name != "causes"})
+
+
+def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path: Path) -> Registrations:
+    if entry.reads == "embeddings":
+        read = read_embedding(path, registrations, logits=True)
+    else:
+        read = dict(Descriptors.load(path, registrations).groups)
+    return replace(registrations, attached={**registrations.attached, **read})

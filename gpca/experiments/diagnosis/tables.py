@@ -1,0 +1,162 @@
+"""Makes Tables IX: how well explainers say whether a registration failed, and why, by the measured truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+from typing import TYPE_CHECKING
+
+from gpca.attribution.confidence import REPEATS
+from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.errors import InputError
+from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH
+from gpca.frames.source import REAL_WORLD
+from gpca.objects.title import title_of
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SHOWN = {
+    "balanced_accuracy": Column("Balanced (%)"),
+    "lead": Column("Lead (points)", limits=(-100.0, 100.0)),
+    "dominant_accuracy": Column("Dominant (%)"),
+    "false_alarm_rate": Column("False alarms (%)", least_is_best=True),
+    "auroc_failed": Column("AUROC", decimals=3, limits=(0.0, 1.0)),
+    "average_precision": Column("mAP (%)", interval=False),
+    "spearman_attribution": Column("Spearman", decimals=2, interval=False, limits=(-1.0, 1.0)),
+    "deletion_gain": Column("Deletion (%)", interval=False),
+    "nominal_calibration": Column("ECE (share)", 3, False, (0.0, 1.0), least_is_best=True),
+    "samples": Column("n", decimals=0, interval=False, limits=(0.0, inf)),
+}
+SHOWN_OF_FRAMES = {
+    STATE: Column("State (%)"),
+    **{key: SHOWN[key] for key in ("dominant_accuracy", "false_alarm_rate", "auroc_failed", "average_precision")},
+    **{key: SHOWN[key] for key in ("spearman_attribution", "deletion_gain", "nominal_calibration", "samples")},
+}
+_SHARES = (  # These are printed in %.
+    STATE,
+    *("balanced_accuracy", "dominant_accuracy", "false_alarm_rate", "average_precision", "deletion_gain"),
+)
+
+
+def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
+    """Return every measure of every explainer, by source and pooled, the ceiling last.
+
+    Args:
+        intervals: What :func:`gpca.experiments.diagnosis.intervals.collect` returned.
+        sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+        explainers: The title of each name, in order.
+
+    Raises:
+        InputError: The intervals hold none of these.
+    """
+    stand_ins = any(entry["stand_in"] for entry in sources.values())
+    titles = {name: title_of(entry) for name, entry in sources.items()} | {POOLED: "All together"}
+    table = TableBuilder("table9_causes", {"source": "Dataset", "explainer": "Explainer"})
+    for source, title in titles.items():
+        for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
+            rows = rows_where(intervals, source=source, method=explainer).set_index("metric")
+            table.add_row([(source, title), (explainer, words)], _cells(rows, SHOWN), rival=explainer != CEILING)
+    table.require_rows("intervals", "have no diagnosis", "run its explainers first")
+    table.compare_down([key for key in SHOWN if key not in ("lead", "samples")], same=1)
+    return table.build(
+        caption="What is wrong with a registration, if anything: objects that no explainer was trained on"
+        + (", procedural stand-ins among them" if stand_ins else ""),
+        column_head="metric",
+        columns=SHOWN,
+        footnotes=(
+            f"n: test samples that are judged, over {plural(table.most_seeds(), 'seed')}; borderline ones are left "
+            f"out. Of them, {_parts(intervals, titles)}. In brackets: the 95 % interval of a bootstrap over objects "
+            f"and seeds ({REPEATS} draws). Bold: best explainer on a dataset.",
+            "Balanced: mean share named rightly of nominal and of the three dominant causes. Lead: balanced accuracy "
+            "minus that of the best other explainer, on the same draws: it wins where the interval is above 0. "
+            "Dominant: of the failed, the share whose main cause has the highest score among the causes.",
+            "False alarms: share of the nominal above the alarm that finds 90 % of the failed. AUROC: of failed "
+            "against nominal. mAP: mean average precision of the sets of causes. Spearman: of scores and measured "
+            "attributions of the failed. Deletion: share of a failed sample's error that goes with the cause named "
+            "first. ECE: expected calibration error of the score of nominal.",
+            "Gates only say whether something is wrong. The ceiling is the truth measured again from other starts.",
+        ),
+    )
+
+
+def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[str, str]) -> Table:
+    """Return what explainers that learned from simulated causes say of those measured in frames, the ceiling last.
+
+    Args:
+        intervals: What :func:`gpca.experiments.frame_causes.metrics.collect` returned.
+        frames: The ``{"title": str, "stand_in": bool}`` of the frames.
+        explainers: The title of each name, in order.
+
+    Raises:
+        InputError: The intervals hold none of these.
+    """
+    of_frames = rows_where(intervals, source=REAL_WORLD)
+    table = TableBuilder("table9_frames", {"explainer": "Explainer"})
+    for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
+        rows = rows_where(of_frames, method=explainer).set_index("metric")
+        table.add_row([(explainer, words)], _cells(rows, SHOWN_OF_FRAMES), rival=explainer != CEILING)
+    counted = rows_where(of_frames, method=TRUTH).set_index("metric")
+    if counted.empty or not table.rows:
+        raise InputError("intervals", "have no diagnosis of frames", "run the step frame_causes first")
+    table.compare_down([key for key in SHOWN_OF_FRAMES if key != "samples"])
+    of = {kind: int(counted["value"][f"count_{kind}"]) for kind in KINDS}
+    failed = {concept: of[concept] for concept in CONCEPTS}
+    total = sum(failed.values())
+    most = max(failed, key=lambda concept: failed[concept])
+    return table.build(
+        caption=f"What is wrong with registrations of depth frames: {title_of(frames)}; learned from simulated causes",
+        column_head="metric",
+        columns=SHOWN_OF_FRAMES,
+        footnotes=(
+            f"Of {counted['samples'].iloc[0]:.0f} registrations {of[NOMINAL]} are nominal, {of[BORDERLINE]} "
+            f"borderline, and {total} failed: {_list_of(failed)}. {of[GEOMETRY]} more are off without a cause. Always "
+            f"naming {most} would be right for {100 * failed[most] / max(1, total):.0f} % of the failed.",
+            "n: the nominal and the failed together, which are judged. False alarms are a share of the "
+            f"{of[NOMINAL]} nominal; Dominant, Spearman and Deletion are over the {total} failed.",
+            f"In brackets: the 95 % interval of {REPEATS} bootstrap draws over {plural(of['scenes'], 'scene')}, "
+            f"{plural(of['objects'], 'object')} and {plural(table.most_seeds(), 'seed')}. Bold: best of a column.",
+            "State: mean share of the nominal and of the failed that is called so. The others as in Table IX.",
+        ),
+    )
+
+
+def _parts(intervals: pd.DataFrame, titles: Mapping[str, str]) -> str:
+    """Return how many samples of each source are nominal and how many failed, in words."""
+    told = {}
+    for source, title in titles.items():
+        samples = rows_where(intervals, source=source).groupby("metric")["samples"].max()
+        nominal, judged = samples.get("false_alarm_rate"), samples.max()
+        if source != POOLED and nominal is not None:
+            told[title] = f"{nominal:.0f} are nominal and {judged - nominal:.0f} failed"
+    if len(told) > 1 and len(set(told.values())) == 1:
+        return f"{next(iter(told.values()))} on each dataset"
+    return "; ".join(f"{words} on {title}" for title, words in told.items())
+
+
+def _list_of(failed: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} mostly by {concept}" for concept, count in failed.items())
+
+
+def _cells(rows: pd.DataFrame, shown: Mapping[str, Column]) -> dict[str, Cell | None]:
+    """Return the cells of one source and explainer, from rows whose index is the metric."""
+    cells: dict[str, Cell | None] = {}
+    for metric in (name for name in shown if name in rows.index):
+        row, scale = rows.loc[metric], 100 if metric in _SHARES else 1
+        cells[metric] = _cell(row, "value", "low", "high", scale)
+        if metric == "balanced_accuracy" and row["rival"] and "lead" in shown:
+            cells["lead"] = _cell(row, "difference", "difference_low", "difference_high", scale)
+    if len(rows):
+        judged = rows["samples"].max()
+        cells["samples"] = plain_cell(judged, int(rows["seeds"].iloc[0]), int(judged))
+    return cells
+
+
+def _cell(row: pd.Series, value: str, low: str, high: str, scale: float) -> Cell:
+    bounds = (scale * row[low], scale * row[high])
+    return Cell(scale * row[value], (bounds[1] - bounds[0]) / 2, int(row["seeds"]), int(row["samples"]), bounds=bounds)

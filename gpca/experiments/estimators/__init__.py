@@ -1,0 +1,1 @@
+"""Estimators of a pose's covariance side by side on the same pairs (Table XII)."""

@@ -1,0 +1,111 @@
+"""The files of what estimators say: a row per registration, and the reference's results, which a figure shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.metrics import source_method_seed
+from gpca.errors import InputError
+from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.axes import Axes
+from gpca.io.csv_file import numbers, read_csv
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+REFERENCE = "reference"  # Monte-Carlo from many starts, which has rows of its own among the estimators
+MADE_BY = "python -m gpca estimate"
+SIXTH = np.triu_indices(6)
+# Upper triangle of Σ, row by row, in squared milliradians and thousandths of the diameter.
+COVARIANCE = tuple(f"covariance_{i + 1}{j + 1}" for i, j in zip(*SIXTH, strict=True))
+MILLI = 1e3
+KNOWN = ("sample", "object", "method", "add_relative", "failed", "failure")
+JUDGED = ("kl_rotation", "kl_translation", "error_ratio", "mahalanobis", "spread")
+
+
+def covariance_columns(covariance_6_6: np.ndarray | None) -> dict[str, float]:
+    """Return the columns of a covariance in radians and diameters; NaN without one."""
+    values = np.full(len(COVARIANCE), np.nan) if covariance_6_6 is None else MILLI**2 * covariance_6_6[SIXTH]
+    return dict(zip(COVARIANCE, values.tolist(), strict=True))
+
+
+def covariance_of(row: pd.Series) -> np.ndarray:
+    """Return Σ (6, 6) of a row, in radians and diameters."""
+    upper_6_6 = np.zeros((6, 6))
+    upper_6_6[SIXTH] = row[list(COVARIANCE)].to_numpy(dtype=float) / MILLI**2
+    return upper_6_6 + np.triu(upper_6_6, 1).T
+
+
+def read_estimates(path: str | Path) -> pd.DataFrame:
+    """Read a file of the step ``estimate``: `failed` as booleans, numbers as numbers, NaN where an estimate failed."""
+    rows = read_csv(path, (*KNOWN, *JUDGED, *COVARIANCE))
+    rows["add_relative"] = numbers(path, rows, "add_relative", least=0)
+    told = rows["failure"] == ""
+    for name in JUDGED:
+        # Where the reference itself has none, no estimate diverges from it by any number.
+        rows[name] = numbers(path, rows, name, needed=told & (rows[name] != ""), least=0)
+    for name in COVARIANCE:
+        rows[name] = numbers(path, rows, name, needed=told)
+    if not rows["failed"].isin(("True", "False")).all():
+        raise InputError(
+            path, "column 'failed' contains values other than True and False", f"regenerate it with '{MADE_BY}'"
+        )
+    rows["failed"] = rows["failed"] == "True"
+    return rows
+
+
+def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], pd.DataFrame]:
+    """Return the rows of files named `…/{source}/{estimator}/seed{seed}.csv` by these three."""
+    return {source_method_seed(path): read_estimates(path) for path in files}
+
+
+@dataclass(frozen=True)
+class ReferenceSamples:
+    """The results of the reference for S registrations, as twists about the pose, in radians and diameters.
+
+    Attributes:
+        sample, method: (S,) which registration.
+        twists: (ΣN, 6) float32, those of registration i are ``twists[offsets[i]:offsets[i + 1]]``.
+        true_twist: (S, 6) of the true pose.
+    """
+
+    sample: np.ndarray
+    method: np.ndarray
+    twists: np.ndarray
+    offsets: np.ndarray
+    true_twist: np.ndarray
+
+    def twists_of(self, i: int) -> np.ndarray:
+        """Return the twists (N, 6) of a row."""
+        return self.twists[self.offsets[i] : self.offsets[i + 1]].astype(np.float64)
+
+    def save(self, path: str | Path, axes: Axes) -> None:
+        """Write the npz described in results/README.md; `axes` are the source and the seed."""
+        save_arrays(path, vars(self), axes)
+
+    @classmethod
+    def load(cls, path: str | Path) -> ReferenceSamples:
+        """Read the npz.
+
+        Raises:
+            InputError: the file is missing, damaged, or holds wrong shapes or NaN.
+        """
+        shapes: dict[str, tuple[int | str, ...]] = {
+            **{"sample": ("S",), "method": ("S",), "twists": ("N", 6), "offsets": ("O",), "true_twist": ("S", 6)}
+        }
+        kinds = {"sample": WHOLE, "method": TEXT, "twists": REAL, "offsets": WHOLE, "true_twist": REAL}
+        arrays = load_arrays(path, shapes, MADE_BY, kinds)
+        offsets = arrays["offsets"]
+        ends = (0, len(arrays["twists"]))
+        if (
+            len(offsets) != len(arrays["sample"]) + 1
+            or (offsets[0], offsets[-1]) != ends
+            or (np.diff(offsets) < 0).any()
+        ):
+            raise InputError(path, "'offsets' do not match 'twists' and 'sample'", f"regenerate it with '{MADE_BY}'")
+        return cls(**arrays)

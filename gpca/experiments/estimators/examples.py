@@ -1,0 +1,73 @@
+"""What estimators that learn are given of a registration: descriptors, results of a few starts, the true twist."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from gpca.alignment.methods.interface import Outcome, Pair
+from gpca.alignment.rigid import inverse, rigid_motion, transform
+from gpca.alignment.twist import log
+from gpca.experiments.judge import Judge
+from gpca.features.distances import describe_distances
+from gpca.features.entropy import describe_entropy
+from gpca.features.pair import ObservedPair
+from gpca.objects.symmetry import symmetric_turn
+from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair, intrinsic_frame
+from gpca.uncertainty.estimators.monte_carlo import sample
+
+Moved = Literal["model", "observed"]  # which cloud the source is
+
+
+def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
+    """Return the descriptors (F,) that need no further registration: distances, local planes, entropy.
+
+    Args:
+        pair: what was registered.
+        outcome: where its source ended.
+        moved: which cloud the source is.
+    """
+    if moved == "model":
+        observed, model = transform(inverse(outcome.T_target_source), pair.target), pair.source
+    else:
+        observed, model = transform(outcome.T_target_source, pair.source), pair.target
+    shown = ObservedPair(
+        observed=observed,
+        model=model,
+        T_init=np.eye(4),
+        T_runs=np.eye(4)[None],
+        fitness_n=np.array([outcome.fitness]),
+        inlier_rmse_n=np.array([outcome.inlier_rmse]),
+        axes=(),
+    )
+    return np.concatenate([*describe_distances(shown), describe_entropy(shown)])
+
+
+def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved) -> np.ndarray:
+    """Return the twist (6,) of the true pose about that of the registration, the symmetric one that is nearest.
+
+    Symmetries are turns of the model: before the pose where the model moves, after it where it is the target.
+    """
+    T_found = registered.T_target_source
+    if moved == "model":
+        turn = rigid_motion(symmetric_turn(T_found[:3, :3].T @ T_true[:3, :3], judge.symmetries))
+        return log((T_true @ turn @ inverse(T_found))[None])[0]
+    turn = rigid_motion(symmetric_turn(T_true[:3, :3] @ T_found[:3, :3].T, judge.symmetries))
+    return log((turn @ T_true @ inverse(T_found))[None])[0]
+
+
+def example(
+    registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved, starts: int, *axes: object
+) -> Example:
+    """Return a training registration with the results of a few starts, all at the pose where there are none."""
+    try:
+        twists_n_6 = sample(registered, starts, *axes, "examples")
+    except FailedEstimate:
+        twists_n_6 = np.zeros((starts, 6))
+    return Example(
+        describe(registered.pair, registered.outcome, moved),
+        twists_n_6,
+        true_twist(registered, T_true, judge, moved),
+        intrinsic_frame(registered.pair.target),
+    )

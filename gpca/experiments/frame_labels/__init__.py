@@ -1,0 +1,1 @@
+"""A new concept on depth frames from few labels (paper Sec. IV-E)."""

@@ -1,0 +1,1 @@
+"""Kernels, learning rates and numbers of iterations (paper Table IV)."""

@@ -1,0 +1,115 @@
+"""Draws accuracy and confidence over iterations by kernel and learning rate, beside what the paper prints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gpca.comparison.published import Number
+from gpca.errors import InputError
+from gpca.experiments.kernel_grid.tables import PRINTED, TITLES
+from gpca.reporting.figures.panels import in_lines
+from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GREY, ORANGE, save_figure, use_style
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLOURS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
+LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # The largest learning rate has the first.
+# Kernels whose curves coincide show beneath each other: the first drawn is the widest.
+WIDTHS = {"matern32": 2.2, "polynomial": 1.0, "rbf": 1.0}
+PRINTED_MARKERS = ("D", "v")  # of what the paper prints for the largest learning rate, and for a smaller one
+BESIDE = dict(zip(COLOURS, (1.15, 1.32, 1.52), strict=True))  # Equal printed numbers would hide one another.
+MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
+
+
+def draw_kernel_curves(
+    grid: pd.DataFrame,
+    sources: Mapping[str, str],
+    numbers: Iterable[Number],
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw means over the seeds; circles are the settings of Table IV, and filled symbols beside them what it prints.
+
+    Args:
+        grid: The frame that :func:`gpca.experiments.kernel_grid.grid.read_grids` returns.
+        sources: The title of each name, in order; those without a grid are left out.
+        numbers: What the paper prints.
+        pdf_path, png_path: The two files to write.
+
+    Raises:
+        InputError: The grid holds none of these sources.
+    """
+    shown = [name for name in sources if (grid["source"] == name).any()]
+    if not shown:
+        raise InputError("kernels", "have no results for these sources", "run them first")
+    plt = use_style()
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import NullLocator
+
+    height_in = 4.05
+    numbers = list(numbers)
+    figure, axes = plt.subplots(
+        len(MEASURES), len(shown), figsize=(COLUMN_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
+    )
+    rates = sorted(grid["learning_rate"].unique(), reverse=True)
+    ticks = sorted(grid["iterations"].unique())
+    for column, source in enumerate(shown):
+        of_source = grid[grid["source"] == source]
+        means = of_source.groupby(["kernel", "learning_rate", "iterations"])[list(MEASURES)].mean()
+        for row, measure in enumerate(MEASURES):
+            panel = axes[row, column]
+            by_kernel = means[measure].groupby(level=["kernel", "learning_rate"])
+            for (kernel, rate), curve in sorted(by_kernel, key=lambda item: list(WIDTHS).index(item[0][0])):
+                iterations = curve.index.get_level_values("iterations")
+                line = LINES[rates.index(rate) % len(LINES)]
+                panel.plot(iterations, 100 * curve, color=COLOURS[kernel], linestyle=line, linewidth=WIDTHS[kernel])
+            for setting in PRINTED:
+                if setting in means.index:
+                    marker = {"color": COLOURS[setting[0]], "markerfacecolor": "white", "markersize": 5}
+                    panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
+            for (kernel, rate, iterations), value in printed_accuracies(numbers, source).items():
+                if measure == "accuracy" and (kernel, rate, iterations) in means.index:
+                    filled = {
+                        "marker": PRINTED_MARKERS[int(rate < rates[0])],
+                        "color": COLOURS[kernel],
+                        "markersize": 3.5,
+                    }
+                    panel.plot(BESIDE[kernel] * iterations, value, linestyle="", clip_on=False, **filled)
+            panel.set_xscale("log")
+            panel.set_xticks(ticks, [f"{tick}" for tick in ticks])
+            panel.xaxis.set_minor_locator(NullLocator())
+            panel.set(xlim=(0.9 * ticks[0], 1.65 * ticks[-1]), ylim=(30, 100))
+        axes[0, column].set_title(in_lines(sources[source]))
+        axes[-1, column].set_xlabel("iterations")
+    for row, label in enumerate(MEASURES.values()):
+        axes[row, 0].set_ylabel(label)
+    handles = [
+        Line2D([], [], color=COLOURS[kernel], linewidth=WIDTHS[kernel], label=TITLES[kernel])
+        for kernel in COLOURS
+        if (grid["kernel"] == kernel).any()
+    ]
+    handles += [
+        Line2D([], [], color=GREY, linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
+        for i, rate in enumerate(rates)
+    ]
+    ours: dict[str, Any] = {"color": GREY, "marker": "o", "markerfacecolor": "white", "linestyle": ""}
+    handles.append(Line2D([], [], label="row of Table IV", **ours))
+    for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False):
+        printed: dict[str, Any] = {"color": GREY, "marker": symbol, "linestyle": "", "markersize": 3.5}
+        handles.append(Line2D([], [], label=f"paper, rate {rate:g}", **printed))
+    figure.legend(handles=handles, ncol=3, loc="lower center", columnspacing=1.2, handlelength=1.8)
+    figure.tight_layout(rect=(0, 0.48 / height_in, 1, 1), pad=0.4, h_pad=0.8)
+    save_figure(figure, pdf_path, png_path)
+
+
+def printed_accuracies(numbers: Iterable[Number], source: str) -> dict[tuple[str, float, int], float]:
+    """Return what Table IV prints for a source, in %, by kernel, learning rate and iterations."""
+    found = {}
+    for number in numbers:
+        if number.table == "IV" and number.counterpart and source in number.counterpart.sources:
+            kernel, rate, iterations = number.counterpart.methods[0].split("-")
+            found[kernel, float(rate), int(iterations)] = number.value
+    return found

@@ -1,0 +1,129 @@
+"""Kernel × learning rate × iterations (paper, Table IV): one fit per kernel and rate, judged on its way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
+from gpca.attribution.metrics import ALL, source_method_seed, tidy
+from gpca.classifier.settings import Draws, Kernel, LearningRate
+from gpca.errors import InputError
+from gpca.io.csv_file import numbers, read_csv, write_csv
+from gpca.settings import Count
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gpca.pairs.dataset import Registrations
+
+MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
+TABLE = "kernels"  # `table` of the tidy rows reads this
+GRID_COLUMNS = ("kernel", "learning_rate", "iterations", *MEASURES)
+
+
+@dataclass(frozen=True)
+class KernelGrid:
+    """What is fitted, and when it is judged.
+
+    Attributes:
+        kernels, learning_rates: every kernel is fitted at every rate.
+        iterations: counts at which the classifier is judged; it is fitted up to the largest.
+        inducing, draws: see :class:`gpca.classifier.gpc.GPCSettings`.
+    """
+
+    kernels: tuple[Kernel, ...] = ("rbf", "matern32", "polynomial")
+    learning_rates: tuple[LearningRate, ...] = (0.01, 0.001)
+    iterations: tuple[Count, ...] = (10, 20, 50, 100, 200)
+    inducing: Count = 64
+    draws: Draws = 1000
+
+
+def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, seed: int) -> pd.DataFrame:
+    """Return the rows of :data:`GRID_COLUMNS`: fitted to the training samples, judged on the test samples.
+
+    Each is what a fit of that many iterations alone would give. `elbo` is per training sample in nats, `confidence`
+    the mean of the largest score.
+
+    Raises:
+        InputError: no training or no test samples.
+    """
+    import pandas as pd
+
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.settings import GPCSettings
+    from gpca.pairs.perturbation import CONCEPTS
+
+    train, test = registrations.rows("train"), registrations.rows("test")
+    if not len(train) or not len(test):
+        raise InputError(f"registrations of {source}, seed {seed}", "lack a split", "give training and test samples")
+    h_S_d = registrations.embedding
+    concept_S = registrations.concept
+    target_N = np.array([CONCEPTS.index(concept) for concept in concept_S[test]])
+    rows = []
+    for kernel in grid.kernels:
+        for rate in grid.learning_rates:
+            settings = GPCSettings(kernel, rate, max(grid.iterations), grid.inducing, grid.draws)
+            gpc = GPC(CONCEPTS, settings, source, seed)
+            for iterations in gpc.fit_up_to(grid.iterations, h_S_d[train], concept_S[train]):
+                scores_N_C, _, _ = gpc.attribute(h_S_d[test])
+                judged = (
+                    np.mean(scores_N_C.argmax(axis=1) == target_N),
+                    gpc.elbo(),
+                    scores_N_C.max(axis=1).mean(),
+                    calibration_error(scores_N_C, target_N),
+                    negative_log_likelihood(scores_N_C, target_N),
+                )
+                rows.append((kernel, rate, iterations, *judged))
+    return pd.DataFrame(rows, columns=list(GRID_COLUMNS))
+
+
+def write_grid(path: str | Path, rows: pd.DataFrame) -> None:
+    """Write what :func:`evaluate_grid` returned."""
+    write_csv(path, rows)
+
+
+def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Read files named `…/{source}/seed{seed}.csv` into one frame with the further columns `source` and `seed`.
+
+    Raises:
+        InputError: no files, a name of another form, a missing column, something that is not a finite number.
+    """
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        _, source, seed = source_method_seed(path)
+        rows = read_csv(path, GRID_COLUMNS)
+        for column in GRID_COLUMNS[1:]:
+            rows[column] = numbers(path, rows, column)
+        parts.append(rows.assign(source=source, seed=seed, iterations=rows["iterations"].astype(int)))
+    if not parts:
+        raise InputError("kernels", "no files were given", "name a source in kernel_grid.sources")
+    return pd.concat(parts, ignore_index=True)
+
+
+def collect_grids(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return the tidy metrics (`MEASURES`) of files named `…/{source}/seed{seed}.csv`.
+
+    Their `method` is as :func:`setting_name` has it.
+
+    Raises:
+        InputError: where :func:`read_grids` raises one.
+    """
+    records = [
+        (TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations), measure, ALL, row.seed, value)
+        for row in read_grids(files).itertuples()
+        for measure in MEASURES
+        for value in [float(getattr(row, measure))]
+    ]
+    return tidy(records, "kernels")
+
+
+def setting_name(kernel: str, learning_rate: float, iterations: int) -> str:
+    """Return e.g. ``rbf-0.01-100``."""
+    return f"{kernel}-{learning_rate:g}-{iterations}"

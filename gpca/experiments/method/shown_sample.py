@@ -1,0 +1,161 @@
+"""Reads one registration of a run with all that the stages made of it, which the figures of the method draw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse, transform
+from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.causes.settings import Limits
+from gpca.causes.truth import FAILED
+from gpca.errors import InputError
+from gpca.experiments.method.concepts import severity_text
+from gpca.experiments.real_world.frame_views import draw_scores
+from gpca.io.csv_file import numbers
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.cloud_views import widest_views
+from gpca.reporting.figures.style import GREY, SMALL_PT, blues
+from gpca.reporting.pose_state import observed_uncertainties, registration_error, state_of_error
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Holds S registrations of one source and seed, and what the stages made of each.
+
+    Attributes:
+        registrations: The registrations.
+        h_S_d: Their embeddings.
+        predictions: What GP-CA said of each.
+        u_S: Their uncertainty in nats, NaN where it is not known.
+        u_clean: What 95 % of the clean pairs stay below, in nats.
+        limits: The limits of the errors that their states are told apart by.
+    """
+
+    registrations: Registrations
+    h_S_d: np.ndarray
+    predictions: pd.DataFrame
+    u_S: np.ndarray
+    u_clean: float
+    limits: Limits
+
+    @classmethod
+    def load(
+        cls,
+        registrations_npz: str | Path,
+        embeddings_npz: str | Path,
+        predictions_csv: str | Path,
+        uncertainty_csv: str | Path,
+        limits: Mapping[str, float],
+    ) -> Stages:
+        """Read what the stages wrote; the limits are those of the config's section ``causes``.
+
+        Raises:
+            InputError: an unusable file, or files of different samples; predictions without variances or BALD.
+        """
+        registrations = Registrations.load(registrations_npz)
+        h_S_d = read_embedding(embeddings_npz, registrations)["embedding"]
+        predictions = read_predictions(predictions_csv)
+        named = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
+        if named != list(zip(predictions["split"], predictions["sample"], strict=True)):
+            raise InputError(
+                predictions_csv, f"its samples differ from those of {registrations_npz}", "regenerate both"
+            )
+        if set(concepts_of(predictions)) != set(CONCEPTS):
+            raise InputError(predictions_csv, f"does not score the concepts {', '.join(CONCEPTS)}", "regenerate it")
+        for column in ("bald", *(f"variance_{concept}" for concept in CONCEPTS)):
+            if column not in predictions:
+                raise InputError(predictions_csv, f"column '{column}' is missing", "give predictions of GP-CA")
+            predictions[column] = numbers(predictions_csv, predictions, column)
+        uncertain = observed_uncertainties(uncertainty_csv, registrations)
+        return cls(registrations, h_S_d, predictions, *uncertain, Limits(**limits))
+
+    def choose(self, concept: str, path: str | Path, *others: str) -> int:
+        """Return the row that is shown, a test sample of the concept whose registration is really uncertain.
+
+        Of those named right after a registration that failed and is more uncertain than 95 % of the clean pairs, it is
+        the one with the median score. Where the concept has none such, one of the `others` may have; where they have
+        none either, the wishes are dropped one by one: first that it failed, then that it is uncertain (the half that
+        ICP fits worst is kept), then that it is named right. Where there is no test sample of the concept, an
+        InputError names `path`.
+        """
+        for other in (concept, *others):
+            if len(failures := self._uncertain_failures(other)):
+                return _median(failures, other)
+        test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
+        if test.empty:
+            raise InputError(path, f"has no test sample of '{concept}'", "raise registrations.test")
+        right = test[test["concept_predicted"] == concept]
+        kept = test if right.empty else right
+        uncertain = kept[self.u_S[kept.index] > self.u_clean]
+        worst = kept.assign(fit=self.registrations.fitness[kept.index]).nsmallest((len(kept) + 1) // 2, "fit")
+        return _median(uncertain if len(uncertain) else worst, concept)
+
+    def _uncertain_failures(self, concept: str) -> pd.DataFrame:
+        rows = self.predictions
+        found = rows[(rows["split"] == "test") & (rows["concept_true"] == concept) & (self.u_S > self.u_clean)]
+        found = found[found["concept_predicted"] == concept]
+        return found[[self.state(row) == FAILED for row in found.index]]
+
+    def error(self, row: int) -> float:
+        """Return how far off a row is after ICP, in diameters."""
+        return registration_error(self.registrations, row)
+
+    def state(self, row: int) -> str:
+        """Return what the error of a row after ICP is called."""
+        return state_of_error(self.error(row), self.limits)
+
+    def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return target and source (·, 3) of a row, the source where the pose ``init`` or ``icp`` puts it."""
+        registrations = self.registrations
+        moved = registrations.T_target_source(which, row) @ inverse(registrations.T_target_source("icp", row))
+        return registrations.target(row), transform(moved, registrations.cloud(row))
+
+    def seen(self, row: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return the clouds before (``init``) and after ICP (``icp``) in the axes of the view that shows most.
+
+        It is that of the views that show the target widest in which ICP moves the source most.
+        """
+        pairs = {which: self.clouds(row, which) for which in ("init", "icp")}
+        target, source = pairs["icp"]
+        moved = pairs["init"][1] - source
+        view = max(widest_views(target), key=lambda view: float(np.linalg.norm(moved @ view[:2].T)))
+        return {which: (target @ view.T, source @ view.T) for which, (target, source) in pairs.items()}
+
+    def words(self, row: int, which: str) -> str:
+        """Return what is known of a pose: of ``init`` what was perturbed, of ``icp`` how far off it is, and u."""
+        if which == "init":
+            return severity_text(self.registrations, row, str(self.registrations.concept[row]))
+        uncertain = "" if np.isnan(self.u_S[row]) else f"\n$u$ = {self.u_S[row]:.1f} nats (clean: < {self.u_clean:.1f})"
+        return f"{self.state(row)}, ADD-S {100 * self.error(row):.1f} % $d${uncertain}"
+
+
+def _median(rows: pd.DataFrame, concept: str) -> int:
+    """Return the row of the median score of a concept."""
+    ranked = rows.sort_values([f"score_{concept}", "sample"], kind="stable")
+    return int(ranked.index[(len(ranked) - 1) // 2])
+
+
+def draw_embedding(axes, h_d: np.ndarray) -> None:
+    """Draw an embedding as a strip of cells, row by row; the darker, the larger the value within it."""
+    columns = next(width for width in range(round(np.sqrt(len(h_d) / 2)) or 1, 0, -1) if len(h_d) % width == 0)
+    axes.imshow(h_d.reshape(-1, columns), cmap=blues(), aspect="auto", interpolation="nearest")
+    axes.set(xticks=[], yticks=[])
+    axes.spines[:].set(visible=True, linewidth=0.6, color=GREY)
+
+
+def draw_scores_with_numbers(axes, sample: pd.Series) -> None:
+    """Draw a sample's concept scores as bars ± one standard deviation, and write score ± deviation beside them."""
+    draw_scores(axes, sample)
+    for place, concept in enumerate(CONCEPTS):
+        deviation = np.sqrt(sample[f"variance_{concept}"])
+        words = f"{sample[f'score_{concept}']:.2f}±{deviation:.2f}"
+        axes.text(1.06, place, words, ha="left", va="center", fontsize=SMALL_PT)

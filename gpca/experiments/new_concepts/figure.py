@@ -1,0 +1,51 @@
+"""Draws how soon a new concept is learned by what the samples are seen by: accuracy over labels, sources as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from gpca.experiments.active_learning.figure import draw_panels, mean_curves
+from gpca.experiments.new_concepts.tables import SEEN
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, VERMILION
+
+SHOWN = "bald_kmeans"
+ROWS = {"concepts": CONCEPTS, "nominal": ("nominal",), "geometry": ("geometry",)}
+TITLES = {"concepts": "new: noise, pose\nor overlap", "nominal": "new: nominal", "geometry": "new: geometry"}
+STYLES = {
+    "pretrained": (GREY, "-", 0.9),
+    "other_samples": (BLUE, "-", 0.9),
+    "other_source": (SKY_BLUE, "-", 0.9),
+    "unseen": (VERMILION, "-", 1.8),
+    "self_supervised": (ORANGE, "-", 0.9),
+    "pair": (GREEN, "-", 1.8),
+}
+
+
+def draw_new_concepts(
+    curve_files: Iterable[str | Path],
+    sources: Mapping[str, str],
+    target: float,
+    pdf_path: str | Path,
+    png_path: str | Path,
+) -> None:
+    """Draw the accuracy over labels by the paper's strategy, its mean over the new concepts, then over the seeds.
+
+    Args:
+        curve_files: Files named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
+        sources: The title of each name, in order; those without curves are left out.
+        target: The accuracy that a dashed line marks.
+        pdf_path, png_path: The two files to write.
+
+    Raises:
+        InputError: an unusable file, or no curve of these.
+    """
+    curve_files = list(curve_files)
+    curves = {
+        (source, row, setting): curve
+        for row, concepts in ROWS.items()
+        for (source, strategy, setting), curve in mean_curves(curve_files, concepts).items()
+        if strategy == SHOWN
+    }
+    draw_panels(curves, sources, TITLES, SEEN, STYLES, target, pdf_path, png_path)

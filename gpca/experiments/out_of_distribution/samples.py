@@ -1,0 +1,114 @@
+"""Makes samples unlike those of the training: severities beyond it, another source, objects never seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import Classifier, embed, train_encoder
+from gpca.experiments.out_of_distribution.distance import knn_distance, mahalanobis_distance, principal_components
+from gpca.experiments.out_of_distribution.sets import SPACES, ShiftedSets
+from gpca.experiments.out_of_distribution.settings import ShiftSettings
+from gpca.explainers.analytical_features import analytical_features
+from gpca.objects.canonical import ObjectClouds
+from gpca.objects.surface import instance_of
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.synthesis import make_registrations
+from gpca.seeds import generator
+
+
+def make_sets(
+    objects: ObjectClouds,
+    registrations: Registrations,
+    other: Registrations | None,
+    encoder: Classifier,
+    encoder_settings: EncoderSettings,
+    source: str,
+    seed: int,
+    settings: ShiftSettings,
+) -> ShiftedSets:
+    """Make, embed and measure all sets of one source and seed.
+
+    Args:
+        objects: of the source.
+        registrations: of the source, with the encoder's embeddings attached.
+        other: registrations of another source, whose test samples are the set `source`; without them it is left out,
+            as the sets of unseen objects are where the source has a single one.
+        encoder, encoder_settings: the source's encoder.
+    """
+    beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
+    parts = {"in_distribution": registrations, "severity": beyond}
+    if other is not None:
+        parts["source"] = other.subset(other.rows("test")[: settings.samples])
+    for name in [name for name in parts if name != "in_distribution"]:
+        h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
+        parts[name] = replace(parts[name], attached={"embedding": h_S_d})
+    measured = [_measured(parts, source, seed, settings)]
+    held_out = held_out_objects(_instances(registrations), settings.held_out_share, source, seed)
+    if len(held_out):
+        parts = _of_unseen_objects(registrations, held_out, source, seed, settings)
+        measured.append(_measured(parts, source, seed, settings))
+    return ShiftedSets.join(measured)
+
+
+def held_out_objects(instances: np.ndarray, share: float, source: str, seed: int) -> np.ndarray:
+    """Return the objects to be held out: a share of them, rounded, at least one; none where there is only one."""
+    instances = np.unique(instances)
+    count = min(max(1, round(share * len(instances))), len(instances) - 1)
+    return np.sort(generator(source, seed, "held-out objects").permutation(instances)[:count])
+
+
+def _instances(registrations: Registrations) -> np.ndarray:
+    """Return the object of each sample, of which several views may have names of their own."""
+    return np.array([instance_of(name) for name in registrations.object_name.tolist()])
+
+
+def _of_unseen_objects(
+    registrations: Registrations, held_out: np.ndarray, source: str, seed: int, settings: ShiftSettings
+) -> dict[str, Registrations]:
+    """Train an encoder that never sees some objects; return what it saw with its kind, and what it never saw."""
+    held_out_S = np.isin(_instances(registrations), held_out)
+    is_train_S = registrations.split == "train"
+    train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
+    seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))
+    # Training samples of objects that were held out are as unseen as test samples, which are few.
+    rows = np.concatenate([np.flatnonzero(held_out_S & ~is_train_S), np.flatnonzero(held_out_S & is_train_S)])
+    unseen = registrations.subset(rows[: settings.samples])
+    name = f"{source} without objects"
+    model, _ = train_encoder(seen, name, seed, settings.encoder)
+    embedded = [replace(part, attached={"embedding": embed(model, part, name, seed, settings.encoder)[0]})
+                for part in (seen, unseen)]  # fmt: skip
+    # Numbered anew: samples of two splits of the registrations are test samples here.
+    renamed: dict[str, Any] = {"split": np.full(len(unseen), "test"), "sample": np.arange(len(unseen))}
+    return {"seen_objects": embedded[0], "objects": replace(embedded[1], **renamed)}
+
+
+def _measured(parts: dict[str, Registrations], source: str, seed: int, settings: ShiftSettings) -> ShiftedSets:
+    """Join sets of one encoder, the one with its training samples first, and measure the distances to these."""
+    spaces = {
+        "analytical": {
+            name: analytical_features(part, source, seed, "distance", name, shape_points=settings.shape_points)
+            for name, part in parts.items()
+        },
+        "embedding": {name: part.embedding for name, part in parts.items()},
+    }
+    home = next(iter(parts))
+    train = parts[home].rows("train")
+    joined = []
+    for name, part in parts.items():
+        test = np.flatnonzero(part.split == "test")
+        distance_S_K = np.zeros((len(part), 2 * len(SPACES)))
+        for i, space in enumerate(SPACES):
+            features_N_F = spaces[space][home][train]
+            query_S_F = spaces[space][name][test]
+            if space == "embedding":
+                features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
+            distance_S_K[test, 2 * i] = knn_distance(features_N_F, query_S_F, settings.neighbours)
+            distance_S_K[test, 2 * i + 1] = mahalanobis_distance(features_N_F, query_S_F)
+        columns = {column: getattr(part, column) for column in ("split", "sample", "concept", "object_name")}
+        named = np.full(len(part), name)
+        joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
+    return ShiftedSets.join(joined)

@@ -1,0 +1,149 @@
+"""Makes the tables of learners and of what their uncertainty is worth (Table V) from the tidy diagnostics.
+
+All take the same arguments and raise the same error:
+
+    metrics: The tidy diagnostics that :func:`gpca.experiments.out_of_distribution.metrics.collect_diagnostics` makes.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
+    learners: The title of each name, in the order in which they are shown.
+    InputError: The metrics hold none of these sources and learners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from gpca.experiments.out_of_distribution.metrics import with_training_like
+from gpca.experiments.out_of_distribution.selection import (
+    AREA,
+    CALIBRATION,
+    NOTHING,
+    OF_DISTANCE,
+    RHO,
+    SHIFTED,
+    only,
+    printed_scale,
+    repeats_note,
+    samples_of_seed,
+    values_by_seed,
+)
+from gpca.objects.title import stand_in_clause, title_of
+from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, span
+from gpca.reporting.tables.table import Cell, Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PRINTED_SOURCE = "ycb"  # the paper prints ρ, AUC and ECE of it
+_AREA: dict[str, Any] = {"decimals": 4, "limits": (0, 1), "least_is_best": True}
+_ERROR: dict[str, Any] = {"decimals": 3, "limits": (0, 1), "least_is_best": True}
+_RHO: dict[str, Any] = {"decimals": 3, "limits": (-1, 1)}
+
+
+def table5_learners(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
+    """Return accuracy and diagnostics of every learner on test samples like the training's (paper, Table V)."""
+    quantities = {
+        "accuracy": ("accuracy", Column("Accuracy (%)")),
+        "rho": (RHO, Column("ρ", **_RHO)),
+        "aurc": ("aurc_max_score", Column("AURC", **_AREA)),
+        "excess_aurc": ("excess_aurc_max_score", Column("E-AURC", **_AREA)),
+        "augrc": ("augrc_max_score", Column("AUGRC", **_AREA)),
+        "ece": ("ece", Column("ECE (share)", **_ERROR)),
+        "nll": ("nll", Column("NLL (nats)", decimals=3, limits=(0, inf), least_is_best=True)),
+        "brier": ("brier", Column("Brier", decimals=3, limits=(0, 2), least_is_best=True)),
+    }
+    picks = {key: ("in_distribution", metric) for key, (metric, _) in quantities.items()}
+    metrics = only(metrics, [metric for _, metric in picks.values()])
+    table = _by_learner("table5_learners", metrics, sources, learners, picks)
+    return table.build(
+        caption="Accuracy and uncertainty of learners on the same embeddings" + table.stand_in_clause(sources),
+        column_head="quantity",
+        columns={key: column for key, (_, column) in quantities.items()},
+        footnotes=(
+            repeats_note(table, metrics),
+            OF_DISTANCE,
+            f"{AREA} E-AURC: AURC minus the least possible with as many errors; AUGRC: mean share of undetected "
+            f"failures. {CALIBRATION}",
+        ),
+    )
+
+
+def table5_compact(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
+    """Return Table V as the paper has it: a row per learner, accuracies by source, diagnostics on one source."""
+    one = PRINTED_SOURCE if PRINTED_SOURCE in sources else list(sources)[-1]
+    diagnostics = {"rho": RHO, "aurc": "aurc_max_score", "ece": "ece"}
+    metrics = only(metrics, ["accuracy", *diagnostics.values()])
+    table = TableBuilder("table5_compact", {"learner": "Learner"})
+    for learner, title in learners.items():
+        cells = {source: _cell(metrics, source, learner, "in_distribution", "accuracy") for source in sources}
+        cells |= {key: _cell(metrics, one, learner, "in_distribution", name) for key, name in diagnostics.items()}
+        table.add_row([(learner, title)], cells)
+    table.require_rows(*NOTHING)
+    found = [source for source in sources if any(key == source for _, key in table.cells)]
+    columns = {source: Column(f"{title_of(entry)} (%)") for source, entry in sources.items()}
+    columns |= {"rho": Column("ρ", **_RHO), "aurc": Column("AURC", **_AREA), "ece": Column("ECE (share)", **_ERROR)}
+    table.compare_down(columns)
+    seeds = table.most_seeds()
+    samples = span(samples_of_seed(metrics, source, "in_distribution") for source in found)
+    return table.build(
+        caption=f"Accuracy of learners by dataset, and what their uncertainty is worth on {sources[one]['title']}"
+        + stand_in_clause(sources.values()),
+        column_head="quantity",
+        columns=columns,
+        footnotes=(f"{mean_over(seeds, samples)}. Bold: best of a column.", OF_DISTANCE, f"{AREA} {CALIBRATION}"),
+    )
+
+
+def table5_shift(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learners: Mapping[str, str]) -> Table:
+    """Return accuracy, calibration and ρ of every learner on samples unlike those of the training."""
+    columns: dict[str, Column] = {}
+    picks: dict[str, tuple[str, str]] = {}
+    for name, title in SHIFTED.items():
+        columns |= {
+            f"accuracy_{name}": Column(f"Acc., {title} (%)"),
+            f"ece_{name}": Column(f"ECE, {title} (share)", **_ERROR),
+            f"rho_{name}": Column(f"ρ, {title}", **_RHO),
+        }
+        picks |= {
+            f"accuracy_{name}": (name, "accuracy"),
+            f"ece_{name}": (name, "ece"),
+            f"rho_{name}": (with_training_like(name), RHO),
+        }
+    metrics = only(metrics, [metric for _, metric in picks.values()])
+    table = _by_learner("table5_shift", metrics, sources, learners, picks)
+    return table.build(
+        caption="Learners on samples unlike those of the training" + table.stand_in_clause(sources),
+        column_head="quantity",
+        columns=columns,
+        footnotes=(
+            repeats_note(table, metrics),
+            f"{OF_DISTANCE} It is taken over the shifted samples and those like the training's together.",
+            f"Unseen objects: another encoder and other learners, which never saw some of the objects. {CALIBRATION}",
+        ),
+    )
+
+
+def _by_learner(
+    name: str,
+    metrics: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    learners: Mapping[str, str],
+    picks: Mapping[str, tuple[str, str]],
+) -> TableBuilder:
+    """Return a table with a row for each source and learner, and a cell for each pick of a set and a metric."""
+    table = TableBuilder(name, {"source": "Dataset", "learner": "Learner"})
+    for source, entry in sources.items():
+        for learner, title in learners.items():
+            cells = {key: _cell(metrics, source, learner, *pick) for key, pick in picks.items()}
+            table.add_row([(source, title_of(entry)), (learner, title)], cells)
+    table.require_rows(*NOTHING)
+    table.compare_down(picks, same=1)
+    return table
+
+
+def _cell(metrics: pd.DataFrame, source: str, learner: str, of_set: str, metric: str) -> Cell | None:
+    values = values_by_seed(metrics, source, learner, of_set, metric)
+    if values.empty:
+        return None
+    return cell_of_repeats(values * printed_scale(metric), samples_of_seed(metrics, source, of_set) * len(values))

@@ -1,0 +1,1 @@
+"""GP-CA on depth frames, by backbone and reduction (paper Table VI)."""

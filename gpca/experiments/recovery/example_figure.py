@@ -1,0 +1,121 @@
+"""Draws Fig. 1 of the paper: one failure of the run, attributed to a concept, seen from a new viewpoint, and solved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from gpca.alignment.pose_error import CORRECT
+from gpca.experiments.real_world.frame_views import draw_score_bars
+from gpca.io.arrays import load_arrays
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.style import (
+    BLACK,
+    SMALL_PT,
+    TARGET_COLOUR,
+    TEXT_WIDTH_IN,
+    YELLOW,
+    blues,
+    save_figure,
+    use_style,
+    write_title,
+)
+from gpca.reporting.words import in_words, object_in_words
+
+SILHOUETTES = ("mask", "true", "placed")
+SHAPES: dict[str, tuple[int | str, ...]] = {
+    "object": (),
+    "cause": (),
+    "action": (),
+    "scores": (len(CONCEPTS),),
+    "errors": (2,),
+    "viewpoints_n_3": ("V", 3),
+    "viewpoint_first": (3,),
+    "surface_n": ("V",),
+    "surface_first": (),
+    "chosen": (),
+    **{f"image_{view}": ("H", "W", 3) for view in ("first", "next")},
+    **{f"{silhouette}_{view}": ("H", "W") for view in ("first", "next") for silhouette in SILHOUETTES},
+}
+
+
+def draw_recovery_example(
+    title: str, example_npz: str | Path, pdf_path: str | Path, png_path: str | Path, dataset: str = ""
+) -> None:
+    """Draw (a) the first view, (b) the concept scores, (c) the viewpoints to choose from, (d) the new view.
+
+    Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
+    object's name in words follows from its `dataset` of the BOP benchmark.
+
+    Raises:
+        InputError: an unusable file.
+    """
+    found = load_arrays(example_npz, SHAPES, "python -m gpca recover")
+    plt = use_style()
+    figure = plt.figure(figsize=(TEXT_WIDTH_IN, 1.95))
+    for left, view in ((0.003, "first"), (0.722, "next")):
+        panel = figure.add_axes((left, 0.12, 0.275, 0.75))
+        _draw_view(panel, found[f"image_{view}"], *(found[f"{name}_{view}"].astype(bool) for name in SILHOUETTES))
+    scores = figure.add_axes((0.345, 0.32, 0.125, 0.48))
+    shown = found["scores"]
+    draw_score_bars(scores, shown.tolist(), str(found["cause"]))
+    scores.set(xlim=(min(0, shown.min()), max(1, shown.max())))
+    scores.set_xlabel("score", labelpad=1)
+    _draw_viewpoints(figure, figure.add_axes((0.487, 0.17, 0.185, 0.67), projection="polar"), found)
+    before, after = (100 * error for error in found["errors"])
+    solved = "solved" if after <= 100 * CORRECT else "not solved"
+    chosen, first = (100 * share for share in (found["surface_n"][int(found["chosen"])], found["surface_first"]))
+    captions = (
+        f"(a) Occluded: pose {before:.0f} % $d$ off" if str(found["cause"]) == "overlap" else f"(a) {before:.0f} % off",
+        f"(b) {CONCEPTS[int(np.argmax(shown))].capitalize()} leads{_instead(str(found['action']))}",
+        f"(c) Surface seen: {first:.0f} % $\\to$ {chosen:.0f} %",
+        f"(d) New view: {after:.1f} % $d$ off, {solved}",
+    )
+    for centre, caption in zip((0.14, 0.385, 0.585, 0.86), captions, strict=True):
+        figure.text(centre, 0.02, caption, ha="center", va="bottom")
+    name = object_in_words(found["object"], dataset)
+    write_title(figure, f"{title}: {name}; outlines: where it is (yellow), where ICP put it (red)")
+    save_figure(figure, pdf_path, png_path)
+
+
+def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, placed: np.ndarray) -> None:
+    """Show the part of an image around both outlines; what is seen of the object is outlined in full."""
+    panel.imshow(image)
+    for silhouette, colour, line in ((true, YELLOW, "--"), (mask, YELLOW, "-"), (placed, TARGET_COLOUR, "-")):
+        if silhouette.any():
+            panel.contour(silhouette, [0.5], colors=colour, linewidths=1.0, linestyles=line)
+    height, width = mask.shape
+    v, u = np.nonzero(true | placed | mask)
+    half_v = np.clip(0.75 * max(np.ptp(v), np.ptp(u) * height / width), height / 5, height / 2)
+    half_u = half_v * width / height
+    centre_u = np.clip((u.min() + u.max()) / 2, half_u, width - half_u)
+    centre_v = np.clip((v.min() + v.max()) / 2, half_v, height - half_v)
+    panel.set(xlim=(centre_u - half_u, centre_u + half_u - 1), ylim=(centre_v + half_v - 1, centre_v - half_v))
+    panel.set_axis_off()
+
+
+def _draw_viewpoints(figure, panel, found: Mapping[str, np.ndarray]) -> None:
+    """Show the viewpoints from above: the darker, the more surface should be seen after it; the chosen is ringed."""
+    towards = found["viewpoints_n_3"]
+    azimuth, zenith_deg = np.arctan2(towards[:, 1], towards[:, 0]), _zenith_deg(towards)
+    look = {"cmap": blues(), "vmin": 0, "vmax": 1, "edgecolors": BLACK}
+    widths = np.where(np.arange(len(towards)) == int(found["chosen"]), 1.6, 0.3)
+    dots = panel.scatter(azimuth, zenith_deg, c=found["surface_n"], s=24, linewidths=widths, **look)
+    first = found["viewpoint_first"]
+    panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=TARGET_COLOUR)
+    panel.set(rlim=(0, 90), xticks=[], yticks=[30, 60, 90])
+    panel.set_yticklabels([])
+    bar = figure.colorbar(dots, cax=figure.add_axes((0.683, 0.25, 0.008, 0.5)), ticks=[0, 0.5, 1])
+    bar.ax.tick_params(labelsize=SMALL_PT, length=1.5, pad=1)
+    bar.outline.set_linewidth(0.4)
+
+
+def _zenith_deg(towards: np.ndarray) -> np.ndarray:
+    return np.rad2deg(np.arccos(np.clip(towards[..., 2], -1, 1)))
+
+
+def _instead(action: str) -> str:
+    """Return what the policy did where it did not change the viewpoint, as the panels show it."""
+    return "" if action == "new_view" else f" ({in_words(action)})"

@@ -1,0 +1,123 @@
+"""The closed loop: policies of recovery on the same failures, with the same budget of actions.
+
+They are asked about registrations that did not fail too, of which each says what it would do; nothing is done then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.experiments.recovery.answers import Answer, Answers, CaseKey, Explain
+from gpca.experiments.recovery.episodes import Episode, is_right
+from gpca.experiments.recovery.rehearsal import known
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.actions import Action
+from gpca.recovery.policies import Case, Decide, Means, PolicyEntry, policy_entry
+from gpca.recovery.settings import LoopSettings
+from gpca.seeds import generator
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NO_SCORES = np.full(len(CONCEPTS), np.nan)
+UNEXPLAINED = Answer(NO_SCORES, NO_SCORES, np.nan, 0.0)
+
+
+class Loop:
+    """All policies on all episodes, step by step, so that explainers see what is new in one batch.
+
+    Args:
+        episodes: the failures, and what did not fail.
+        actions: each by its name.
+        explain: for each explainer that the policies read, the function that attributes registrations.
+        means: what the policies are made from.
+    """
+
+    def __init__(
+        self,
+        episodes: Sequence[Episode],
+        actions: Mapping[str, Action],
+        explain: Mapping[str, Explain],
+        means: Means,
+        settings: LoopSettings,
+        axes: tuple,
+    ) -> None:
+        self.episodes = episodes
+        self._actions = actions
+        self._means = means
+        self._settings = settings
+        self._axes = axes
+        self._answers = Answers(episodes, explain, tuple(actions), settings.budget)
+
+    def run(self, policies: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """Return a row per episode, policy and step, and the seconds of each, in the same order."""
+        import pandas as pd
+
+        entries = {name: policy_entry(name, tuple(self._actions)) for name in policies}
+        decide = {name: entry.make(self._means) for name, entry in entries.items()}
+        taken: dict[tuple[int, str], tuple[str, ...]] = {
+            (episode.number, name): () for episode in self.episodes for name in policies
+        }
+        rows, seconds = [], []
+        for step in range(1, self._settings.budget + 1):
+            self._answers.ask(
+                CaseKey(entries[name].explainer, number, actions) for (number, name), actions in taken.items()
+            )
+            following = {}
+            for episode in self.episodes:
+                for name in policies:
+                    if (key := (episode.number, name)) not in taken:
+                        continue
+                    row, time = self._step(episode, name, entries[name], decide[name], taken[key])
+                    rows.append(row | {"step": step})
+                    seconds.append({c: row[c] for c in ("episode", "failed", "policy")} | {"step": step} | time)
+                    if row["failed"] and row["action"] in self._actions and not row["recovered"]:
+                        following[key] = (*taken[key], row["action"])
+            taken = following
+        order = sorted(range(len(rows)), key=lambda n: (rows[n]["episode"], policies.index(rows[n]["policy"]), n))
+        return pd.DataFrame([rows[n] for n in order]), pd.DataFrame([seconds[n] for n in order])
+
+    def _step(
+        self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: tuple[str, ...]
+    ) -> tuple[dict, dict]:
+        """Let one policy decide and act; return its row and its seconds."""
+        history = self._answers.history(entry.explainer, episode.number, before) if entry.explainer else []
+        started = perf_counter()
+        decision = decide(
+            Case(
+                actions=before,
+                scores_T_C=np.array([answer.scores_C for answer in history]) if history else None,
+                bald_T=np.array([answer.bald for answer in history]) if history else None,
+                known_F=known(episode.observe(before), history[-1]) if entry.learns else None,
+                cause=episode.situation.cause if entry.oracle and episode.failed else "",
+                random=generator(*self._axes, "policy", episode.number),
+            )
+        )
+        spent = perf_counter() - started
+        last = history[-1] if history else UNEXPLAINED
+        old, new, action_seconds = episode.outcomes[before], None, 0.0
+        if episode.failed and decision.action in self._actions:
+            new = episode.take((*before, decision.action), self._actions, self._settings)
+            action_seconds = new.seconds
+        shelf, model = episode.situation.shelf, episode.situation.model
+        row = {
+            "episode": episode.number,
+            "cause": episode.situation.cause,
+            "object": shelf.objects.names[model],
+            "symmetric": shelf.symmetric[model],
+            "tries": episode.tries,
+            "failed": episode.failed,
+            "policy": name,
+            "action": decision.action,
+            "concept": decision.concept,
+            **{f"score_{concept}": score for concept, score in zip(CONCEPTS, last.scores_C, strict=True)},
+            "bald": last.bald,
+            "error_before": old.error,
+            "error_after": (new or old).error,
+            "recovered": new is not None and is_right(new),
+        }
+        return row, {"explanation_seconds": spent + last.seconds, "action_seconds": action_seconds}

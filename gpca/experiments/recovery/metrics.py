@@ -1,0 +1,122 @@
+"""From what policies did about failures to numbers: of every policy, cause and seed, as one tidy table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gpca.attribution.metrics import ALL, tidy
+from gpca.errors import InputError
+from gpca.io.csv_file import numbers, read_csv
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policy import NOTHING, QUEUE
+from gpca.seeds import seed_of_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE = "recovery"  # `table` and `source` of the tidy rows read this
+RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "failed", "recovered", "tries")
+_OTHERS = ("object", "symmetric", "concept", "score_*", "bald", "error_before", "error_after")
+SECONDS = ("explanation_seconds", "action_seconds")
+FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
+
+
+def collect_recovery(
+    files: Iterable[str | Path], treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
+) -> pd.DataFrame:
+    """Return the tidy metrics of files named `…/seed{seed}.csv`; results/README.md lists them.
+
+    Args:
+        treatments: concept -> the action of its own.
+        costs: action -> what it costs, in right poses.
+        budget: actions per failure.
+
+    Raises:
+        InputError: no files, a name of another form, a missing column, no rows, an unknown cause.
+    """
+    records = []
+    for path in files:
+        seed = seed_of_file(path)
+        rows = read_recovery(path)
+        for policy, of_policy in rows.groupby("policy", sort=False):
+            for cause in (ALL, *CONCEPTS):
+                of_cause = of_policy if cause == ALL else of_policy[of_policy["cause"] == cause]
+                if not of_cause["failed"].any():
+                    continue
+                values = policy_metrics(of_cause, treatments, costs, budget)
+                records += [(TABLE, TABLE, policy, metric, cause, seed, float(v)) for metric, v in values.items()]
+    return tidy(records, "recovery")
+
+
+def policy_metrics(
+    rows: pd.DataFrame, treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
+) -> dict[str, float]:
+    """Return the metrics of one policy on the failures among the rows, and how often it acts on the others."""
+    fine, rows = rows[~rows["failed"]], rows[rows["failed"]]
+    first = rows[rows["step"] == 1]
+    acted = first[is_action(first)]
+    episodes = first["episode"].nunique()
+    values = {
+        f"recovered_within_{k}": rows[rows["recovered"] & (rows["step"] <= k)]["episode"].nunique() / episodes
+        for k in range(1, budget + 1)
+    }
+    values |= {"episodes": episodes, "acted_first": len(acted), "tries": first.groupby("cause")["tries"].first().sum()}
+    if len(acted):
+        values["wrong_first"] = float((acted["action"] != acted["cause"].map(dict(treatments))).mean())
+    values["queued"] = rows[rows["action"] == QUEUE]["episode"].nunique() / episodes
+    values["left_alone"] = float((first["action"] == NOTHING).mean())
+    values["actions"] = float(is_action(rows).sum() / episodes)
+    values["cost"] = float(rows["action"].map(dict(costs)).sum() / episodes)
+    values |= {"nominal": len(fine)} | ({"acted_nominal": float(is_action(fine).mean())} if len(fine) else {})
+    counts = first["action"].value_counts()
+    return values | {FIRST + action: counts.get(action, 0) for action in (*treatments.values(), QUEUE)}
+
+
+def is_action(rows: pd.DataFrame) -> pd.Series:
+    """Return which rows are of an action, as booleans."""
+    return ~rows["action"].isin((QUEUE, NOTHING))
+
+
+def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
+    """Return policy -> mean seconds of a failure, of explaining and acting, over all files of seconds."""
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        rows = read_csv(path, ("episode", "failed", "policy", *SECONDS), others=("step",))
+        rows = rows[rows["failed"] == "True"]
+        rows["seconds"] = sum(numbers(path, rows, name) for name in SECONDS)
+        parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
+    if not parts:
+        raise InputError("recovery", "no timing files were given", "run the step recover")
+    return pd.concat(parts).groupby(level="policy").mean().to_dict()
+
+
+def read_recovery(path: str | Path) -> pd.DataFrame:
+    """Read a file of the step ``recover``: `recovered` as booleans, numbers as numbers, the rest as text."""
+    rows = read_csv(path, RECOVERY_COLUMNS, _OTHERS)
+    for name in ("episode", "step", "tries"):
+        rows[name] = numbers(path, rows, name).astype(int)
+    flags = ("failed", "recovered")
+    if not (rows["cause"].isin(CONCEPTS) & rows[[*flags]].isin(("True", "False")).all(axis=1)).all():
+        raise InputError(path, "contains an unknown cause, or a flag other than True and False", "regenerate it")
+    for name in flags:
+        rows[name] = rows[name] == "True"
+    return rows
+
+
+def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
+    """Return a share over the failures of all seeds, and their number; None where the metrics hold none.
+
+    A wrong first action is a share of the failures that were acted on at all, an action on what did not fail one of
+    those registrations.
+    """
+    weight = {"wrong_first": "acted_first", "acted_nominal": "nominal"}.get(metric, "episodes")
+    of_policy = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
+    share_R, count_R = (of_policy[of_policy["metric"] == m].set_index("seed")["value"] for m in (metric, weight))
+    if share_R.empty:
+        return None
+    weight_R = count_R[share_R.index]
+    return float((share_R * weight_R).sum() / weight_R.sum()), int(weight_R.sum())

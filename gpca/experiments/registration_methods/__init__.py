@@ -1,0 +1,1 @@
+"""Registration methods side by side on the same pairs (Table XI)."""

@@ -1,0 +1,137 @@
+"""Makes the tables of registration methods: how often and how well each registers, from which start, by what cause.
+
+Both take the same arguments and raise the same error:
+
+    metrics: The tidy metrics that :func:`gpca.experiments.registration_methods.metrics.collect_trials` makes.
+    sources: The ``{"title": str, "stand_in": bool}`` of each name.
+    methods: The ``{"title": str, "is_global": bool}`` of each name, in the order in which they are shown.
+    global_start: The global method at whose pose local methods start a second time.
+    left_out: The package that is missing, by the title of the method that needs it.
+    InputError: The metrics hold none of these sources and methods.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import inf
+from typing import TYPE_CHECKING
+
+from gpca.attribution.metrics import ALL
+from gpca.experiments.registration_methods.metrics import BINS, bin_name
+from gpca.experiments.registration_methods.rows import INITIAL, NO_START, row_name
+from gpca.objects.title import stand_in_clause
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, missing_packages
+from gpca.reporting.tables.table import Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_ERRORS = {  # Each of these metrics has a column, and a factor to the column's unit.
+    "failed": (Column("Failed (%)", interval=False, least_is_best=True), 100),
+    "add": (Column("ADD(-S) (% d)", limits=(0, inf), least_is_best=True), 100),
+    "rotation_deg": (Column("Rotation (°)", limits=(0, 180), least_is_best=True), 1),
+    "translation": (Column("Translation (% d)", limits=(0, inf), least_is_best=True), 100),
+}
+_MILLISECONDS = Column("ms", interval=False, limits=(0, inf), least_is_best=True)
+
+
+def table11_registration(
+    metrics: pd.DataFrame,
+    seconds: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    methods: Mapping[str, Mapping],
+    global_start: str,
+    left_out: Mapping[str, str],
+) -> Table:
+    """Return successes in all and by cause, errors and milliseconds: starts × methods."""
+    table = _table("table11_registration")
+    causes = (ALL, *CONCEPTS)
+    for labels, name in _rows(methods, global_start):
+        cells = {
+            f"success_{cause}": cell_over_sources(metrics, metrics, sources, name, "success", cause, 100)
+            for cause in causes
+        }
+        cells |= {
+            key: cell_over_sources(metrics, metrics, sources, name, key, ALL, factor)
+            for key, (_, factor) in _ERRORS.items()
+        }
+        cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", ALL, 1e3)
+        table.add_row(labels, cells)
+    table.require_rows("metrics", "have no registration method", "run the step register_methods first")
+    columns = {f"success_{cause}": Column(f"{cause.capitalize()} (%)") for cause in causes}
+    columns |= {key: column for key, (column, _) in _ERRORS.items()}
+    table.compare_down(columns, same=1)
+    return table.build(
+        caption="Registrations that succeed, and how far all are off" + stand_in_clause(sources.values()),
+        column_head="metric",
+        columns=columns | {"milliseconds": _MILLISECONDS},
+        footnotes=(
+            *_notes(table, metrics, sources, left_out),
+            "Errors are means over all registrations, at the last pose of those that failed; rotations up to the "
+            "object's symmetries. Failed: given up by the method itself, or not at rest. ms: of one registration, with "
+            "its global start if it has one, without the normals; the only column that differs from run to run.",
+        ),
+    )
+
+
+def table11_severity(
+    metrics: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    methods: Mapping[str, Mapping],
+    global_start: str,
+    left_out: Mapping[str, str],
+) -> Table:
+    """Return successes by cause and severity: starts × methods by causes × bins."""
+    table = _table("table11_severity")
+    columns = {
+        bin_name(cause, severity): Column(f"{cause.capitalize()}, {severity} (%)", decimals=0)
+        for cause in CONCEPTS
+        for severity in BINS
+    }
+    for labels, name in _rows(methods, global_start):
+        table.add_row(
+            labels, {key: cell_over_sources(metrics, metrics, sources, name, "success", key, 100) for key in columns}
+        )
+    table.require_rows("metrics", "have no registration method", "run the step register_methods first")
+    table.compare_down(columns, same=1)
+    pairs = {key: cell.test_samples for (_, key), cell in table.cells.items()}
+    return table.build(
+        caption="Registrations that succeed, by cause and severity (%)" + stand_in_clause(sources.values()),
+        column_head="cause",
+        columns=columns,
+        footnotes=(
+            *_notes(table, metrics, sources, left_out),
+            "Low, middle, high: thirds of what is drawn; a pose error counts by the mean of its places in the two "
+            f"ranges. Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}.",
+        ),
+    )
+
+
+def _table(name: str) -> TableBuilder:
+    return TableBuilder(name, {"start": "Start", "method": "Method"})
+
+
+def _rows(methods: Mapping[str, Mapping], global_start: str) -> Iterable[tuple[list[tuple[str, str]], str]]:
+    """Yield the labels of each row and its method in the metrics, start by start."""
+    starts = {INITIAL: "Initial pose", NO_START: "None"}
+    if global_start in methods:
+        starts[global_start] = methods[global_start]["title"]
+    for start, title in starts.items():
+        for name, entry in methods.items():
+            if entry["is_global"] == (start == NO_START):
+                yield [(start, title), (name, entry["title"])], row_name(name, start)
+
+
+def _notes(
+    table: TableBuilder, metrics: pd.DataFrame, sources: Mapping[str, Mapping], left_out: Mapping[str, str]
+) -> list[str]:
+    (start, _), (method, _) = table.rows[0]
+    pairs = cell_over_sources(metrics, metrics, sources, row_name(method, start), "success", ALL, 1)
+    per_seed = pairs.test_samples // pairs.seeds if pairs else 0
+    notes = [
+        f"{mean_over(table.most_seeds(), per_seed)}. A success is off by less than the config's `method_pairs.success` "
+        "of the diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own "
+        "account is no success. Bold: best of a start."
+    ]
+    return [*notes, *missing_packages(left_out)]

@@ -1,0 +1,130 @@
+"""Registers the test pairs of one source and seed by every method: local ones twice, from the pair's own initial pose
+and from the pose of a global method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.methods.interface import Outcome, Pair
+from gpca.alignment.methods.registry import make_method, method_entry, require_global
+from gpca.errors import InputError
+from gpca.experiments.judge import Judges
+from gpca.experiments.registration_methods.rows import INITIAL, NO_START, SEVERITY_COLUMNS
+from gpca.experiments.registration_methods.settings import PairSettings
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
+from gpca.process.progress import progress
+from gpca.seeds import generator, seed_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Method = Callable[[Pair], Outcome]
+
+
+def try_methods(
+    registrations: Registrations,
+    objects: ObjectClouds,
+    source: str,
+    seed: int,
+    methods: Mapping[str, Mapping],
+    settings: PairSettings,
+) -> dict[str, pd.DataFrame]:
+    """Return for each method a row per pair and start, with the seconds that it took.
+
+    A method that fails has its reason in the row, and no success. Normals are estimated beforehand, as the same ones
+    serve all methods; what a method loads or compiles at its first call is loaded before the first pair.
+
+    Args:
+        registrations: with test samples; their targets are in the objects' canonical frames.
+        methods: name -> settings, the global start among them.
+
+    Raises:
+        InputError: an unknown method or setting, a missing package, a global start that is none or not among them, no
+            test samples, or other objects than those that were registered.
+    """
+    import pandas as pd
+
+    made = {name: make_method(name, given) for name, given in methods.items()}
+    start = settings.global_start
+    require_global(start)
+    if start not in made:
+        raise InputError("method_pairs.global_start", f"'{start}' is not among the methods", "add it or name another")
+    rows = _chosen(registrations, source, settings.samples)
+    of_objects = Judges(objects, f"objects of {source}")
+    judges = [of_objects.of(registrations, row) for row in rows]
+    first = observed_pair(registrations, rows[0], source, seed, settings.points)
+    for method in made.values():
+        method(first)
+    records: dict[str, list[dict]] = {name: [] for name in made}
+    for i, row in enumerate(progress(rows, f"registration methods on {source}, seed {seed}")):
+        pair = observed_pair(registrations, row, source, seed, settings.points)
+        T_true = registrations.T_target_source("true", row)
+        judge = judges[i]
+        known = {
+            "sample": registrations.sample[row],
+            "object": registrations.object_name[row],
+            "concept": registrations.concept[row],
+            **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
+            "symmetric": judge.symmetric,
+        }
+        found = _timed(made[start], pair)
+        for name, method in made.items():
+            for started_at, outcome, seconds in _attempts(name, method, pair, start, found):
+                errors = judge(outcome.T_target_source, T_true)
+                success = outcome.converged and errors["add_relative"] < settings.success
+                of_outcome = {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
+                told = known | {"start": started_at, "success": success} | errors | of_outcome
+                records[name].append(told | {"seconds": seconds})
+    return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
+
+
+def observed_pair(registrations: Registrations, row: int, source: str, seed: int, points: int) -> Pair:
+    """Return what a method is given of a registration: clouds thinned to `points`, normals estimated on these."""
+    axes = (source, seed, "methods", registrations.split[row], registrations.sample[row])
+    observed = registrations.source(row)
+    kept = generator(*axes, "clouds").permutation(len(observed))[:points]
+    return Pair(
+        observed[kept],
+        registrations.target(row)[:points].astype(np.float64),  # in random order
+        registrations.T_target_source("init", row),
+        seed=seed_of(*axes, "draws"),
+    ).with_normals()
+
+
+def _attempts(
+    name: str, method: Method, pair: Pair, start: str, found: tuple[Outcome, float]
+) -> Iterator[tuple[str, Outcome, float]]:
+    """Yield start, outcome and seconds of each run of a method; `found` is what the global method `start` found."""
+    coarse, coarse_seconds = found
+    if name == start:
+        yield NO_START, coarse, coarse_seconds
+    elif method_entry(name).is_global:
+        yield NO_START, *_timed(method, pair)
+    else:
+        yield INITIAL, *_timed(method, pair)
+        if coarse.converged:
+            outcome, seconds = _timed(method, pair.started_at(coarse.T_target_source))
+            yield start, outcome, coarse_seconds + seconds
+        else:
+            yield start, replace(coarse, failure=f"{start}: {coarse.failure}"), coarse_seconds
+
+
+def _timed(method: Method, pair: Pair) -> tuple[Outcome, float]:
+    started = perf_counter()
+    outcome = method(pair)
+    return outcome, perf_counter() - started
+
+
+def _chosen(registrations: Registrations, source: str, samples: int) -> np.ndarray:
+    """Return the rows of the first test samples: threes of one object, which go round the objects."""
+    rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < samples))
+    if not len(rows):
+        raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
+    return rows

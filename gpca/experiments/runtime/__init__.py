@@ -1,0 +1,1 @@
+"""How long each stage of GP-CA takes (paper Table VII)."""

@@ -1,0 +1,49 @@
+"""Table V's ρ, AUC and ECE on other samples, with other distances, uncertainties and areas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.diagnostics import aurc, calibration_error, rank_correlation
+from gpca.attribution.metrics import ALL
+from gpca.experiments.out_of_distribution.metrics import probabilities, read_learner_predictions, sets_of, wrong
+from gpca.experiments.specification_curve.given import Given, Row
+from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+    """Yield ρ, AUC and ECE of each learner under each reading."""
+    learned = read_learner_predictions(given.predictions.values(), given.sets.values())
+    for (source, learner, seed), rows in learned.items():
+        of_sets = sets_of(rows)
+        for reading in readings:
+            if (of_set := of_sets.get(reading["set"])) is None:
+                continue
+            for metric, value in diagnostics(of_set, reading).items():
+                yield reading, source, learner, metric, ALL, seed, value
+
+
+def diagnostics(rows: pd.DataFrame, reading: Reading) -> dict[str, float]:
+    """Return ρ, the area and ECE of one learner, by the names of their counterparts; entropy stands for BALD.
+
+    Without any error, or with errors alone, there is no ROC curve, and no value of it.
+    """
+    score_S = rows[reading["score"] if reading["score"] in rows else "entropy"].to_numpy(float)
+    values = {
+        "rho_max_score_knn_analytical": rank_correlation(score_S, rows[reading["distance"]].to_numpy(float)),
+        "ece": calibration_error(*probabilities(rows)),
+    }
+    wrong_S = wrong(rows)
+    if reading["area"] == "aurc":
+        values["aurc_max_score"] = aurc(-score_S, wrong_S)
+    elif 0 < wrong_S.sum() < len(wrong_S):
+        from sklearn.metrics import roc_auc_score
+
+        values["aurc_max_score"] = 1 - float(roc_auc_score(wrong_S, score_S))
+    return {name: float(np.asarray(value)) for name, value in values.items()}

@@ -1,0 +1,85 @@
+"""The files of a run that readings read, by source and seed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from gpca.alignment.icp import ICPSettings
+from gpca.attribution.metrics import source_method_seed
+from gpca.errors import InputError
+from gpca.experiments.out_of_distribution.sets import ShiftedSets
+from gpca.experiments.specification_curve.settings import Reading
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.uncertainty.settings import UncertaintySettings
+
+SECTIONS = {
+    "uncertainty": ("uncertainty", "additive"),
+    "icp": ("registrations", "icp"),
+    "encoder": ("encoders", "*"),
+    "pretraining": ("real_world", "pretraining"),
+    "training": ("real_world", "training", "*"),
+    "active_learning": ("active_learning",),
+    "gpca_paper": ("explainers", "gpca_paper"),
+    "gpca": ("explainers", "gpca"),
+}
+# Reading, and the value of a printed number's counterpart under it: source, method, metric, concept, seed, value.
+Row = tuple[Reading, str, str, str, str, int, float]
+
+
+@dataclass(frozen=True)
+class Given:
+    """Paths by what names them.
+
+    Attributes:
+        registrations, sets: (source, seed) -> file of the step ``registrations`` or ``shift``.
+        poses: (source, seed) -> CSV beside the registrations of depth frames.
+        predictions, embeddings: (source, method, seed) -> file.
+        sections: name -> settings of the config's section `SECTIONS` of that name, for what a reading leaves as it is.
+    """
+
+    registrations: Mapping[tuple[str, int], Path] = field(default_factory=dict)
+    sets: Mapping[tuple[str, int], Path] = field(default_factory=dict)
+    poses: Mapping[tuple[str, int], Path] = field(default_factory=dict)
+    predictions: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
+    embeddings: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
+    sections: Mapping[str, dict] = field(default_factory=dict)
+
+    def uncertainty(self) -> UncertaintySettings:
+        """Return the settings of Monte-Carlo ICP under fixed knobs."""
+        runs = {name: value for name, value in self.sections["uncertainty"].items() if name != "samples"}
+        return UncertaintySettings(**runs, icp=ICPSettings(**self.sections["icp"]))
+
+    def in_distribution(self) -> Iterator[tuple[str, int, ShiftedSets, Registrations]]:
+        """Yield source, seed, sets, and the samples like the training's with their embeddings attached."""
+        for (source, seed), path in self.sets.items():
+            sets = ShiftedSets.load(path, (source, seed))
+            yield source, seed, sets, sets.registrations((sets.set == "in_distribution").nonzero()[0])
+
+    def embedded(self, source: str, method: str, seed: int) -> Registrations:
+        """Return registrations with the embeddings of a ``{backbone}-{reduction}`` attached."""
+        registrations = Registrations.load(self.registrations[source, seed], (source, seed))
+        embedding = read_embedding(self.embeddings[source, method, seed], registrations)
+        return replace(registrations, attached=embedding)
+
+
+def by_source_and_seed(paths: Iterable[Path]) -> dict[tuple[str, int], Path]:
+    """Return files named ``…/{source}/seed{seed}.npz`` by source and seed."""
+    return {source_method_seed(path)[1:]: path for path in paths}
+
+
+def by_method(paths: Iterable[Path]) -> dict[tuple[str, str, int], Path]:
+    """Return prediction files named ``…/{source}/{method}/seed{seed}.csv`` by these three."""
+    return {source_method_seed(path): path for path in paths}
+
+
+def by_backbone(paths: Iterable[Path]) -> dict[tuple[str, str, int], Path]:
+    """Return files named ``…/{source}/{backbone}/{reduction}/seed{seed}.npz`` by source, method and seed."""
+    found = {}
+    for path in paths:
+        backbone, reduction, seed = source_method_seed(path)
+        if len(path.parts) < 4:
+            raise InputError(path, "is not named …/{source}/{backbone}/{reduction}/seed{number}.npz", "rename it")
+        found[path.parts[-4], f"{backbone}-{reduction}", seed] = path
+    return found

@@ -1,0 +1,133 @@
+"""SHAP and sensitivity analysis under other readings: the knobs of Monte-Carlo ICP, run anew on some test samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.alignment.rigid import inverse, transform
+from gpca.attribution.metrics import ALL
+from gpca.causes.shapley import shapley_values
+from gpca.experiments.specification_curve.given import Given, Row
+from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.progress import progress
+from gpca.seeds import generator
+from gpca.uncertainty.conditions import CORNERS
+from gpca.uncertainty.designs import KNOB_RANGE, STEP, Pair
+from gpca.uncertainty.evaluation import design_rows
+from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import divergence, log_determinant, log_residual
+
+# Step from the untouched pair, of each knob.
+STEPS = {"small": STEP * KNOB_RANGE, "middle": np.subtract(MIDDLE, UNTOUCHED)}
+
+
+def sensitivity(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
+    """Yield the accuracies of local sensitivity analysis under each reading."""
+    settings = given.uncertainty()
+    for source, seed, pairs in _pairs(given, sizes, settings, settings.starts, "sensitivity"):
+        found = [(concept, _steps(runs["observed"], settings)) for concept, runs in pairs]
+        concept_S, measured = zip(*found, strict=True)
+        for reading in readings:
+            step_3 = STEPS[reading["step"]]
+            values_S_K = np.array([of_sample[reading["quantity"]] for of_sample in measured])
+            first = 1 if reading["step"] == "small" else 4
+            change_S_3 = values_S_K[:, first : first + 3] - values_S_K[:, :1]
+            derivative_S_3 = change_S_3 / (step_3 / KNOB_RANGE if reading["unit"] == "range" else step_3)
+            value = _accuracy(np.array(concept_S), derivative_S_3, reading["sign"])
+            yield reading, source, "sa_local_additive", "accuracy", ALL, seed, value
+
+
+def shap(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
+    """Yield the accuracies of SHAP under each reading."""
+    settings = given.uncertainty()
+    starts = sorted({reading["starts"] for reading in readings})
+    for source, seed, pairs in _pairs(given, sizes, settings, starts[-1], "shap"):
+        concept_S, spreads = [], []
+        for concept, runs in pairs:
+            concept_S.append(concept)
+            spreads.append({name: _corners(of_pair, starts) for name, of_pair in runs.items()})
+        for reading in readings:
+            spread_S_8 = np.array([of_sample[reading["background"]][reading["starts"]] for of_sample in spreads])
+            worth_S_8 = _worth(spread_S_8, reading["quantity"], reading["floor"])
+            value = _accuracy(np.array(concept_S), shapley_values(worth_S_8), reading["sign"])
+            yield reading, source, "shap_additive", "accuracy", ALL, seed, value
+
+
+def _pairs(
+    given: Given, sizes: ReadingSizes, settings: UncertaintySettings, starts: int, title: str
+) -> Iterator[tuple[str, int, Iterator[tuple[str, dict[str, tuple[Pair, KnobRuns]]]]]]:
+    """Yield source, seed, and of each sample its concept and its runs: of the observed pair, and of a clean one.
+
+    What is random in a sample is named as in :func:`gpca.uncertainty.evaluation.evaluate_design`.
+    """
+    for (source, seed), path in given.registrations.items():
+        registrations = Registrations.load(path, (source, seed))
+        chosen = registrations.subset(design_rows(registrations, "additive", sizes.samples))
+        yield source, seed, _runs(chosen, source, seed, settings, starts, f"{title} of {source}, seed {seed}")
+
+
+def _runs(
+    registrations: Registrations, source: str, seed: int, settings: UncertaintySettings, starts: int, title: str
+) -> Iterator[tuple[str, dict]]:
+    observed = registrations.without_labels()
+    for row in progress(range(len(registrations)), title):
+        axes = (source, seed, "uncertainty", observed.split[row], observed.sample[row])
+        xi_n_6 = generator(*axes, "starts").normal(size=(starts, 6)) * settings.deviation_6()
+        random, pair = generator(*axes, "clouds"), Pair(observed, row)
+        clouds = {"observed": pair.observed(settings.icp_points, random), "clean": pair.clean(settings.icp_points)}
+        made = {name: (of_pair, KnobRuns(*of_pair, xi_n_6, settings, random)) for name, of_pair in clouds.items()}
+        yield str(registrations.concept[row]), made
+
+
+def _steps(pair: tuple, settings: UncertaintySettings) -> dict[str, np.ndarray]:
+    """Return every quantity of the untouched pair, after each small step, and after each step to the middle, (7,)."""
+    (_, target, _, T_ref), knob_runs = pair
+    untouched = np.array(UNTOUCHED)
+    conditions = [untouched] + [untouched + step_3 * knob for step_3 in STEPS.values() for knob in np.eye(3)]
+    found = [knob_runs.runs(Knobs(*condition)) for condition in conditions]
+    spread_K = np.array([runs.covariance(T_ref) for runs, _ in found])
+    distance = settings.icp.correspondence_distance
+    best = [runs.T_target_source_n[runs.cost_n(distance).argmin()] for runs, _ in found]
+    return {quantity: _worth(spread_K, quantity, settings.floor) for quantity in WORTHS} | {
+        "trace": np.trace(spread_K, axis1=1, axis2=2),
+        "residual": np.array(
+            [
+                log_residual(transform(inverse(T), target), cKDTree(source))
+                for T, (_, source) in zip(best, found, strict=True)
+            ]
+        ),
+        "inlier_rmse": np.array([runs.inlier_rmse_n.mean() for runs, _ in found]),
+        "inlier_rmse_of_one": np.array([runs.inlier_rmse_n[0] for runs, _ in found]),
+    }
+
+
+def _corners(pair: tuple, starts: Sequence[int]) -> dict[int, np.ndarray]:
+    """Return the covariances (8, 6, 6) of the corners of the knobs' middle, over the first so many starts."""
+    (_, _, _, T_ref), knob_runs = pair
+    corners = [knob_runs.runs(Knobs(*np.where(switches, MIDDLE, UNTOUCHED)))[0] for switches in CORNERS]
+    return {n: np.array([runs.chosen(np.arange(n)).covariance(T_ref) for runs in corners]) for n in starts}
+
+
+WORTHS: dict[str, Callable[[np.ndarray, np.ndarray, float], np.ndarray]] = {
+    "divergence": divergence,
+    "divergence_reversed": lambda clean, spread, floor: divergence(spread, np.broadcast_to(clean, spread.shape), floor),
+    "log_determinant": lambda clean, spread, floor: log_determinant(spread, floor),
+}
+
+
+def _worth(spread_K: np.ndarray, quantity: str, floor: float) -> np.ndarray:
+    """Return the uncertainty (…, K) of covariances (…, K, 6, 6), of which the first is the untouched pair's."""
+    return WORTHS[quantity](spread_K[..., :1, :, :], spread_K, floor)
+
+
+def _accuracy(concept_S: np.ndarray, values_S_3: np.ndarray, sign: str) -> float:
+    """Return the share of samples whose concept has the value that counts; where all are equal, none is named."""
+    signed_S_3 = {"signed": values_S_3, "absolute": np.abs(values_S_3), "lowest": -values_S_3}[sign]
+    named_S = np.array(CONCEPTS)[signed_S_3.argmax(axis=1)]
+    return float(np.mean((named_S == concept_S) & (np.ptp(values_S_3, axis=1) > 0)))

@@ -1,0 +1,51 @@
+"""GP-CA on test samples that were perturbed weakly or strongly: what other severities would do to its accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.stats import rankdata
+
+from gpca.attribution.predictions import read_predictions
+from gpca.experiments.specification_curve.given import Given, Row
+from gpca.experiments.specification_curve.judged import accuracies_of_named
+from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
+from gpca.pairs.dataset import Registrations
+
+PARTS = ("weakest", "middle", "strongest")
+CLASSIFIERS = {"paper": "gpca_paper", "converged": "gpca"}
+
+
+def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+    """Yield the accuracies under each reading, of all samples and of each concept."""
+    for (source, seed), path in given.registrations.items():
+        registrations = Registrations.load(path, (source, seed))
+        test = registrations.subset(registrations.rows("test"))
+        part_S = dict(zip(test.sample.astype(str), parts(test), strict=True))
+        for reading in readings:
+            of_classifier = given.predictions.get((source, CLASSIFIERS[reading["classifier"]], seed))
+            if of_classifier is None:
+                continue
+            rows = read_predictions(of_classifier)
+            rows = rows[rows["split"] == "test"]
+            if reading["part"] != "all":
+                rows = rows[rows["sample"].map(part_S) == reading["part"]]
+            values = accuracies_of_named(rows["concept_true"].to_numpy(), rows["concept_predicted"].to_numpy())
+            for (metric, concept), value in values.items():
+                yield reading, source, "gpca_paper", metric, concept, seed, value
+
+
+def parts(registrations: Registrations) -> np.ndarray:
+    """Return for each sample the third of its concept's samples in which its severity lies.
+
+    That of a pose error is the mean of the ranks of its angle and its length.
+    """
+    names_S = np.empty(len(registrations), object)
+    pose_S = rankdata(registrations.severity_rotation_rad) + rankdata(registrations.severity_translation)
+    severities = {"noise": registrations.severity_noise, "pose": pose_S, "overlap": registrations.severity_crop}
+    for concept, severity_S in severities.items():
+        rows = np.flatnonzero(registrations.concept == concept)
+        ranks = np.argsort(np.argsort(severity_S[rows], kind="stable"))
+        names_S[rows] = np.array(PARTS)[len(PARTS) * ranks // max(len(rows), 1)]
+    return names_S

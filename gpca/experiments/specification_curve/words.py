@@ -1,0 +1,102 @@
+"""What a reader calls the readings of the unstated: words for the values of each group's choices."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from gpca.experiments.specification_curve.registry import GROUPS
+
+_INPUTS = {"standardised": "standardized inputs", "unit_norm": "inputs of unit norm", "raw": "raw inputs"}
+_SETS = {
+    "in_distribution": "samples as in training",
+    "severity": "severer perturbations",
+    "source": "another dataset",
+    "objects": "unseen objects",
+    "seen_objects": "seen objects",
+}
+WORDS = {  # field of a group's choices -> what its values are called
+    "quantity": {
+        "divergence": "KL divergence",
+        "divergence_reversed": "reversed KL divergence",
+        "log_determinant": "log determinant",
+        "trace": "trace",
+        "residual": "residual",
+        "inlier_rmse": "inlier RMSE",
+        "inlier_rmse_of_one": "inlier RMSE of one run",
+    },
+    "sign": {"signed": "largest value", "absolute": "largest magnitude", "lowest": "smallest value"},
+    "unit": {"range": "knobs in units of their range", "own": "knobs in their own units"},
+    "step": {"small": "small step", "middle": "step to the middle"},
+    "background": {"observed": "from the observed pair", "clean": "from the clean pair"},
+    "part": {
+        "all": "all severities",
+        "weakest": "weakest third",
+        "middle": "middle third",
+        "strongest": "strongest third",
+    },
+    "classifier": {"paper": "the paper's setting", "converged": "trained longer"},
+    "inputs": _INPUTS,
+    "inducing": {"kmeans": "inducing inputs by k-means", "random": "random inducing inputs"},
+    "lengthscale": {"median": "lengthscale from the median distance", "default": "default lengthscale"},
+    "batch": {"full": "all samples at once", "minibatch": "minibatches"},
+    "kernel": {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "polynomial"},
+    "machine": {"svc": "SVC", "linear_svc": "LinearSVC"},
+    "probability": {"platt": "Platt scaling", "softmax": "softmax of the decision values"},
+    "head": {"linear": "linear head", "two_layer": "head of two layers"},
+    "set": _SETS,
+    "distance": {
+        "knn_analytical": "distance to neighbors in classic features",
+        "mahalanobis_analytical": "Mahalanobis distance in classic features",
+        "knn_embedding": "distance to neighbors in the embedding",
+        "mahalanobis_embedding": "Mahalanobis distance in the embedding",
+    },
+    "score": {"max_score": "1 - largest score", "entropy": "entropy", "bald": "BALD"},
+    "area": {"aurc": "AURC", "auroc_error": "1 - AUROC of errors"},
+    "labels": {"at_target": "labels at the target", "all": "all labels"},
+    "repeats": {
+        "everything": "everything varies",
+        "classifiers": "only the classifier varies",
+        "samples": "classifier and training samples vary",
+    },
+    "objects": {"all": "all objects", "seen": "seen objects", "unseen": "unseen objects"},
+    "input": {
+        "aligned": "cloud aligned by ICP",
+        "observed": "cloud before ICP",
+        "reversed": "ICP from the model to the cloud",
+    },
+    "features": {
+        "all": "all features",
+        "no_counts": "without point counts",
+        "no_residual": "without residuals",
+        "residual": "residuals alone",
+        "counts": "point counts alone",
+    },
+}
+NUMBERS = {  # field -> the words around a number
+    "starts": "{} starts",
+    "floor": "variances of at least {}",
+    "iterations": "{} iterations",
+    "batch": "batches of {}",
+    "new_share": "{} of the pool is new",
+    "initial": "{} labels at the start",
+    "learning_rate": "rate {}",
+}
+
+
+def reading_in_words(group: str, reading: str) -> str:
+    """Return a reading as words: ``RBF, 100 iterations`` for ``rbf/100`` of the group ``kernel``.
+
+    What is not known is kept as it is.
+    """
+    values = reading.split("/")
+    names = [field.name for field in fields(GROUPS[group].choices)] if group in GROUPS else []
+    if len(names) != len(values):
+        return ", ".join(values)
+    return ", ".join(_words(name, value) for name, value in zip(names, values, strict=True))
+
+
+def _words(name: str, value: str) -> str:
+    of_name = WORDS.get(name, {})
+    if value not in of_name and name in NUMBERS:
+        return NUMBERS[name].format(value)
+    return " and ".join(of_name.get(part, part) for part in value.split("+"))

@@ -1,0 +1,116 @@
+"""The conditions of SHAP's and sensitivity analysis' design, with any estimator's covariance in place of Monte-Carlo's.
+
+Clouds, jitter and cut are those of design ``additive`` (:mod:`gpca.uncertainty.designs`). A knob turns what it can: the
+spread of the starts is an estimator's prior, or nothing to one that reads no start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.registry import make_method
+from gpca.alignment.normals import estimate_normals
+from gpca.experiments.estimators.examples import Moved, describe, example
+from gpca.experiments.judge import Judges
+from gpca.pairs.dataset import Registrations
+from gpca.process.progress import progress
+from gpca.seeds import generator, seed_of
+from gpca.uncertainty.designs import ADDITIVE_KNOBS
+from gpca.uncertainty.designs import Pair as Clouds
+from gpca.uncertainty.estimators.interface import POINT_TO_POINT, Estimate, Example, RegisteredPair
+from gpca.uncertainty.knobs import UNTOUCHED, KnobbedSource, Knobs
+from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.spread import divergence
+
+MOVED: Moved = "observed"  # onto the model, as the paper's protocol has it
+OBSERVED = (UNTOUCHED,)  # the condition of explainers that read the observed pair alone
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What one estimator says of S registrations under K conditions.
+
+    Attributes:
+        covariance: (S, K, 6, 6), radians and diameters; NaN where it says nothing.
+        failure: (S, K) why.
+    """
+
+    covariance: np.ndarray
+    failure: np.ndarray
+
+    def why_untold(self, conditions: int) -> np.ndarray:
+        """Return (S,) why one of the first so many conditions has no estimate, empty where all have."""
+        return np.array([next(filter(None, row), "") for row in self.failure[:, :conditions]])
+
+    def attach_to(self, registrations: Registrations, rows: np.ndarray, conditions: int, floor: float) -> Registrations:
+        """Return the given rows with what explainers read of a design; its cost is not told.
+
+        Args:
+            registrations: the S.
+            rows: those that have all of the first so many conditions.
+            conditions: how many.
+            floor: ε of the divergence.
+        """
+        covariance = self.covariance[rows, :conditions]
+        zeros = np.zeros(covariance.shape[:2])
+        own = {"covariance": covariance, "uncertainty": divergence(covariance[:, :1], covariance, floor)}
+        own |= dict.fromkeys(("icp_calls", "seconds", "icp_seconds"), zeros)
+        chosen = registrations.subset(rows)
+        return replace(chosen, attached={**chosen.attached, **own})
+
+
+class Registrar:
+    """Registers the rows of a source and seed by point-to-point ICP, under any setting of the knobs."""
+
+    def __init__(self, registrations: Registrations, source: str, seed: int, settings: UncertaintySettings) -> None:
+        self._registrations, self._axes, self._settings = registrations, (source, seed, "uncertainty"), settings
+        self._register = make_method(POINT_TO_POINT)
+
+    def under(self, row: int, settings_of_knobs: Sequence[Knobs]) -> Iterator[RegisteredPair]:
+        """Yield the registration of a row under each setting."""
+        registrations, settings = self._registrations, self._settings
+        axes = (*self._axes, registrations.split[row], registrations.sample[row])
+        random = generator(*axes, "clouds")
+        points, target, T_init, _ = Clouds(registrations, row).observed(settings.icp_points, random)
+        source = KnobbedSource(points, random)
+        normals = estimate_normals(target)
+        for knobs in settings_of_knobs:
+            pair = Pair(source.at(knobs), target, T_init, None, normals, seed_of(*axes, "estimates"))
+            outcome = self._register(pair)
+            deviation_6 = knobs.spread * settings.deviation_6()
+            described = cache(lambda pair=pair, outcome=outcome: describe(pair, outcome, MOVED))
+            yield RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6, described)
+
+    def examples(self, rows: np.ndarray, judges: Judges) -> list[Example]:
+        """Return the rows as estimators learn from them."""
+        found = []
+        for row in rows:
+            [registered] = self.under(row, OBSERVED)
+            T_true = self._registrations.T_target_source("true", row)
+            judge = judges.of(self._registrations, row)
+            found.append(example(registered, T_true, judge, MOVED, self._settings.starts, *self._axes))
+        return found
+
+    def estimates(
+        self,
+        rows: np.ndarray,
+        estimators: Mapping[str, Callable[[RegisteredPair], Estimate]],
+        settings_of_knobs: Sequence[Knobs] = ADDITIVE_KNOBS,
+    ) -> dict[str, Estimates]:
+        """Return what each estimator says of the rows under each setting."""
+        shape = len(rows), len(settings_of_knobs)
+        found = {name: Estimates(np.full((*shape, 6, 6), np.nan), np.full(shape, "", object)) for name in estimators}
+        for s, row in enumerate(progress(rows, f"estimates of {self._axes[0]}, seed {self._axes[1]}")):
+            for k, registered in enumerate(self.under(row, settings_of_knobs)):
+                for name, estimate in estimators.items():
+                    said = estimate(registered)
+                    if said.covariance_6_6 is None:
+                        found[name].failure[s, k] = said.failure
+                    else:
+                        found[name].covariance[s, k] = said.covariance_6_6
+        return found

@@ -1,0 +1,148 @@
+"""Every explainer with each registration method, or each estimator of uncertainty, beneath it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.predictions import prediction_frame
+from gpca.attribution.scores import Attribution
+from gpca.experiments.controls.rivals import Embed, Rival, described_for
+from gpca.experiments.judge import Judges
+from gpca.experiments.substitution.estimated import OBSERVED, Estimates, Registrar
+from gpca.experiments.substitution.registered import registered_by
+from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
+from gpca.io.names import SPLITS
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.designs import ADDITIVE_KNOBS
+from gpca.uncertainty.estimators.registry import make_estimator
+from gpca.uncertainty.settings import UncertaintySettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+UNTAUGHT = "too few training registrations have an estimate"
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """What is exchanged beneath the explainers of one source and seed.
+
+    Attributes:
+        source, seed: name what is random.
+        settings: of the exchange.
+        methods, estimators: name -> settings.
+        uncertainty: floor, points and spread of the starts, of the estimators.
+        rivals: by name. Those that read an uncertainty get each estimator's, the others each method's registrations.
+        embed: registrations and the name of their source -> embeddings and head's logits by the run's encoder.
+    """
+
+    source: str
+    seed: int
+    settings: ExchangeSettings
+    methods: Mapping[str, Mapping]
+    estimators: Mapping[str, Mapping]
+    uncertainty: UncertaintySettings
+    rivals: Mapping[str, Rival]
+    embed: Embed
+
+    def run(self, registrations: Registrations, judges: Judges) -> pd.DataFrame:
+        """Return a row for each explainer, test sample, and what was exchanged beneath it.
+
+        Args:
+            registrations: of the source, by the paper's protocol.
+            judges: of their objects.
+
+        Returns:
+            the columns of a prediction file after `LABELS`, and `FAILURE`. Of methods, ``learnt_from`` and ``asked_of``
+            are that of the training and that of the test registrations; of estimators they are the same.
+        """
+        import pandas as pd
+
+        of_estimators = {name: rival for name, rival in self.rivals.items() if rival.reads.startswith("uncertainty/")}
+        of_methods = {name: rival for name, rival in self.rivals.items() if name not in of_estimators}
+        frames = list(self._by_methods(registrations, of_methods)) if of_methods else []
+        if of_estimators:
+            frames += self._by_estimators(registrations, of_estimators, judges)
+        return pd.concat(frames, ignore_index=True)
+
+    def _by_methods(self, registrations: Registrations, rivals: Mapping[str, Rival]) -> Iterator[pd.DataFrame]:
+        settings = self.settings
+        rows = np.concatenate(
+            [first(registrations, "train", settings.train), first(registrations, "test", settings.test)]
+        )
+        found = {}
+        axes = self.source, self.seed, settings.points
+        for name, (anew, failure_S) in registered_by(registrations.subset(rows), self.methods, *axes).items():
+            h_S_d, logits_S_C = self.embed(anew, self.source)
+            seen = replace(anew, attached={"embedding": h_S_d, "head_logits": logits_S_C})
+            found[name] = described_for(rivals, seen), failure_S
+        for learnt_from, (learnt, _) in found.items():
+            for explainer_name, rival in rivals.items():
+                explainer = rival.make()
+                explainer.fit(learnt.subset(learnt.rows("train")))
+                for asked_of, (asked, failure_S) in found.items():
+                    test = asked.subset(asked.rows("test"))
+                    said = explainer.explain(test.without_labels())
+                    labels = METHOD, learnt_from, asked_of, explainer_name
+                    yield labelled(prediction_frame(test, said), labels, failure_S[asked.rows("test")])
+
+    def _by_estimators(
+        self, registrations: Registrations, rivals: Mapping[str, Rival], judges: Judges
+    ) -> Iterator[pd.DataFrame]:
+        settings = self.settings
+        learnt = first(registrations, "train", 2 * settings.estimated_train)
+        half = len(learnt) // 2 // len(CONCEPTS) * len(CONCEPTS)  # threes of one object stay together
+        test = first(registrations, "test", settings.estimated_test)
+        described = described_for(rivals, registrations.subset(np.concatenate([learnt[:half], test])))
+        rows_of = {split: described.rows(split) for split in SPLITS}
+        examples = Registrar(registrations, self.source, self.seed, self.uncertainty).examples(learnt[half:], judges)
+        estimators = {name: make_estimator(name, given, examples) for name, given in self.estimators.items()}
+        registrar = Registrar(described.without_labels(), self.source, self.seed, self.uncertainty)
+        lessons = rows_of["train"] if any(rival.observed_only for rival in rivals.values()) else np.arange(0)
+        taught = registrar.estimates(lessons, estimators, OBSERVED)
+        asked = registrar.estimates(rows_of["test"], estimators)
+        train, test_samples = (described.subset(rows) for rows in rows_of.values())
+        for estimator in estimators:
+            for name, rival in rivals.items():
+                said, failure_S = self._said(rival, train, taught[estimator], test_samples, asked[estimator])
+                frame = prediction_frame(test_samples, said)
+                yield labelled(frame, (ESTIMATOR, estimator, estimator, name), failure_S)
+
+    def _said(
+        self, rival: Rival, train: Registrations, taught: Estimates, test: Registrations, asked: Estimates
+    ) -> tuple[Attribution, np.ndarray]:
+        """Return the attribution of all test samples, abstained where there is no estimate, and why there is none."""
+        floor, conditions = self.uncertainty.floor, len(OBSERVED if rival.observed_only else ADDITIVE_KNOBS)
+        explainer = rival.make()
+        failure_S = asked.why_untold(conditions)
+        if rival.observed_only:
+            known = np.flatnonzero(taught.why_untold(len(OBSERVED)) == "")
+            if set(train.concept[known]) < set(CONCEPTS):
+                failure_S = np.where(failure_S == "", UNTAUGHT, failure_S)
+            else:
+                explainer.fit(taught.attach_to(train, known, len(OBSERVED), floor))
+        told = np.flatnonzero(failure_S == "")
+        scores_S_C = np.zeros((len(test), len(CONCEPTS)))
+        abstained_S = np.ones(len(test), bool)
+        if len(told):
+            said = explainer.explain(asked.attach_to(test.without_labels(), told, conditions, floor))
+            scores_S_C[told], abstained_S[told] = said.scores_N_C, said.abstained_N
+        return Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S), failure_S
+
+
+def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
+    """Return the rows of the first so many samples of a split: threes of one object, which go round the objects."""
+    return np.flatnonzero((registrations.split == split) & (registrations.sample < samples))
+
+
+def labelled(frame: pd.DataFrame, labels: tuple[str, ...], failure_S: np.ndarray) -> pd.DataFrame:
+    """Return a prediction file's columns between `LABELS` and `FAILURE`."""
+    for place, (name, label) in enumerate(zip(LABELS, labels, strict=True)):
+        frame.insert(place, name, label)
+    frame[FAILURE] = failure_S
+    return frame

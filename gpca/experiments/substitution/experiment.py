@@ -1,0 +1,85 @@
+"""Explanations with other registration methods, and other estimators of uncertainty, beneath them (Table XIV)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from gpca.experiments.experiment import Experiment
+from gpca.experiments.substitution.settings import ExchangeSettings
+
+# What these functions import inside loads numba, and this module is loaded by every command.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ExchangeSettings):
+    """The settings, and the sources whose registrations are explained."""
+
+    sources: tuple[str, ...]
+
+
+def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
+    """Check the names; as under controls, an explainer's settings add to those that it has as an explainer."""
+    from baselines.registry import require_settings
+    from gpca.errors import require_names, with_key
+    from gpca.experiments.substitution.asked import require_exchangeable
+    from gpca.settings import check_settings
+
+    exchange = config["exchange"]
+    for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
+        require_names(f"exchange.{key}", exchange[key], config[key], noun, left_out(key))
+    for name, settings in exchange["explainers"].items():
+        key = f"exchange.explainers.{name}"
+        own = (config["explainers"].get(name) or {}) | (settings or {})
+        with_key(key, require_settings, name, own)
+        with_key(key, check_settings, own, "explainers", name)
+        with_key(key, require_exchangeable, name)
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the sources and seeds, the methods, and the explainers whose estimator or whose method is exchanged."""
+    from baselines.registry import explainer_entry
+    from gpca.alignment.methods.registry import installed
+
+    exchange = config["exchange"]
+    return {
+        "exchange_source": list(exchange["sources"]),
+        "exchange_seed": list(config["seeds"])[: exchange["seeds"]],
+        "exchange_estimated": [name for name in exchange["explainers"] if explainer_entry(name).design],
+        "exchange_registered": [name for name in exchange["explainers"] if not explainer_entry(name).design],
+        "exchange_method": installed(exchange["methods"]),
+    }
+
+
+def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the titles of what stands in the tables, and the methods whose package is missing here."""
+    from baselines.registry import explainer_entry
+    from gpca.alignment.methods.registry import installed, left_out, method_entry
+    from gpca.uncertainty.estimators.registry import estimator_entry
+
+    exchange = config["exchange"]
+    missing = left_out(exchange["methods"])
+    return {
+        "exchange_sources": {
+            name: {key: sources[name][key] for key in ("title", "stand_in")} for name in exchange["sources"]
+        },
+        "exchange_explainers": {name: explainer_entry(name).title for name in exchange["explainers"]},
+        "exchange_methods": {name: method_entry(name).title for name in installed(exchange["methods"])},
+        "exchange_left_out": {method_entry(name).title: package for name, package in missing.items()},
+        "exchange_estimators": {name: estimator_entry(name).title for name in exchange["estimators"]},
+    }
+
+
+EXPERIMENT = Experiment(
+    name="exchange",
+    summary="registrations -> explanations based on other registration methods and estimators",
+    settings=Section,
+    tidy="exchange.csv",
+    folder="substitution",
+    names=names,
+    shown=shown,
+    check=check,
+    lists={"sources": "sources", "methods": "methods", "estimators": "estimators"},
+    explainers=True,
+)

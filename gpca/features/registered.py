@@ -1,0 +1,109 @@
+"""What can be measured of registrations as the paper's protocol makes them: two clouds and what ICP did, once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse
+from gpca.alignment.twist import log
+from gpca.features.distances import MatchedPair, describe_distances
+from gpca.features.groups import QUANTILES
+from gpca.features.pair import ObservedPair, displacements
+from gpca.features.points import CHANNELS, describe_points, log_of_ratio
+from gpca.pairs.dataset import Registrations
+from gpca.process.progress import progress
+from gpca.seeds import generator
+
+SMALLEST = 1e-5  # diameters; nothing is nearer that could be told from zero
+COARSE = slice(0, QUANTILES, 3)  # five of the thirteen quantiles say as much of a relation
+WIDTHS = {"distances": 4 * QUANTILES, "relations": 35, "densities": 2}
+POINTS = "points"
+MOTION = 5  # of the relations, the last: what ICP did
+
+
+def describe_registrations(registrations: Registrations, *axes: object, points: int) -> dict[str, np.ndarray]:
+    """Return the groups of `WIDTHS`, each (N, F), of N registrations, and what their points are told.
+
+    - distances: the 52 of :func:`gpca.features.distances.describe_distances`, in diameters.
+    - relations: what of a pair does not depend on which object it is (:func:`relations`).
+    - densities: logarithms of spacing and extent of the observed cloud relative to the model's.
+    - points: (N, 2, points, 7) of :func:`gpca.features.points.describe_points`.
+
+    Args:
+        registrations: N of them.
+        axes: name the draws, with split and number of a sample.
+        points: drawn from each cloud, as an encoder sees so many; all where there are fewer.
+    """
+    rows = []
+    for row in progress(range(len(registrations)), "descriptions of pairs"):
+        random = generator(*axes, "pair", registrations.split[row], registrations.sample[row])
+        rows.append(_describe(observed_once(registrations, row, points, random), points))
+    groups = {name: np.array([row[name] for row in rows]).reshape(len(rows), width) for name, width in WIDTHS.items()}
+    of_points = [row[POINTS] for row in rows]
+    return groups | {POINTS: np.array(of_points, np.float32).reshape(len(rows), 2, points, CHANNELS)}
+
+
+def observed_once(registrations: Registrations, row: int, points: int, random: np.random.Generator) -> ObservedPair:
+    """Return what may be seen of a row, thinned to so many points of each cloud, with the one run of ICP there was."""
+    observed, model = (
+        cloud[np.sort(random.permutation(len(cloud))[:points])].astype(np.float64)
+        for cloud in (registrations.cloud(row), registrations.target(row))
+    )
+    return ObservedPair(
+        observed=observed,
+        model=model,
+        T_init=registrations.T_target_source("init", row) @ inverse(registrations.T_target_source("icp", row)),
+        T_runs=np.eye(4)[None],
+        fitness_n=registrations.fitness[[row]],
+        inlier_rmse_n=registrations.inlier_rmse[[row]],
+        axes=(),
+    )
+
+
+def _describe(pair: ObservedPair, points: int) -> dict[str, np.ndarray]:
+    matched = MatchedPair.of(pair)
+    distances, planes = describe_distances(pair, matched)
+    spacing, model_spacing, extent, model_extent = np.log(np.maximum(planes[3 * QUANTILES :][:4], SMALLEST))
+    return {
+        "distances": distances,
+        "relations": relations(pair, distances, planes),
+        "densities": np.array([spacing - model_spacing, extent - model_extent]),
+        POINTS: describe_points(pair, matched, points),
+    }
+
+
+def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Return 35 numbers that compare the clouds with what the model alone would give.
+
+    An object's own shape sets how far its points lie apart and how thick its local planes are. Logarithms of quantiles,
+    relative to these, are alike for all objects: of the distances both ways to the model's spacing, of the distances
+    from the planes both ways to the model's median thickness, of the observed thickness to the model's; then the
+    quantiles of |cosine| between normals, and the motion: angle (radians), length and displacement (diameters),
+    fitness, and the inlier RMSE relative to the spacing.
+
+    Args:
+        pair: what was observed and its model.
+        distances, planes: what :func:`gpca.features.distances.describe_distances` says of it.
+    """
+    to_model, to_observed, from_plane, thickness = distances.reshape(4, QUANTILES)[:, COARSE]
+    from_observed_plane, cosine, model_thickness = planes[: 3 * QUANTILES].reshape(3, QUANTILES)[:, COARSE]
+    spacing, usual_thickness = planes[3 * QUANTILES + 1], np.median(model_thickness)
+
+    def log_ratio(lengths: np.ndarray, to: np.ndarray | float) -> np.ndarray:
+        return log_of_ratio(lengths, to, spacing)
+
+    moved = log(inverse(pair.T_init)[None])[0]
+    return np.concatenate(
+        [
+            log_ratio(to_model, spacing),
+            log_ratio(to_observed, spacing),
+            log_ratio(from_plane, usual_thickness),
+            log_ratio(thickness, model_thickness),
+            log_ratio(from_observed_plane, usual_thickness),
+            cosine,
+            [np.sqrt(np.square(moved[:3]).sum()), np.sqrt(np.square(moved[3:]).sum())],
+            displacements(pair.T_init[None], pair.observed),
+            pair.fitness_n,
+            log_ratio(pair.inlier_rmse_n, spacing),
+        ]
+    )

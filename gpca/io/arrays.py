@@ -1,0 +1,162 @@
+"""Arrays in npz files: without pickles, of a known source and seed, and no more than the memory can hold."""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.io.axes import Axes, require_axes
+from gpca.io.files import whole_file
+from gpca.io.limits import LARGEST_NUMBER, is_bounded, require_file, require_memory
+from gpca.io.names import SPLITS, is_name
+
+TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy
+_KNOWN = f"b{REAL}{TEXT}"
+_FLOAT_BYTES = (4, 8)
+_LONGEST_HEADER = 10_000  # bytes; NumPy parses none that is longer
+
+
+def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray], axes: Axes | None = None) -> None:
+    """Write an npz whose bytes depend on the arrays and axes alone (NumPy stamps every member 1980-01-01).
+
+    Args:
+        path: the file.
+        arrays: by name.
+        axes: the source and seed that they are of, kept beside them as ``source`` and ``seed``.
+    """
+    source, seed = axes or (None, None)
+    of = {name: np.array(value) for name, value in (("source", source), ("seed", seed)) if value is not None}
+    with whole_file(path) as partial:
+        np.savez(partial, allow_pickle=False, **arrays, **of)
+
+
+def load_arrays(
+    path: str | Path,
+    shapes: Mapping[str, tuple[int | str, ...]],
+    made_by: str,
+    kinds: Mapping[str, str] | None = None,
+    axes: Axes | None = None,
+    optional: Collection[str] = (),
+) -> dict[str, np.ndarray]:
+    """Load the arrays of an npz that a stage needs, and no others.
+
+    What their headers say is checked before any data is read, so that a small file cannot fill the memory.
+
+    Args:
+        path: the file.
+        shapes: for each needed array its shape; a number must match, a letter (``"S"``) must be the
+            same size wherever it occurs.
+        made_by: the command that writes such a file; named in the message.
+        kinds: for some of them what they may hold: `TEXT`, `WHOLE` or `REAL`. Any other may hold each of these.
+        axes: the source and seed that the file has to be of; it may be of any where this is None.
+        optional: arrays that may be missing, as ``source`` in a file that a user's own program wrote.
+
+    Raises:
+        InputError: missing or unreadable file, pickled objects, missing array, wrong shape or type, more than the
+            machine can hold, NaN, infinity, numbers beyond all that can be measured, unknown splits, empty names, a
+            file of another source or seed, or one that does not say.
+    """
+    path = Path(path)
+    require_file(path, "no such file", f"make it with '{made_by}'", math.inf)
+    remedy = f"regenerate it with '{made_by}'"
+    shapes, kinds = _with_axes(shapes, kinds or {}, axes)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = _checked_members(archive, path, shapes, kinds, optional, remedy)
+            arrays = {name: _read_array(archive, info) for name, info in members.items()}
+    except InputError:
+        raise
+    except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
+        raise InputError(path, "is not a readable npz archive", remedy) from fault
+    for name, array in arrays.items():
+        if (found := _fault_of(name, array)) is not None:
+            raise InputError(path, f"array '{name}' contains {found}", remedy)
+    if axes is not None and "source" in arrays:
+        require_axes(path, axes_in(arrays), axes, made_by)
+    return arrays
+
+
+def axes_in(arrays: Mapping[str, np.ndarray]) -> Axes:
+    """Return the source and the seed that arrays are of; those of objects have no seed."""
+    return str(arrays["source"]), int(arrays["seed"]) if "seed" in arrays else None
+
+
+def _with_axes(shapes, kinds, axes: Axes | None) -> tuple[dict, dict]:
+    """Return the shapes and kinds of what has to be read, the axes included where some are expected."""
+    of: dict[str, str] = {}
+    if axes is not None:
+        of = {"source": TEXT} | ({} if axes[1] is None else {"seed": WHOLE})
+    return {**shapes, **dict.fromkeys(of, ())}, {**kinds, **of}
+
+
+def _fault_of(name: str, array: np.ndarray) -> str | None:
+    """Return what is wrong with the values of an array, whatever it is for."""
+    if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():
+        return "NaN or infinity" if not np.isfinite(array).all() else f"numbers above {LARGEST_NUMBER:.0e}"
+    if array.dtype.kind == TEXT:
+        words = set(array.ravel().tolist())
+        if not all(is_name(word) for word in words):
+            return "a name that is empty or does not fit on one line"
+        if name == "split" and (unknown := words - set(SPLITS)):
+            return f"the split {sorted(unknown)[0]!r}, which is neither train nor test"
+    return None
+
+
+def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str, zipfile.ZipInfo]:
+    """Return the member of each array, once its header is found to be right."""
+    listed = archive.namelist()
+    sizes: dict[str, int] = {}
+    members = {}
+    for name, shape in shapes.items():
+        if (count := listed.count(f"{name}.npy")) == 0 and name in optional:
+            continue
+        if count != 1:
+            raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
+        members[name] = info = archive.getinfo(f"{name}.npy")
+        if not is_bounded(info):
+            raise InputError(path, f"array '{name}' uses a compression that npz does not support", remedy)
+        with archive.open(info) as stream:
+            actual, dtype, start = _npy_header(stream)
+        if dtype.hasobject:
+            raise InputError(path, "contains pickled objects, which are never loaded", remedy)
+        _check_shape(path, name, actual, shape, sizes, remedy)
+        if math.prod(actual) and dtype.kind not in kinds.get(name, _KNOWN):
+            raise InputError(path, f"array '{name}' has type {dtype}", remedy)
+        if (dtype.kind == "f" and dtype.itemsize not in _FLOAT_BYTES) or not dtype.isnative:
+            # Half precision has lost digits, and neither torch nor LAPACK calculates with more than double.
+            raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", remedy)
+        if start + math.prod(actual) * dtype.itemsize != info.file_size:
+            raise ValueError(f"array '{name}' is not as long as its header says")
+    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
+    return members
+
+
+def _npy_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype, int]:
+    """Return shape, type and length of the header of a member; it may claim to be gigabytes long itself."""
+    head = io.BytesIO(stream.read(_LONGEST_HEADER))
+    version = np.lib.format.read_magic(head)
+    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+    shape, _, dtype = read(head)
+    return shape, dtype, head.tell()
+
+
+def _read_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    with archive.open(info) as stream:
+        return np.lib.format.read_array(stream, allow_pickle=False)
+
+
+def _check_shape(path, name, actual, shape, sizes, remedy) -> None:
+    matches = len(actual) == len(shape) and all(
+        sizes.setdefault(size, found) == found if isinstance(size, str) else size == found
+        for size, found in zip(shape, actual, strict=True)
+    )
+    if not matches:
+        expected = "×".join(str(sizes.get(size, size)) for size in shape) or "scalar"
+        raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {expected}", remedy)

@@ -1,0 +1,127 @@
+"""CSV files, every fault said in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.io.files import whole_file
+from gpca.io.limits import require_file
+from gpca.io.names import SPLITS
+from gpca.numerals import decimal
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_CONTROL = r"[\x00-\x08\x0a-\x1f\x7f]"  # all but tabs, by which a user's program may part numbers
+NAMES = ("object", "method", "explainer", "policy")  # columns whose entries name something in every file
+ANY = ("*",)
+
+
+def read_csv(
+    path: str | Path, columns: Iterable[str], others: Iterable[str] = (), remedy: str = "regenerate it"
+) -> pd.DataFrame:
+    """Read a CSV file with these columns and at least one row, every entry as the text that stands there.
+
+    Args:
+        path: the file.
+        columns: those that have to be there.
+        others: patterns of those that may be there too; `ANY` in a file of a user, or of which a part is read.
+        remedy: what to do about a damaged file.
+
+    Raises:
+        InputError: missing, empty or unreadable file, column that is missing, unknown or there twice, no rows, rows
+            longer than the head, an entry of several lines, an empty name, a split that is neither train nor test.
+    """
+    require_file(path, "no such file", "make it with snakemake")
+    import pandas as pd
+
+    try:
+        rows = pd.read_csv(path, dtype=str, keep_default_na=False)
+    except pd.errors.EmptyDataError as fault:
+        raise InputError(path, "is empty", remedy) from fault
+    except (pd.errors.ParserError, UnicodeDecodeError, OSError) as fault:
+        raise InputError(path, f"is not a readable CSV file ({fault})", remedy) from fault
+    needed = tuple(columns)
+    if missing := [column for column in needed if column not in rows.columns]:
+        raise InputError(path, f"column '{missing[0]}' is missing", remedy)
+    if not isinstance(rows.index, pd.RangeIndex):  # pandas takes what is too much for an index, and shifts the rest
+        raise InputError(path, "has rows with more entries than columns", remedy)
+    # pandas gives the second of two columns another name, so the head is read once more as it stands.
+    head = pd.read_csv(path, dtype=str, keep_default_na=False, header=None, nrows=1).iloc[0]
+    if (twice := head[head.duplicated()]).size:
+        raise InputError(path, f"column '{twice.iloc[0]}' appears twice", remedy)
+    ours = [name for name in head if any(fnmatchcase(str(name), pattern) for pattern in {*needed, *others} - {*ANY})]
+    if not {*ANY} & {*others} and (unknown := [name for name in head if name not in ours]):
+        raise InputError(path, f"column '{unknown[0]}' is unknown", remedy)
+    if rows.empty:
+        raise InputError(path, "has no rows", remedy)
+    _require_entries(path, rows[ours], remedy)
+    return rows
+
+
+def _require_entries(path: str | Path, rows: pd.DataFrame, remedy: str) -> None:
+    """Raise an InputError for an entry that no file of any kind can have."""
+    for name, entries in rows.items():
+        faults = [("a line break or another control character", entries.str.contains(_CONTROL))]
+        if name in NAMES:
+            faults.append(("an empty name", entries.str.strip() == ""))
+        if name == "split":
+            faults.append(("a split that is neither train nor test", ~entries.isin(SPLITS)))
+        for fault, at in faults:
+            if at.any():
+                raise InputError(f"{path}, line {at.argmax() + 2}", f"column '{name}' contains {fault}", remedy)
+
+
+def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, least: float = -np.inf) -> pd.Series:
+    """Return a column as float64; NaN where it is not `needed` and no number.
+
+    Raises:
+        InputError: no number where one is needed; a number below `least`.
+    """
+    import pandas as pd
+
+    values = pd.to_numeric(rows[column], errors="coerce").astype(float)
+    if (~np.isfinite(values) & needed).any():
+        raise InputError(path, f"column '{column}' contains values that are not finite numbers", "regenerate it")
+    if (values < least).any():
+        raise InputError(path, f"column '{column}' contains numbers below {least:g}", "regenerate it")
+    return values
+
+
+def read_numbers(
+    path: str | Path, columns: Iterable[str], numeric: Iterable[str], optional: Iterable[str] = (), least=-np.inf
+) -> pd.DataFrame:
+    """Read a CSV file as :func:`read_csv` does, its numeric columns as numbers; only optional ones may be empty, NaN.
+
+    Raises:
+        InputError: as of :func:`read_csv` and :func:`numbers`.
+    """
+    rows, may_be_empty = read_csv(path, columns), set(optional)
+    for column in numeric:
+        needed = rows[column] != "" if column in may_be_empty else True
+        rows[column] = numbers(path, rows, column, needed, least)
+    return rows
+
+
+def finite_number(subject: object, name: str, text: str, remedy: str = "regenerate it") -> float:
+    """Return the number that one field holds; `subject` and `name` say where it stands.
+
+    Raises:
+        InputError: no number, NaN or infinity.
+    """
+    try:
+        return decimal(text.strip())
+    except ValueError as fault:
+        raise InputError(subject, f"'{name}' is '{text[:40]}', not a finite number", remedy) from fault
+
+
+def write_csv(path: str | Path, frame: pd.DataFrame, form: str | None = "%.6f") -> None:
+    """Write a CSV file, whole or not at all; `form` is that of numbers with decimals, None for all their digits."""
+    with whole_file(path) as partial:
+        frame.to_csv(partial, index=False, float_format=form, lineterminator="\n")

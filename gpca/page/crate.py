@@ -1,0 +1,203 @@
+"""Describes a run as an RO-Crate: one JSON-LD file that names every result, the job that made it, and from what.
+
+It holds what the records of provenance beside the results say, in the form of RO-Crate 1.1 with its profile for runs of
+single programs, so that catalogues and archives of data can read it.
+"""
+
+from __future__ import annotations
+
+import json
+import mimetypes
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from gpca.errors import InputError
+from gpca.io.files import whole_file
+from gpca.io.json_file import read_json
+
+NAME = "ro-crate-metadata.json"
+RECORD = ".provenance.json"
+SPECIFICATION = "https://w3id.org/ro/crate/1.1"
+PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
+CONTEXT = (f"{SPECIFICATION}/context", "https://w3id.org/ro/terms/workflow-run/context")
+PAPER = "https://arxiv.org/abs/2509.18786"
+LICENSE = "The suite is under the MIT license; the datasets that the run read keep their own licenses."
+
+
+@dataclass(frozen=True)
+class Job:
+    """One recorded block of work.
+
+    Attributes:
+        outputs: The files or folders that it wrote, relative to the run's folder.
+        inputs: The SHA-256 of each file that it read, by its path: relative to the run's folder, or as it was given.
+        code: Version and commit of the suite, and whether tracked files differed from it.
+        libraries: The version of each library.
+        ended: When it ended, in UTC.
+        seconds: How long it took.
+    """
+
+    outputs: tuple[str, ...]
+    inputs: Mapping[str, str]
+    code: Mapping[str, Any]
+    libraries: Mapping[str, str]
+    ended: datetime
+    seconds: float
+
+
+def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Sequence[int]) -> None:
+    """Write ``ro-crate-metadata.json`` of the run in a folder from all records of provenance below it.
+
+    Args:
+        folder: The folder ``results/{run}``.
+        run: The name of the run.
+        sources: The titles of its datasets.
+        seeds: The seeds of its repeats.
+
+    Raises:
+        InputError: There is no record, or a damaged one.
+    """
+    description = (
+        "Explanations of uncertain point cloud registrations: tables, figures and the numbers behind them, on "
+        f"{', '.join(sources)}; seeds {', '.join(map(str, seeds))}."
+    )
+    document = crate(read_jobs(Path(folder)), f"GP-CA Bench: run {run}", description)
+    with whole_file(Path(folder, NAME)) as half:
+        half.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def read_jobs(folder: Path) -> list[Job]:
+    """Return the jobs of a run, by their first output; those that wrote several files left one record beside each.
+
+    The job that writes the crate is left out: what an earlier one has left says nothing of this one.
+    """
+    paths_of = defaultdict(list)
+    for path in sorted(folder.rglob(f"*{RECORD}")):
+        paths_of[path.read_bytes()].append(path)
+    if not paths_of:
+        raise InputError(folder, f"has no *{RECORD}", "name the folder of a finished run")
+    own = {folder / f"{NAME}{RECORD}"}
+    return [_job(folder, paths) for paths in paths_of.values() if own.isdisjoint(paths)]
+
+
+def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
+    """Return the metadata document: ``@context`` and the flat ``@graph`` of entities that refer to each other."""
+    hashes = {path: digest for job in jobs for path, digest in job.inputs.items()}
+    parts = sorted({path for job in jobs for path in job.outputs})
+    named = {path: path for path in parts}
+    named |= {path: f"#input-{digest[:16]}" for path, digest in hashes.items() if path not in named}
+    entities = [_part(path, hashes.get(path)) for path in parts]
+    entities += [
+        {"@id": identifier, "@type": "CreativeWork", "name": Path(path).name, "sha256": hashes[path]}
+        for path, identifier in named.items()
+        if identifier.startswith("#")
+    ]
+    entities += [_software(job.code, job.libraries) for job in jobs]
+    entities += [_library(*library) for job in jobs for library in job.libraries.items()]
+    actions = [_action(job, named) for job in jobs]
+    root: dict[str, Any] = {
+        "@id": "./",
+        "@type": "Dataset",
+        "name": name,
+        "description": description,
+        "datePublished": max(job.ended for job in jobs).date().isoformat(),
+        "license": LICENSE,
+        "conformsTo": {"@id": PROFILE},
+        "citation": {"@id": PAPER},
+        "hasPart": _references(parts),
+        "mentions": _references(action["@id"] for action in actions),
+    }
+    title = "Human-Interpretable Uncertainty Explanations for Point Cloud Registration"
+    about: dict[str, Any] = {
+        "@id": NAME,
+        "@type": "CreativeWork",
+        "about": {"@id": "./"},
+        "conformsTo": {"@id": SPECIFICATION},
+    }
+    known: list[dict[str, Any]] = [
+        {"@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5"},
+        {"@id": PAPER, "@type": "ScholarlyArticle", "name": title},
+    ]
+    graph = {entity["@id"]: entity for entity in (about, root, *known, *entities, *actions)}
+    return {"@context": list(CONTEXT), "@graph": list(graph.values())}
+
+
+def _job(folder: Path, paths: Sequence[Path]) -> Job:
+    """Read the record that stands beside all outputs of a job."""
+    read = partial(read_json, what="a record of provenance", remedy="regenerate its result")
+    record = read(paths[0])
+    outputs = [path.with_name(path.name.removesuffix(RECORD)) for path in paths]
+    try:
+        return Job(
+            outputs=tuple(_relative(folder, path) + ("/" if path.is_dir() else "") for path in outputs),
+            inputs={_relative(folder, Path(path)): digest for path, digest in record["inputs_sha256"].items()},
+            code=record["code"],
+            libraries=record["libraries"],
+            ended=datetime.fromtimestamp(int(paths[0].stat().st_mtime), UTC),
+            seconds=float(record["seconds"]),
+        )
+    except (KeyError, TypeError, AttributeError, ValueError) as fault:
+        raise InputError(paths[0], "is not a record of provenance", "regenerate its result") from fault
+
+
+def _relative(folder: Path, path: Path) -> str:
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else str(path)
+
+
+def _part(path: str, digest: str | None) -> dict[str, Any]:
+    """A result of the run; its hash is known where another job read it."""
+    form = mimetypes.guess_type(path)[0]
+    entity: dict[str, Any] = {"@id": path, "@type": "Dataset" if path.endswith("/") else "File", "name": path}
+    entity |= {"encodingFormat": form} if form else {}
+    return entity | ({"sha256": digest} if digest else {})
+
+
+def _action(job: Job, named: Mapping[str, str]) -> dict[str, Any]:
+    more = f" and {len(job.outputs) - 1} more" if len(job.outputs) > 1 else ""
+    return {
+        "@id": f"#job-{sha256(' '.join(job.outputs).encode()).hexdigest()[:16]}",
+        "@type": "CreateAction",
+        "name": f"Making {job.outputs[0]}{more}",
+        "description": f"{job.seconds:g} s; settings and machine are in {job.outputs[0].rstrip('/')}{RECORD}",
+        "endTime": job.ended.isoformat(),
+        "instrument": {"@id": _software_id(job.code)},
+        "object": _references(named[path] for path in job.inputs),
+        "result": _references(job.outputs),
+    }
+
+
+def _software(code: Mapping[str, Any], libraries: Mapping[str, str]) -> dict[str, Any]:
+    """The suite in one state of its code."""
+    commit = f", commit {code['commit']}" if code["commit"] else ""
+    changed = " with uncommitted changes" if code["dirty"] else ""
+    return {
+        "@id": _software_id(code),
+        "@type": "SoftwareApplication",
+        "name": "GP-CA Bench",
+        "softwareVersion": f"{code['version']}{commit}{changed}",
+        "softwareRequirements": _references(_library(*library)["@id"] for library in libraries.items()),
+    }
+
+
+def _software_id(code: Mapping[str, Any]) -> str:
+    parts = ["gpca-bench", code["version"], (code["commit"] or "")[:12], "changed" if code["dirty"] else ""]
+    return "#" + "-".join(filter(None, parts))
+
+
+def _library(name: str, version: str) -> dict[str, Any]:
+    return {
+        "@id": f"#{name}-{version.replace('+', '-')}",
+        "@type": "SoftwareApplication",
+        "name": name,
+        "softwareVersion": version,
+    }
+
+
+def _references(identifiers: Iterable[str]) -> list[dict[str, str]]:
+    return [{"@id": identifier} for identifier in dict.fromkeys(identifiers)]

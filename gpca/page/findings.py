@@ -1,0 +1,196 @@
+"""What a run found, in sentences with the numbers of its files: what the page of the run opens with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.metrics import ALL, read_metrics
+from gpca.experiments.diagnosis.intervals import read_intervals
+from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.real_world.metrics import read_together
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PAPERS_RIVALS = {"shap_additive": "SHAP", "sa_local_additive": "sensitivity analysis"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Holds one finding: the number that it is about, a sentence or two, and the result that has the rest."""
+
+    number: str
+    text: str
+    result: str
+
+
+@dataclass(frozen=True)
+class Titles:
+    """Holds what readers call the explainers of concepts (``title`` and ``oracle`` of each) and those of causes."""
+
+    explainers: Mapping[str, Mapping]
+    cause_explainers: Mapping[str, str]
+    budget: int
+
+
+def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Finding]:
+    """Return what the collected files of a run say, of those findings whose files and results are there.
+
+    Args:
+        folder: The folder ``results/{run}``.
+        titles: What readers call its explainers.
+        shown: The names of its results.
+
+    Raises:
+        InputError: an unusable file.
+    """
+    readers: dict[str, tuple[Callable, list[Callable]]] = {
+        "metrics.csv": (read_metrics, [_protocol, _rival, _uncertain]),
+        "cause_intervals.csv": (read_intervals, [_causes]),
+        "real_world.csv": (read_together, [_frames]),
+        "active_learning.csv": (read_metrics, [_labels]),
+        "recovery.csv": (read_metrics, [_recovery]),
+    }
+    found = []
+    for name, (read, tellers) in readers.items():
+        if (folder / name).is_file():
+            rows = read(folder / name)
+            found += [finding for tell in tellers if (finding := tell(rows, titles))]
+    return [finding for finding in found if finding.result in shown]
+
+
+def _protocol(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+    accuracies = _accuracies(metrics)
+    gpca = next((name for name in GPCA_FORMS if name in accuracies), None)
+    if gpca is None:
+        return None
+    rivals = [f"{words} {_span(accuracies[name])}" for name, words in PAPERS_RIVALS.items() if name in accuracies]
+    text = (
+        f"Under the paper's protocol, GP-CA names the perturbed concept in {_span(accuracies[gpca])} of the test "
+        f"registrations, depending on the dataset{''.join(f'; {rival}' for rival in rivals)}. Guessing gives a third."
+    )
+    return Finding(_span(accuracies[gpca]), text, "table1_single_baselines")
+
+
+def _rival(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+    means = {name: of_sources.mean() for name, of_sources in _accuracies(metrics).items()}
+    own = {name: mean for name, mean in means.items() if name in GPCA_FORMS}
+    others = {name: means[name] for name, entry in titles.explainers.items() if name in means and not entry["oracle"]}
+    others = {name: mean for name, mean in others.items() if name not in own}
+    if not own or not others:
+        return None
+    best, best_own = max(others, key=others.__getitem__), max(own, key=own.__getitem__)
+    text = (
+        f"{titles.explainers[best]['title']} comes first among the {len(others)} other explainers that are not told "
+        f"the truth, with {_percent(others[best], 1)} on average over the datasets, where "
+        f"{titles.explainers[best_own]['title']} has {_percent(own[best_own], 1)}."
+    )
+    return Finding(_percent(others[best], 1), text, "table1_extended")
+
+
+def _uncertain(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+    gpca = next((name for name in GPCA_FORMS if (metrics["method"] == name).any()), None)
+    rows = metrics[(metrics["method"] == gpca) & (metrics["concept"] == ALL)]
+    counts = rows[rows["metric"].isin(("causal_samples", "test_samples"))].groupby("metric")["value"].sum()
+    if len(counts) < 2:
+        return None
+    share = _percent(counts["causal_samples"] / counts["test_samples"])
+    text = (
+        f"{share} of these registrations are more uncertain than 95 % of clean pairs. The labels of the protocol "
+        "say what was perturbed, not whether that did any harm."
+    )
+    return Finding(share, text, "table1_extended")
+
+
+def _causes(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
+    rows = intervals[intervals["metric"] == "balanced_accuracy"]
+    if not (rows["source"] == POOLED).any() and rows["source"].nunique() != 1:
+        return None
+    pooled = rows[rows["source"] == (POOLED if (rows["source"] == POOLED).any() else rows["source"].iloc[0])]
+    values = pooled.set_index("method")[["value", "low", "high"]]
+    rivals = values.loc[[name for name in titles.cause_explainers if name in values.index], "value"]
+    if rivals.empty:
+        return None
+    best = rivals.idxmax()
+    between = " to ".join(f"{100 * values.loc[best, bound]:.0f}" for bound in ("low", "high"))
+    text = (
+        "Where the truth is measured, on objects that no explainer has seen, the best tells nominal registrations and "
+        f"the dominant causes of failed ones apart with a balanced accuracy of {_percent(rivals[best])} "
+        f"(95 % interval {between} %): {titles.cause_explainers[best]}."
+    )
+    if "gpca" in rivals and best != "gpca":
+        text += f" {titles.cause_explainers['gpca']} has {_percent(rivals['gpca'])}."
+    if CEILING in values.index:
+        text += f" The truth measured a second time agrees in {_percent(values.loc[CEILING, 'value'])}."
+    return Finding(_percent(rivals[best]), text, "table9_causes")
+
+
+def _frames(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+    accuracies = {name: of.mean() for name, of in _accuracies(metrics).items() if "-" in name}  # backbone-reduction
+    if not accuracies:
+        return None
+    span = _span(np.array(list(accuracies.values())))
+    text = f"On objects in depth frames, GP-CA is right in {span} of the cases, depending on encoder and reduction."
+    return Finding(span, text, "table6_backbones")
+
+
+def _labels(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+    medians = {name: _median_labels(metrics, name) for name in ("bald_kmeans", "random")}
+    bald, random = medians["bald_kmeans"], medians["random"]
+    if bald is None or random is None:
+        return None
+    text = (
+        f"A concept that the classifier has never seen is known after {bald} chosen by BALD and k-means, and after "
+        f"{random} drawn at random (medians)."
+    )
+    return Finding(bald, text, "table3_active_learning")
+
+
+def _recovery(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+    rows = metrics[(metrics["metric"] == f"recovered_within_{titles.budget}") & (metrics["concept"] == ALL)]
+    shares = rows.groupby("method")["value"].mean()
+    if "gpca" not in shares:
+        return None
+    others = {"random": "random actions", "oracle": "a policy that is told the cause"}
+    beside = [f"{words} {_percent(shares[name])}" for name, words in others.items() if name in shares]
+    text = (
+        f"In a closed loop on rendered tables, GP-CA's policy repairs {_percent(shares['gpca'])} of the failed "
+        f"registrations with at most {plural(titles.budget, 'action')}{''.join(f'; {each}' for each in beside)}."
+    )
+    return Finding(_percent(shares["gpca"]), text, "table8_recovery")
+
+
+def _accuracies(metrics: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Return method -> mean accuracy over the seeds, of every source."""
+    rows = metrics[(metrics["metric"] == "accuracy") & (metrics["concept"] == ALL)]
+    means = rows.groupby(["method", "source"])["value"].mean()
+    return {str(method): of_method.to_numpy() for method, of_method in means.groupby(level="method")}
+
+
+def _median_labels(metrics: pd.DataFrame, strategy: str) -> str | None:
+    """Return the median number of labels in words, over datasets, concepts and seeds; a bound where it is none."""
+    rows = metrics[(metrics["table"] == "active_learning/pretrained") & (metrics["method"] == strategy)]
+    rows = rows[rows["concept"].isin(CONCEPTS)].set_index(["source", "concept", "seed"])
+    of = {name: rows.loc[rows["metric"] == name, "value"] for name in ("labels_to_target", "reached", "labels")}
+    if of["reached"].empty:
+        return None
+    median = np.where(of["reached"] == 1, of["labels_to_target"], np.inf)
+    count = float(np.median(median))
+    return f"{count:g} labels" if np.isfinite(count) else f"more than {of['labels'].median():g} labels"
+
+
+def _percent(share: float, decimals: int = 0) -> str:
+    return f"{100 * share:.{decimals}f} %"
+
+
+def _span(shares: np.ndarray) -> str:
+    low, high = (f"{100 * share:.0f}" for share in (shares.min(), shares.max()))
+    return f"{low} %" if low == high else f"{low} to {high} %"

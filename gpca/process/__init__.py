@@ -1,0 +1,1 @@
+"""The process that runs: its processor and threads, compiled code, progress, interrupts, arguments."""

@@ -1,0 +1,114 @@
+"""Where a result comes from: a JSON sidecar beside every output, apart from the data so that those stay comparable."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from gpca.io.files import require_outputs, sha256_of_file, whole_file
+from gpca.process.processor import describe
+
+LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
+CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # JSON, the hash of each section: set by the Snakefile for its jobs
+_ROOT = Path(__file__).resolve().parent.parent  # of the checkout, or the site-packages that gpca is installed in
+
+
+@contextmanager
+def record_provenance(
+    outputs: Sequence[Path | str],
+    inputs: Sequence[Path | str],
+    settings: Mapping,
+    seed: int | None = None,
+    folders: bool = False,
+) -> Iterator[None]:
+    """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.
+
+    The commit and the hash of environment.lock are those of the checkout that the package lies in; where it is
+    installed elsewhere they are null, and the package's version is all that is known of the code.
+
+    Args:
+        outputs, inputs: files; the inputs are hashed (SHA-256).
+        settings: what the result depends on besides its inputs.
+        seed: the repeat, if there is one.
+        folders: the outputs are folders.
+
+    Raises:
+        InputError: before the block, for an output that cannot be written: :func:`gpca.io.files.require_outputs`.
+    """
+    require_outputs(outputs, inputs, folders)
+    started = time.perf_counter()
+    yield
+    record = {
+        "seconds": round(time.perf_counter() - started, 3),
+        "peak_memory_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "seed": seed,
+        "settings": settings,
+        "settings_sha256": sha256_of_settings(settings),
+        "config_sha256": json.loads(os.environ.get(CONFIG_VARIABLE, "null")),
+        "inputs_sha256": {str(path): sha256_of_file(path) for path in inputs},
+        "code": _code_version(),
+        "environment_lock_sha256": sha256_of_file(lock) if (lock := _ROOT / "environment.lock").is_file() else None,
+        "device": describe() | {"gpu": _gpu()},
+        "python": platform.python_version(),
+        "libraries": _library_versions(),
+    }
+    for output in map(Path, outputs):
+        with whole_file(output.with_name(output.name + ".provenance.json")) as partial:
+            partial.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def sha256_of_settings(settings: object) -> str:
+    """Return the SHA-256 of settings as JSON with sorted keys."""
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
+
+
+def _code_version() -> dict[str, object]:
+    """The version, the commit, and whether tracked files differ from it.
+
+    Commit and changes are null without git and where git does not keep this package: a virtual environment may well lie
+    in the checkout of another project, whose commit says nothing of this code.
+    """
+    # No import statement: with gpca/__init__.py among the code of every step, a new version would rerun all of them.
+    installed = import_module("gpca").__version__
+    commit, changes, ours = None, None, False
+    if shutil.which("git") is not None:
+        ours = _git("ls-files", "--error-unmatch", "gpca/__init__.py") is not None
+    if ours:
+        commit, changes = _git("rev-parse", "HEAD"), _git("status", "--porcelain", "--untracked-files=no")
+    if not commit or changes is None:
+        return {"version": installed, "commit": None, "dirty": None}
+    return {"version": installed, "commit": commit, "dirty": bool(changes)}
+
+
+def _git(*arguments: str) -> str | None:
+    """What git says about the folder of the package, or None where it fails."""
+    done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, check=False)
+    return None if done.returncode else done.stdout.strip()
+
+
+def _gpu() -> str | None:
+    """The GPU, where torch was loaded and uses one."""
+    torch = sys.modules.get("torch")
+    return torch.cuda.get_device_name() if torch is not None and torch.cuda.is_available() else None
+
+
+def _library_versions() -> dict[str, str]:
+    found = {}
+    for library in LIBRARIES:
+        try:
+            found[library] = version(library)
+        except PackageNotFoundError:
+            continue
+    return found

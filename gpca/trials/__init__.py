@@ -1,1 +1,0 @@
-"""Registration methods side by side, and estimators of uncertainty: the same pairs, judged by the true pose."""

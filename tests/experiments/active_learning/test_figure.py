@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from gpca.active_learning.curves import POOL_COLUMNS, write_curves
+from gpca.errors import InputError
+from gpca.experiments.active_learning.figure import STYLES, draw_learning_curves, mean_curves
+from gpca.reporting.figures.query import draw_query
+
+TITLES = {"random": "Random", "bald_kmeans": "BALD + k-means", "mine": "Mine"}
+SOURCES = {"ycb": "YCB (procedural stand-in)", "linemod": "LINEMOD"}
+
+
+@pytest.fixture
+def files(tmp_path):
+    paths = []
+    for source in SOURCES:
+        for strategy in TITLES:
+            for seed in range(2):
+                curves = {
+                    (setting, held_out): [
+                        {
+                            "labels": 4 * n,
+                            "new_labels": n,
+                            "accuracy": 0.5 + 0.1 * n + 0.02 * seed + bonus,
+                            "accuracy_new": 0.5,
+                            "epochs": 1,
+                        }
+                        for n in range(4)
+                    ]
+                    for setting in ("pretrained", "unseen")
+                    for held_out, bonus in (("noise", 0.0), ("pose", 0.1))
+                }
+                path = tmp_path / source / strategy / f"seed{seed}.csv"
+                path.parent.mkdir(parents=True, exist_ok=True)
+                write_curves(path, curves, POOL_COLUMNS)
+                paths.append(path)
+    return paths
+
+
+def test_curves_are_means_over_concepts_and_intervals_over_seeds(files):
+    curve = mean_curves(files)["ycb", "random", "pretrained"]
+    assert curve["labels"].tolist() == [0, 4, 8, 12]
+    assert curve["mean"].tolist() == pytest.approx([56, 66, 76, 86])
+    # Two seeds 2 points apart: s = √2, t_1 = 12.706.
+    assert (curve["high"] - curve["mean"]).tolist() == pytest.approx([12.706] * 4, abs=1e-3)
+    assert curve["seeds"].tolist() == [2] * 4
+
+
+def test_the_target_is_named_and_the_seeds_are_counted(files, tmp_path, figures):
+    draw_learning_curves(files, SOURCES, TITLES, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
+    [figure] = figures
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [*TITLES.values(), "target (90 %)"]
+    assert [text.get_text() for text in figure.texts] == ["Means over 2 seeds"]
+
+
+def test_no_two_strategies_look_alike():
+    looks = [(colour, line) for colour, line, _ in STYLES.values()]
+    assert len(set(looks)) == len(looks)
+
+
+def test_the_figure_is_the_same_bytes_each_time(files, tmp_path):
+    drawn = []
+    for attempt in ("a", "b"):
+        paths = [tmp_path / f"{attempt}.{suffix}" for suffix in ("pdf", "png")]
+        draw_learning_curves(files, SOURCES, TITLES, 0.9, *paths)
+        drawn.append([path.read_bytes() for path in paths])
+    assert drawn[0] == drawn[1]
+
+
+def test_without_a_curve_of_these_sources_nothing_is_drawn(files, tmp_path):
+    with pytest.raises(InputError, match="has no curve of these sources and strategies"):
+        draw_learning_curves(files, {"cups": "Cups"}, TITLES, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
+    assert not list(tmp_path.glob("a.*"))
+
+
+def test_a_query_is_drawn_with_few_or_many_points(tmp_path):
+    random = np.random.default_rng(0)
+    for points in (3, 5000):
+        draw_query(
+            random.normal(size=(points, 3)), random.normal(size=(points, 3)), "train sample 1: cup", tmp_path / "q.png"
+        )
+        assert (tmp_path / "q.png").read_bytes()[:4] == b"\x89PNG"

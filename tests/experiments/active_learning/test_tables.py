@@ -1,0 +1,110 @@
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import TIDY_COLUMNS
+from gpca.errors import InputError
+from gpca.experiments.active_learning.tables import table3_active_learning, table3_extended, table3_stream
+
+REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
+STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
+STRATEGIES = {
+    "random": "Random", "random_stratified": "Told", "bald_kmeans": "BALD + k-means", "stream_bald": "Stream",
+}  # fmt: skip
+CONDITIONS = {
+    "initial": 120, "train": 800, "test": 200, "labels": 60, "batch": 4, "target": 0.9, "iterations": 100,
+    "rare_share": 0.05, "rare_labels": 400, "stream": {"arrivals": 400, "quiet": 100, "budget": 0.1},
+}  # fmt: skip
+
+
+def tidy(values):
+    """Metrics from {(setting, source, strategy, concept, metric): values over seeds}."""
+    return pd.DataFrame(
+        [
+            (f"active_learning/{setting}", source, strategy, metric, concept, seed, value)
+            for (setting, source, strategy, concept, metric), of_seeds in values.items()
+            for seed, value in enumerate(of_seeds)
+        ],
+        columns=list(TIDY_COLUMNS),
+    )
+
+
+@pytest.fixture
+def metrics():
+    of_ycb = ("pretrained", "ycb")
+    return tidy(
+        {
+            (*of_ycb, "bald_kmeans", "overlap", "labels_to_target"): [12, 16, 20],
+            (*of_ycb, "bald_kmeans", "overlap", "reached"): [1, 1, 1],
+            (*of_ycb, "bald_kmeans", "overlap", "final_accuracy"): [0.95, 0.96, 0.97],
+            (*of_ycb, "bald_kmeans", "overlap", "area_under_curve"): [0.8, 0.8, 0.8],
+            (*of_ycb, "bald_kmeans", "pose", "area_under_curve"): [0.6, 0.6, 0.6],
+            (*of_ycb, "bald_kmeans", "overlap", "area_gain"): [-0.1, 0.0, 0.1],
+            (*of_ycb, "bald_kmeans", "noise", "labels_to_target"): [2, 2, 2],
+            (*of_ycb, "random", "overlap", "labels_to_target"): [40, 60, 44],
+            (*of_ycb, "random", "overlap", "reached"): [1, 0, 1],
+            (*of_ycb, "random", "overlap", "area_under_curve"): [0.75, 0.75, 0.75],
+            (*of_ycb, "random_stratified", "overlap", "area_under_curve"): [0.9, 0.9, 0.9],
+            (*of_ycb, "stream_bald", "overlap", "delay"): [60, 70, 50],
+            (*of_ycb, "stream_bald", "overlap", "recognised"): [1, 1, 1],
+            (*of_ycb, "stream_bald", "overlap", "final_accuracy"): [0.9, 0.9, 0.9],
+            ("unseen", "ycb", "random", "overlap", "labels_to_target"): [60, 60, 60],
+            ("unseen", "ycb", "random", "overlap", "reached"): [0, 0, 0],
+        }
+    )
+
+
+def test_table3_shows_the_papers_experiment_alone(metrics):
+    markdown = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    assert "| Dataset | Encoder saw | Labels, BALD + k-means | Labels, random |" in markdown
+    # Two of three random runs reached the target: their mean is a lower bound, without an interval, and never bold.
+    assert "| YCB | all concepts | **16 ± 10** | > 48 | 96.0 ± 2.5 |" in markdown
+    assert "| YCB | the known concepts only | – | > 60 |" in markdown
+    assert "LINEMOD" not in markdown
+
+
+def test_table3_states_its_conditions(metrics):
+    markdown = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    for words in ("120 labeled samples", "680 training samples", "4 labels a round, 60 in all", "warm start", "5% of"):
+        assert words in markdown
+    assert "Mean over 3 seeds, 200 test samples each" in markdown
+
+
+def test_without_a_rare_share_nothing_is_said_of_it(metrics):
+    table = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS | {"rare_share": None})
+    assert not [note for note in table.footnotes if note.startswith("Rare")]
+
+
+def test_the_csv_marks_lower_bounds(metrics):
+    records = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).records()
+    assert ("ycb", "pretrained", "labels_random", 48.0, "", "", 3, 600, True) in records
+    assert ("ycb", "pretrained", "labels_bald_kmeans", 16.0, 6.063449, 25.936551, 3, 600, False) in records
+
+
+def test_extended_averages_over_the_concepts_held_out_and_leaves_the_oracle_out_of_the_comparison(metrics):
+    markdown = table3_extended(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    assert "Labels, overlap" in markdown
+    [bald] = [line for line in markdown.splitlines() if "BALD + k-means" in line and "YCB" in line]
+    assert "70.0 ± 0.0" in bald
+    assert "**0.0 ± 24.8**" not in bald
+    [told] = [line for line in markdown.splitlines() if "Told" in line]
+    assert "**" not in told
+    assert "**75.0 ± 0.0**" in markdown
+    assert "Stream" not in markdown
+
+
+def test_stream_shows_streams_alone(metrics):
+    markdown = table3_stream(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    assert "| YCB | Stream |" in markdown
+    assert "60 ± 25" in markdown
+    assert "Random" not in markdown
+    assert "400 samples arrive one by one; the first 100" in markdown
+
+
+@pytest.mark.parametrize("make", [table3_active_learning, table3_extended, table3_stream])
+def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(metrics, make):
+    table = make(metrics, STAND_INS, STRATEGIES, CONDITIONS)
+    assert "on procedural stand-ins" in table.caption
+    assert "YCB (procedural stand-in)" in table.markdown()
+    assert table.latex().count("{") == table.latex().count("}")
+    with pytest.raises(InputError, match=f"have no results for {make.__name__}"):
+        make(metrics[:0], REAL, STRATEGIES, CONDITIONS)

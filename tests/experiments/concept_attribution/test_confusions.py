@@ -1,0 +1,134 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import TIDY_COLUMNS, write_metrics
+from gpca.errors import InputError
+from gpca.experiments.concept_attribution import confusions as confusions_figure
+from gpca.experiments.concept_attribution.confusions import draw_confusions_figure, letters, pooled_confusions
+
+CONCEPTS = ("noise", "pose", "overlap")
+SOURCES = {"cup": "Coffee Cup (procedural stand-in)", "ycb": "YCB (procedural stand-in)"}
+EXPLAINERS = {f"explainer_{i}": f"Explainer {i} with a title that is long (oracle)" for i in range(5)}
+COUNTS = np.array([[8, 1, 0, 1], [3, 5, 2, 0], [0, 0, 10, 0]])  # last: abstained
+
+
+def records(source, explainer, counts, seed=0):
+    return [
+        ("attribution", source, explainer, f"predicted_as_{predicted}", true, seed, float(counts[row][column]))
+        for column, predicted in enumerate((*CONCEPTS, "abstained"))
+        for row, true in enumerate(CONCEPTS)
+    ]
+
+
+def tidy(rows):
+    return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+
+
+@pytest.fixture
+def metrics_csv(tmp_path):
+    """All explainers on both sources, two seeds; the last one only on one."""
+    random = np.random.default_rng(0)
+    rows = []
+    for source in SOURCES:
+        for explainer in EXPLAINERS:
+            if (source, explainer) != ("cup", "explainer_4"):
+                rows += [r for seed in (0, 1) for r in records(source, explainer, random.integers(0, 9, (3, 4)), seed)]
+    write_metrics(tidy(rows), tmp_path / "metrics.csv")
+    return tmp_path / "metrics.csv"
+
+
+def test_confusions_are_pooled_over_seeds_in_the_order_of_the_concepts():
+    metrics = tidy([*records("ycb", "shap", COUNTS, 0), *records("ycb", "shap", COUNTS, 1)])
+    accuracies = tidy([("attribution", "ycb", "shap", "accuracy", "all", 0, 0.5)])
+    pooled = pooled_confusions(pd.concat([accuracies, metrics]))
+    assert list(pooled) == [("ycb", "shap")]
+    confusion = pooled["ycb", "shap"]
+    assert list(confusion.index) == list(CONCEPTS)
+    assert list(confusion.columns) == [*CONCEPTS, "abstained"]
+    np.testing.assert_array_equal(confusion, 2 * COUNTS)
+
+
+def axes_of(draw, *arguments):
+    confusions_figure.use_style()
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots()
+    draw(axes, *arguments)
+    plt.close(figure)
+    return axes
+
+
+def test_a_matrix_shows_the_share_of_each_true_concept():
+    confusion = pooled_confusions(tidy(records("ycb", "shap", COUNTS)))["ycb", "shap"]
+    shown = [text.get_text() for text in axes_of(confusions_figure.draw_matrix, confusion, True).texts]
+    assert shown == ["80", "10", "0", "30", "50", "20", "0", "0", "100"]
+    without_overlap = axes_of(confusions_figure.draw_matrix, confusion.loc[["noise", "pose"]], True)
+    assert [text.get_text() for text in without_overlap.texts] == shown[:6]
+
+
+def test_bars_are_the_shares_of_all_samples_and_dashes_the_truth():
+    confusion = pooled_confusions(tidy(records("ycb", "shap", COUNTS)))["ycb", "shap"]
+    axes = axes_of(confusions_figure.draw_bars, confusion, True)
+    assert [bar.get_height() for bar in axes.patches] == pytest.approx([11 / 30, 6 / 30, 12 / 30, 1 / 30])
+    [dashes] = axes.collections
+    assert [segment[0][1] for segment in dashes.get_segments()] == pytest.approx([1 / 3] * 3)
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["N", "P", "O", "–"]
+
+
+def test_where_none_abstains_there_is_no_bar_and_no_word_for_it(tmp_path, figures):
+    rows = records("ycb", "explainer_0", COUNTS * [1, 1, 1, 0])
+    rows_of_others = records("cup", "other", COUNTS)
+    for name, part in (("none", rows), ("others", rows + rows_of_others)):
+        write_metrics(tidy(part), tmp_path / f"{name}.csv")
+        draw_confusions_figure(tmp_path / f"{name}.csv", SOURCES, EXPLAINERS, tmp_path / "a.pdf", tmp_path / "a.png")
+        figure = figures.pop()
+        assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["N", "P", "O"]
+        assert not [text for text in figure.texts if "abstained" in text.get_text()]
+
+
+def test_letters_tell_concepts_apart():
+    assert letters(["noise", "pose", "overlap"]) == ["N", "P", "O"]
+    assert letters(["pose", "position", "noise"]) == ["Pose", "Posi", "Nois"]
+
+
+def test_the_same_metrics_give_the_same_bytes(metrics_csv, tmp_path):
+    for name in "ab":
+        outputs = (tmp_path / f"{name}.pdf", tmp_path / f"{name}.png")
+        draw_confusions_figure(metrics_csv, SOURCES, EXPLAINERS, *outputs)
+    for suffix in ("pdf", "png"):
+        assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_nothing_overlaps_and_all_stays_on_the_page(metrics_csv, monkeypatch):
+    kept = []
+    monkeypatch.setattr(confusions_figure, "save_figure", lambda figure, pdf, png: kept.append(figure))
+    draw_confusions_figure(metrics_csv, SOURCES, EXPLAINERS, "a.pdf", "a.png")
+    [figure] = kept
+    assert len(figure.axes) == 2 * (2 * 5 - 1)
+    renderer = figure.canvas.get_renderer()
+    words = " ".join(text.get_text().replace("\n", " ") for text in figure.texts)
+    for title in (*SOURCES.values(), *EXPLAINERS.values()):
+        assert title in words
+    texts = [text.get_window_extent(renderer) for text in figure.texts]
+    panels = [axes.get_tightbbox(renderer) for axes in figure.axes]
+    for box in (*texts, *panels):
+        assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 <= box.y0 and box.y1 <= figure.bbox.y1
+    boxes = [*texts, *panels]
+    for number, first in enumerate(boxes):
+        assert not [box for box in boxes[number + 1 :] if first.overlaps(box)]
+
+
+def test_metrics_without_these_confusions_are_refused(metrics_csv, tmp_path):
+    with pytest.raises(InputError, match="has no confusion") as caught:
+        draw_confusions_figure(metrics_csv, SOURCES, {"other": "Other"}, tmp_path / "a.pdf", tmp_path / "a.png")
+    assert str(metrics_csv) in str(caught.value)
+    with pytest.raises(InputError, match="no such file"):
+        draw_confusions_figure(tmp_path / "none.csv", SOURCES, EXPLAINERS, tmp_path / "a.pdf", tmp_path / "a.png")
+    assert not (tmp_path / "a.pdf").exists()
+
+
+def test_nominal_is_ok_and_the_others_keep_their_letter():
+    assert letters(["nominal", "noise", "pose", "overlap"]) == ["OK", "N", "P", "O"]

@@ -1,0 +1,182 @@
+"""From predictions under the controls to metrics, intervals and severities."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import write_metrics
+from gpca.errors import InputError
+from gpca.experiments.controls.costs import collect_costs
+from gpca.experiments.controls.intervals import collect as collect_intervals
+from gpca.experiments.controls.intervals import read_intervals
+from gpca.experiments.controls.judged import read_controls
+from gpca.experiments.controls.metrics import collect
+from gpca.experiments.controls.protocol import LABELS
+from gpca.experiments.controls.samples import sample_table
+from gpca.experiments.controls.severity import REGISTRATION, read_severities
+from gpca.experiments.controls.severity import collect as collect_severities
+from gpca.experiments.diagnosis.judged import POOLED
+from gpca.io.csv_file import write_csv
+from gpca.pairs.perturbation import CONCEPTS
+
+SEVERITIES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05, 0.30], "crop": [0.2, 0.6]}
+
+
+def said(source, tested, control, explainer, wrong, samples=30):
+    """Test samples of five objects of which the first so many are named wrongly, and are the most uncertain."""
+    number = np.arange(samples)
+    true = np.array(CONCEPTS)[number % 3]
+    named = np.where(number < wrong, np.array(CONCEPTS)[(number + 1) % 3], true)
+    scores = {f"score_{name}": np.where(named == name, 0.8, 0.1) for name in CONCEPTS}
+    return pd.DataFrame(
+        dict(zip(LABELS, (control, tested, explainer), strict=True))
+        | {"sample": number, "split": "test", "object": [f"part_{n % 5}_1_{n}" for n in number]}
+        | {"concept_true": true, "concept_predicted": named, **scores}
+        | {"bald": "" if explainer == "head" else 0.0, "entropy": np.where(number < wrong, 0.9, 0.2)}
+        | {"abstained": False, "icp_calls": 0}
+    )
+
+
+@pytest.fixture
+def files(tmp_path):
+    paths = []
+    for source, other in (("a", "b"), ("b", "a")):
+        for seed in (100, 101):
+            parts = [
+                said(source, source, "paper", "gpca", 3),
+                said(source, source, "density", "gpca", 9),
+                said(source, other, "transfer", "gpca", 15),
+                said(source, source, "paper", "head", 0),
+                said(source, other, "transfer", "head", 6),
+            ]
+            paths.append(tmp_path / "controls" / source / f"seed{seed}.csv")
+            write_csv(paths[-1], pd.concat(parts))
+    return paths
+
+
+def test_the_column_table_is_the_control_and_concept_the_source_of_a_transfer(files):
+    rows = collect(files).set_index(["table", "source", "method", "metric", "concept", "seed"])["value"]
+    assert rows["density", "a", "gpca", "accuracy", "all", 100] == pytest.approx(0.7)
+    assert rows["transfer", "b", "gpca", "accuracy", "a", 101] == pytest.approx(0.5)
+    assert rows["paper", "a", "gpca", "auroc_error", "all", 100] == 1
+    assert rows["paper", "a", "gpca", "auroc_error_bald", "all", 100] == 0.5
+    assert ("paper", "a", "head", "auroc_error", "all", 100) not in rows.index  # nothing is wrong
+    assert ("transfer", "b", "head", "auroc_error_bald", "a", 100) not in rows.index
+    assert rows["transfer", "b", "head", "test_samples", "a", 100] == 30
+
+
+def test_a_change_is_that_of_the_same_draws_of_objects_and_seeds(files, tmp_path):
+    write_metrics(collect_intervals(files), tmp_path / "control_intervals.csv")
+    rows = read_intervals(tmp_path / "control_intervals.csv").set_index(
+        ["control", "source", "trained_on", "method", "metric"]
+    )
+    density = rows.loc["density", "a", "a", "gpca", "accuracy"]
+    assert (density["samples"], density["seeds"]) == (60, 2)
+    assert (density["value"], density["change"]) == pytest.approx((0.7, -0.2))
+    assert density["low"] < density["value"] < density["high"]
+    # Both seeds and all objects err alike but for the first samples, so that the change hardly varies.
+    assert density["change_low"] == pytest.approx(-0.2, abs=0.1)
+    assert rows.loc["paper", "a", "a", "gpca", "accuracy"]["change_high"] == 0
+    assert rows.loc["transfer", POOLED, POOLED, "gpca", "accuracy"]["value"] == pytest.approx(0.5)
+    assert rows.loc["transfer", "b", "a", "gpca", "accuracy"]["samples"] == 60
+    assert rows.loc["paper", POOLED, POOLED, "gpca", "accuracy"]["samples"] == 120
+
+
+def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_protocol(files):
+    parts = [said("a", "a", "paper", "gpca", 27)]
+    write_csv(files[1], pd.concat(parts))  # another seed, in which all goes wrong
+    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
+    density = rows.loc["density", "a", "gpca", "accuracy"]
+    assert (density["seeds"], density["value"], density["change"]) == pytest.approx((1, 0.7, -0.2))
+
+
+def test_the_change_of_an_encoder_trained_otherwise_is_against_the_papers_training_on_the_same_samples(files):
+    frame = pd.read_csv(files[0], keep_default_na=False)  # of one seed alone
+    added = [("seen_objects", "gpca", 3), ("seen_objects", "gpca_two_layer_head", 6)]
+    write_csv(files[0], pd.concat([frame, *(said("a", "a", *of[:2], of[2]) for of in added)]))
+    second = pd.read_csv(files[1], keep_default_na=False)
+    write_csv(files[1], pd.concat([second, said("a", "a", "seen_objects", "gpca", 30)]))
+    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
+    otherwise = rows.loc["seen_objects", "a", "gpca_two_layer_head", "accuracy"]
+    assert (otherwise["value"], otherwise["change"]) == pytest.approx((0.8, -0.1))
+    assert rows.loc["seen_objects", "a", "gpca", "accuracy"]["value"] == pytest.approx(0.45)
+
+
+def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
+    path = tmp_path / "timings" / "a" / "controls" / "seed100.csv"
+    write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [2.5], "seconds": [0.01]}))
+    rows = collect_costs([path]).set_index(["source", "method", "metric", "seed"])["value"]
+    assert rows.to_dict() == {
+        ("a", "gpca_pair", "learning_seconds", 100): 2.5,
+        ("a", "gpca_pair", "seconds", 100): 0.01,
+    }
+    write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [-1], "seconds": [0.01]}))
+    with pytest.raises(InputError, match="'learning_seconds' contains numbers below 0"):
+        collect_costs([path])
+
+
+def test_views_of_one_instance_are_one_object(files):
+    assert set(read_controls(files)["instance"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
+
+
+def test_an_unknown_control_is_refused(tmp_path):
+    path = tmp_path / "controls" / "a" / "seed100.csv"
+    write_csv(path, said("a", "a", "gravity", "gpca", 3))
+    with pytest.raises(InputError, match="unknown control 'gravity'; expected one of density"):
+        read_controls([path])
+    with pytest.raises(InputError, match="no files were given"):
+        read_controls([])
+
+
+def severity_files(folder, paths, **changed):
+    """The severities of the test samples: pose errors of the first half of the range, noise of all of it."""
+    written = []
+    for path in paths:
+        number = np.arange(30)
+        concept = np.array(CONCEPTS)[number % 3]
+        columns = {"sample": number, "object": "part", "concept": concept}
+        columns |= {"noise": np.where(concept == "noise", np.linspace(0.01, 0.03, 30), 0)}
+        columns |= {"rotation_deg": np.where(concept == "pose", 20.0, 0)}
+        columns |= {"translation": np.where(concept == "pose", np.linspace(0.05, 0.3, 30), 0)}
+        columns |= {"crop": np.where(concept == "overlap", 0.6, 0), "error": np.where(concept == "pose", 0.1, 0.001)}
+        written.append(folder / "control_samples" / path.parent.name / path.name)
+        write_csv(written[-1], pd.DataFrame(columns | changed))
+    return written
+
+
+def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
+    found = collect_severities(files, severity_files(tmp_path, files), SEVERITIES, bins=2, success=0.02)
+    write_metrics(found, tmp_path / "severities.csv")
+    rows = read_severities(tmp_path / "severities.csv").set_index(["concept", "method"])
+    assert rows.loc[("pose", REGISTRATION)]["value"].tolist() == [0, 0]
+    assert rows.loc[("pose", REGISTRATION)]["other_low"].tolist() == pytest.approx([0.05, 0.175])
+    assert rows.loc[("overlap", REGISTRATION)][["low", "high", "value"]].tolist() == [0.4, 0.6, 1.0]
+    noise = rows.loc[("noise", "gpca")]
+    assert noise["samples"].sum() == 40  # of four files
+    assert (noise["value"] * noise["samples"]).sum() == pytest.approx(36)  # by the paper's protocol alone
+    assert noise["value"].iloc[1] == 1
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"crop": 0.9}, r"'crop' contains 0.9, outside its bins from 0.2 to 0.6"),
+        ({"sample": 7}, "contains a sample twice"),
+        ({"sample": np.arange(30) + 1}, "lack test samples"),
+    ],
+)
+def test_severities_that_cannot_be_are_refused(files, tmp_path, changed, words):
+    with pytest.raises(InputError, match=words):
+        collect_severities(files, severity_files(tmp_path, files, **changed), SEVERITIES, bins=2, success=0.02)
+
+
+def test_a_perfect_pose_has_no_error(registrations, objects):
+    there = replace(registrations, T_target_source_icp=registrations.T_target_source_true)
+    table = sample_table(there, objects)
+    assert len(table) == 18
+    # The error of a symmetric object is to the nearest point, which is the point itself.
+    assert table["error"].max() == pytest.approx(0, abs=1e-9)
+    assert table["rotation_deg"][table["concept"] == "pose"].between(15, 60).all()
+    assert sample_table(registrations, objects)["error"].max() > 0.001

@@ -1,0 +1,165 @@
+from dataclasses import replace
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from baselines.pair import PairGPCA
+from baselines.residuals import residuals_logistic
+from gpca.encoders.settings import EncoderSettings
+from gpca.experiments.controls.costs import ASKED
+from gpca.experiments.controls.encoding import encode
+from gpca.experiments.controls.rivals import Rival
+from gpca.experiments.controls.settings import TRAININGS, ControlSettings
+from gpca.experiments.controls.variants import of_unseen_objects, shows_known_object
+from tests.experiments.controls.conftest import Head, Nearest, attached, experiment, seen
+
+
+def share_right(rows, **wanted):
+    for column, value in wanted.items():
+        rows = rows[rows[column] == value]
+    assert len(rows)
+    return (rows["concept_true"] == rows["concept_predicted"]).mean()
+
+
+def test_every_explainer_says_something_of_every_test_sample_under_every_control(six):
+    of_unseen = of_unseen_objects(six, 3, "tiny", 100)
+    found = experiment(
+        *(six, "density", "unseen_objects", "reversed", "label_noise_30", "shuffled", "transfer"),
+        embeddings={"density": attached(six), "unseen_objects": attached(of_unseen)},
+    ).run(six, {"other": six})
+    counts = found.groupby(["control", "tested", "explainer"]).size()
+    assert counts["paper", "tiny"].to_dict() == {"nearest": 18, "head": 18}
+    assert counts["transfer", "other"].to_dict() == {"nearest": 18, "head": 18}
+    known = shows_known_object(of_unseen)[of_unseen.split == "test"]
+    assert counts["unseen_objects", "tiny"].tolist() == [(~known).sum()] * 2
+    assert counts["seen_objects", "tiny"].tolist() == [known.sum()] * 2
+    assert set(found["split"]) == {"test"}
+    # A head that is trained with its encoder learns no labels.
+    assert counts["shuffled", "tiny"].to_dict() == counts["label_noise_30", "tiny"].to_dict() == {"nearest": 18}
+    for control in ("paper", "density", "unseen_objects", "reversed", "transfer"):
+        assert share_right(found, control=control, explainer="nearest") == 1
+    assert share_right(found, control="shuffled", explainer="nearest") < 1
+
+
+def test_what_a_source_does_not_admit_is_left_out_and_named(registrations, capsys):
+    found = experiment(registrations, "unseen_objects", "shuffled", "transfer").run(registrations, {})
+    assert set(found["control"]) == {"paper", "shuffled"}
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
+        "controls of tiny: 'unseen_objects' is skipped: it needs at least 5 objects, but there are 3",
+        "controls of tiny: 'transfer' is skipped: it needs at least two sources",
+    ]
+
+
+def test_shuffled_labels_are_learnt_in_parts_and_every_test_sample_is_asked_about_once(six, monkeypatch):
+    monkeypatch.setattr("gpca.experiments.controls.protocol.FEWEST_OF_PART", 12)
+    learnt = []
+
+    class Counting(Nearest):
+        def fit(self, registrations):
+            learnt.append(registrations.sample.tolist())
+            super().fit(registrations)
+
+    found = experiment(six, "shuffled", rivals={"counting": Rival(Counting, "embeddings")}).run(six, {})
+    assert [len(samples) for samples in learnt] == [36, 12, 12, 12]
+    assert sorted(sample for samples in learnt[1:] for sample in samples) == learnt[0]
+    assert sorted(found["sample"][found["control"] == "shuffled"]) == list(range(18))
+
+
+def test_an_explainer_cannot_see_what_was_perturbed(six):
+    class Spy:
+        def fit(self, registrations):
+            assert set(registrations.split) == {"train"}
+
+        def explain(self, registrations):
+            assert set(registrations.concept) == {""}
+            assert np.isnan(registrations.severity_noise).all()
+            return seen_by.explain(registrations)
+
+    seen_by = Head()
+    experiment(six, "label_noise_10", rivals={"spy": Rival(Spy, "embeddings")}).run(six, {})
+
+
+def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(six, monkeypatch):
+    import gpca.features.registered as registered
+
+    measured = []
+    describe = registered.describe_registrations
+    monkeypatch.setattr(
+        registered, "describe_registrations", lambda r, *a, **k: measured.append(len(r)) or describe(r, *a, **k)
+    )
+    rivals = {
+        "pair": Rival(partial(PairGPCA, "tiny", 100, points=32, iterations=2, inducing=4, draws=10), "registrations"),
+        "residuals": Rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal"),
+    }
+    found = experiment(six, "label_noise_10", "shuffled", rivals=rivals).run(six, {})
+    assert measured == [len(six), ASKED]  # a few again, to take the time
+    assert found.groupby(["control", "explainer"]).size().tolist() == [18] * 6
+    alone = experiment(replace(six, attached={}), "shuffled", rivals={"residuals": rivals["residuals"]}).run(six, {})
+    both = found[(found["explainer"] == "residuals") & (found["control"] != "label_noise_10")]
+    assert np.allclose(alone["entropy"], both["entropy"])
+
+
+class WithEncoder(Nearest):
+    """Its encoder finds the concept, if it was trained; it has measured nothing."""
+
+    learnt: ClassVar[list] = []
+
+    def learn_encoder(self, registrations):
+        self.learnt.append(registrations.concept.tolist())
+        return lambda asked: replace(asked, attached={**asked.attached, "embedding": seen(asked)[0]})
+
+
+def test_an_encoder_of_an_explainer_is_trained_once_for_all_labels_and_anew_for_other_samples(six):
+    WithEncoder.learnt.clear()
+    of_unseen = of_unseen_objects(six, 3, "tiny", 100)
+    made = experiment(
+        *(six, "density", "unseen_objects", "reversed", "label_noise_30", "shuffled", "transfer"),
+        embeddings={"density": attached(six), "unseen_objects": attached(of_unseen)},
+        rivals={"own": Rival(WithEncoder, "registrations")},
+    )
+    found = made.run(six, {"other": six})
+    of_paper, of_density, of_known = WithEncoder.learnt
+    assert of_paper == of_density == six.concept[six.split == "train"].tolist()
+    assert of_known == of_unseen.concept[of_unseen.split == "train"].tolist()
+    assert all(share_right(found, control=control) == 1 for control in ("density", "unseen_objects", "transfer"))
+    [cost] = made.costs.rows().to_dict("records")
+    assert cost["explainer"] == "own" and cost["learning_seconds"] > 0 and cost["seconds"] >= 0
+
+
+def test_encoders_that_are_trained_otherwise_are_asked_about_known_and_unseen_objects_alone(six):
+    of_unseen = of_unseen_objects(six, 3, "tiny", 100)
+    good = attached(of_unseen)
+    embeddings = {"unseen_objects": good, "two_layer_head": good | {"embedding": 0 * good["embedding"]}}
+    made = experiment(six, "unseen_objects", embeddings=embeddings, rivals={"gpca": Rival(Nearest, "embeddings")})
+    found = replace(made, settings=replace(made.settings, encoders=TRAININGS)).run(six, {})
+    assert found.groupby("explainer")["control"].unique().map(set).to_dict() == {
+        "gpca": {"paper", "unseen_objects", "seen_objects"},
+        "gpca_two_layer_head": {"unseen_objects", "seen_objects"},  # of the other way there are no embeddings
+    }
+    assert share_right(found, control="seen_objects", explainer="gpca") == 1
+    assert share_right(found, control="seen_objects", explainer="gpca_two_layer_head") < 1
+
+
+@pytest.mark.parametrize(
+    ("control", "head", "fewest_points"),
+    [
+        ("density", "linear", 32),
+        ("unseen_objects", "linear", None),
+        ("random_draws", "linear", 32),
+        ("two_layer_head", "two_layer", None),
+    ],
+)
+def test_an_encoder_is_trained_as_its_control_says(six, monkeypatch, control, head, fewest_points):
+    given = []
+    monkeypatch.setattr(
+        "gpca.experiments.controls.encoding.train_encoder", lambda *given_: given.append(given_) or (None, [])
+    )
+    monkeypatch.setattr("gpca.experiments.controls.encoding.embed", lambda model, asked, *_: seen(asked))
+    arrays, _ = encode(control, six, "tiny", 100, ControlSettings(draw_points=(32, 64)), EncoderSettings())
+    learnt, settings = given[0][0], given[0][3]
+    assert (settings.head, settings.fewest_points) == (head, fewest_points)
+    expected = six if control == "density" else of_unseen_objects(six, 3, "tiny", 100)
+    assert np.array_equal(learnt.split, expected.split) and len(arrays["h"]) == len(expected)

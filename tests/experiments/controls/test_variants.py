@@ -1,0 +1,104 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.icp import ICPSettings
+from gpca.alignment.rigid import inverse, transform
+from gpca.errors import InputError
+from gpca.experiments.controls.settings import RELABELLED, ControlSettings
+from gpca.experiments.controls.variants import (
+    left_out,
+    of_unseen_objects,
+    registered_backwards,
+    relabelled,
+    shows_known_object,
+    thinned,
+)
+from gpca.objects.surface import instance_of
+from gpca.pairs.perturbation import CONCEPTS
+
+
+def test_a_thinned_cloud_has_a_random_number_of_its_own_points(six):
+    thin = thinned(six, (32, 64), "tiny", 100)
+    sizes = np.diff(thin.offsets)
+    assert sizes.min() >= 32 and sizes.max() <= 64 and len(set(sizes)) > 10
+    assert abs(np.corrcoef(sizes, six.concept == "overlap")[0, 1]) < 0.4
+    for row in (0, 40):
+        assert set(map(tuple, thin.cloud(row))) <= set(map(tuple, six.cloud(row)))
+        assert np.array_equal(thin.target(row), six.target(row))
+    part = thinned(six.subset(np.array([7])), (32, 64), "tiny", 100)
+    assert np.array_equal(part.cloud(0), thin.cloud(7))
+
+
+def test_every_object_is_unseen_once_with_all_its_views(six):
+    tested = []
+    for seed in range(3):
+        changed = of_unseen_objects(six, 3, "tiny", seed)
+        asked = changed.split == "test"
+        unseen = asked & ~shows_known_object(changed)
+        train, test = ({instance_of(name) for name in changed.object_name[rows]} for rows in (~asked, unseen))
+        assert not train & test
+        assert len(set(changed.sample[asked])) == asked.sum()
+        shown = {instance_of(name) for name in six.object_name}
+        assert train | test == shown
+        of_both = np.isin([instance_of(name) for name in six.object_name], sorted(test)).sum()
+        assert unseen.sum() == of_both  # of both splits
+        known = np.isin([instance_of(name) for name in six.object_name], sorted(train)) & (six.split == "test")
+        assert (asked & ~unseen).sum() == known.sum()  # new samples of what it learns from
+        tested += sorted(test)
+    assert sorted(tested) == sorted(shown)
+
+
+def test_icp_backwards_aligns_as_well_and_tells_where(six):
+    rows = np.flatnonzero(six.concept == "noise")[:4]
+    back = registered_backwards(six.subset(rows), ICPSettings())
+    for i, row in enumerate(rows):
+        observed = transform(inverse(six.T_target_source("icp", row)), six.cloud(row).astype(float))
+        assert np.allclose(transform(back.T_target_source("icp", i), observed), back.cloud(i), atol=1e-4)
+        assert not np.array_equal(back.cloud(i), six.cloud(row))
+        assert np.abs(back.cloud(i) - six.cloud(row)).max() < 0.2  # diameters
+    assert (back.fitness > 0.5).all()
+
+
+def test_icp_backwards_finds_normals_for_its_target(six):
+    part = six.subset(np.array([0, 1]))
+    planes = registered_backwards(part, ICPSettings(method="point_to_plane"))
+    assert not np.array_equal(planes.T_target_source_icp, registered_backwards(part, ICPSettings()).T_target_source_icp)
+
+
+@pytest.mark.parametrize(("control", "share"), [("label_noise_10", 0.1), ("label_noise_30", 0.3)])
+def test_so_many_labels_are_wrong(six, control, share):
+    train = six.subset(six.rows("train"))
+    changed = relabelled(control, train, "tiny", 100)
+    assert (changed.concept != train.concept).sum() == round(share * len(train))
+    assert set(changed.concept) == set(CONCEPTS)
+    assert np.array_equal(relabelled(control, train, "tiny", 100).concept, changed.concept)
+
+
+def test_shuffled_labels_say_nothing_of_the_concept(six):
+    train = six.subset(six.rows("train"))
+    changed = relabelled("shuffled", train, "tiny", 100)
+    counts = [[(changed.concept[train.concept == true] == label).sum() for label in CONCEPTS] for true in CONCEPTS]
+    assert np.array_equal(counts, np.full((3, 3), 4))
+    assert set(RELABELLED) == {"label_noise_5", "label_noise_10", "label_noise_20", "label_noise_30", "shuffled"}
+
+
+def test_what_a_source_does_not_admit_is_said(six, registrations):
+    settings = ControlSettings(draw_points=(32, 64))
+    assert left_out("unseen_objects", six, settings, "dgcnn") is None
+    assert (
+        left_out("unseen_objects", registrations, settings, "dgcnn") == "it needs at least 5 objects, but there are 3"
+    )
+    assert left_out("density", six, settings, "dgcnn") is None
+    assert left_out("density", six, settings, "pointnet") == "backbone 'pointnet' accepts clouds of one size only"
+    fewest = np.diff(six.offsets).min()
+    assert left_out("random_draws", six, settings, "pointnet") == "backbone 'pointnet' accepts clouds of one size only"
+    assert left_out("two_layer_head", six, settings, "pointnet") is None
+    words = f"its smallest draw has 200 points, but a cloud has only {fewest}"
+    assert left_out("density", six, replace(settings, draw_points=(200, 512)), "dgcnn") == words
+
+
+def test_a_range_that_runs_downwards_is_refused():
+    with pytest.raises(InputError, match=r"\[64, 32\] is in descending order"):
+        ControlSettings.from_dict({"draw_points": [64, 32], "explainers": {}})

@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from gpca.causes.replay import replay
+from gpca.causes.settings import CauseSettings
+from gpca.causes.shapley import ALL
+from gpca.causes.truth import FAILED
+from gpca.errors import InputError
+from gpca.experiments.diagnosis.example import GAP, TRUTH, _draw_scores, choose_sample, draw_causes_example
+from gpca.objects.canonical import write_objects
+from gpca.objects.procedural import surfaces
+from tests.conftest import FEW_CAUSES, FOUR
+from tests.experiments.diagnosis.files import write_run
+
+SETTINGS = FEW_CAUSES | {"points": list(FEW_CAUSES["points"]), "icp": {}}
+
+
+def test_a_sample_is_drawn_again_where_it_lay(four, causes):
+    row = choose_sample(causes, "causes.npz")
+    again = replay(four, causes, row, "four", 100, CauseSettings(**FEW_CAUSES))
+    assert again.observed[ALL] == pytest.approx(causes.registrations.cloud(row), abs=1e-5)
+    assert np.array_equal(again.model.astype(np.float32), causes.registrations.target(row))
+    with pytest.raises(InputError, match="is not reproduced by these settings"):
+        replay(four, causes, row, "four", 101, CauseSettings(**FEW_CAUSES))
+
+
+def test_the_sample_shown_failed_by_as_many_causes_as_any(causes):
+    row = choose_sample(causes, "causes.npz")
+    failed = causes.rows("test")[causes.truth.state[causes.rows("test")] == FAILED]
+    assert row in failed
+    assert causes.truth.causes[row].sum() == causes.truth.causes[failed].sum(axis=1).max()
+    with pytest.raises(InputError, match="has no failed test sample"):
+        choose_sample(causes.subset(causes.rows("train")), "causes.npz")
+
+
+def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row_is_bold():
+    import matplotlib.pyplot as plt
+
+    figure, panel = plt.subplots()
+    numbers = np.array([[0.0, 0.5, 0.3, 0.2], [0.1, 0.2, 0.9, 0.8], [0.7, 0.1, 0.1, 0.1]])
+    _draw_scores(panel, [TRUTH, "Multi-label", "Right"], numbers)
+    assert panel.get_yticks().tolist() == [0, 1 + GAP, 2 + GAP]
+    assert [text.get_text() for text in panel.texts if text.get_fontweight() == "bold"] == ["0.50", "0.90", "0.70"]
+    plt.close(figure)
+
+
+def test_the_figure_is_the_same_bytes_each_time(causes, tmp_path):
+    predictions, [truth] = write_run(tmp_path, causes)
+    objects = tmp_path / "four.npz"
+    write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", objects, n_points=6000)
+    drawn = []
+    for name in ("one", "two"):
+        files = [tmp_path / f"{name}.{suffix}" for suffix in ("pdf", "png")]
+        draw_causes_example(objects, truth, predictions, SETTINGS, {"right": "Right"}, "Four", *files)
+        drawn.append([path.read_bytes() for path in files])
+    assert drawn[0] == drawn[1]

@@ -1,0 +1,61 @@
+import pytest
+
+from gpca.causes.labels import LABELS, labels_of
+from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.errors import InputError
+from gpca.experiments.diagnosis.judged import CEILING, POOLED, ceiling_of, read_judged
+from gpca.experiments.diagnosis.metrics import collect
+from tests.experiments.diagnosis.files import write_run
+
+
+def values(rows, **wanted):
+    for column, value in wanted.items():
+        rows = rows[rows[column] == value]
+    return rows["value"].tolist()
+
+
+def test_who_is_right_has_full_marks_and_who_says_the_same_has_those_of_chance(causes, tmp_path):
+    rows = collect(*write_run(tmp_path, causes))
+    assert values(rows, method="right", metric="balanced_accuracy") == [1.0]
+    assert values(rows, method="right", metric="auroc_failed") == [1.0]
+    assert values(rows, method="right", metric="false_alarm_rate") == [0.0]
+    assert values(rows, method="always_pose", metric="auroc_failed") == [0.5]
+    present = set(labels_of(causes.truth)[causes.rows("test")]) - {BORDERLINE}
+    assert set(present) <= set(LABELS)
+    assert values(rows, method="always_pose", metric="balanced_accuracy") == [1 / len(LABELS)]
+    assert values(rows, method=CEILING, metric="auroc_failed")[0] > 0.8
+
+
+def test_what_the_ceiling_names_nominal_has_its_score_of_it(causes):
+    ceiling = ceiling_of(causes.subset(causes.rows("test")), seed=0)
+    assert ((ceiling.named == NOMINAL) == (ceiling.nominal == 1)).all()
+    assert (ceiling.nominal[ceiling.named != NOMINAL] == 0).all()
+    assert ceiling.nominal + ceiling.scores.sum(axis=1) == pytest.approx(1)
+
+
+def test_the_confusion_counts_every_sample_that_has_a_label(causes, tmp_path):
+    rows = collect(*write_run(tmp_path, causes))
+    labelled = (labels_of(causes.truth)[causes.rows("test")] != BORDERLINE).sum()
+    named = rows[(rows["method"] == "always_pose") & rows["metric"].str.startswith("predicted_as_")]
+    assert named["value"].sum() == labelled == sum(values(named, metric="predicted_as_pose"))
+
+
+def test_all_sources_together_are_one_more_where_there_are_several(causes, tmp_path):
+    first, truth = write_run(tmp_path, causes)
+    second, other = write_run(tmp_path, causes, source="again")
+    rows = collect([*first, *second], [*truth, *other])
+    assert set(rows["source"]) == {"four", "again", POOLED}
+    n = values(rows, method="right", metric="test_samples")
+    assert n[2] == n[0] + n[1]
+
+
+def test_predictions_without_their_truth_or_of_other_samples_are_refused(causes, tmp_path):
+    files, truth = write_run(tmp_path, causes)
+    with pytest.raises(InputError, match=r"its ground truth was not given; give causes/four/seed100\.npz"):
+        read_judged(files, [])
+    lines = files[0].read_text().splitlines()
+    files[0].write_text("\n".join(lines[:-1]) + "\n")
+    with pytest.raises(InputError, match="its test samples differ from those of the causes"):
+        read_judged(files, truth)
+    with pytest.raises(InputError, match="no files were given"):
+        collect([], [])

@@ -1,0 +1,57 @@
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from gpca.errors import InputError
+from gpca.experiments.diagnosis.measures import measure
+from gpca.experiments.diagnosis.reliability import draw_nominal_reliability, draw_reliability_panel
+from tests.experiments.diagnosis.conftest import random_judged
+
+SOURCES, EXPLAINERS = {"cups": "Cups"}, {"gpca_pair": "GP-CA on the pair", "absent": "Absent"}
+
+
+def test_the_error_in_the_title_is_the_one_of_the_tables(tmp_path):
+    judged = random_judged(n=300)
+    clear = judged.label != "borderline"
+    _, panel = plt.subplots()
+    gap = draw_reliability_panel(panel, judged.nominal[clear], judged.label[clear] == "nominal", bins=10)
+    expected = measure(judged, np.ones((1, len(judged))))["nominal_calibration"][0]
+    assert gap == pytest.approx(expected)
+    plt.close()
+
+
+def test_a_calibrated_score_lies_on_the_diagonal():
+    random = np.random.default_rng(0)
+    probability = random.uniform(size=40000)
+    _, panel = plt.subplots()
+    gap = draw_reliability_panel(panel, probability, random.uniform(size=40000) < probability, bins=10)
+    across, up = panel.get_lines()[-1].get_data()
+    assert gap < 0.02
+    assert np.abs(across - up).max() < 0.03
+    plt.close()
+
+
+def test_the_panel_is_square_and_counts_the_samples_of_each_bin():
+    random = np.random.default_rng(0)
+    probability = random.uniform(size=500) ** 3
+    figure, panel = plt.subplots()
+    draw_reliability_panel(panel, probability, random.uniform(size=500) < probability, bins=10)
+    counts = figure.axes[1]
+    expected = np.histogram(probability, bins=10, range=(0, 1))[0]
+    assert [bar.get_height() for bar in counts.patches] == expected.tolist()
+    assert counts.get_yscale() == "log" and counts.get_ylim()[1] > expected.max() ** 1.5
+    assert panel.get_box_aspect() == counts.get_box_aspect() == 1
+    assert panel.get_xlim() == panel.get_ylim()
+    plt.close()
+
+
+def test_the_figure_is_the_same_bytes_each_time(tmp_path):
+    judged = {("cups", "gpca_pair", seed): random_judged(seed=seed) for seed in (100, 101)}
+    drawn = []
+    for name in ("one", "two"):
+        files = [tmp_path / f"{name}.{suffix}" for suffix in ("pdf", "png")]
+        draw_nominal_reliability(judged, SOURCES, EXPLAINERS, *files)
+        drawn.append([file.read_bytes() for file in files])
+    assert drawn[0] == drawn[1]
+    with pytest.raises(InputError, match="have no predictions of these sources and explainers"):
+        draw_nominal_reliability(judged, {"mugs": "Mugs"}, EXPLAINERS, tmp_path / "a.pdf", tmp_path / "a.png")

@@ -1,0 +1,113 @@
+"""The figure of estimators."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import chi2
+
+from gpca.errors import InputError
+from gpca.experiments.estimators.covariances import ReferenceSamples, covariance_columns, read_estimate_files
+from gpca.experiments.estimators.ellipses import STYLES, WIDEST, draw_ellipses, ellipse
+from gpca.experiments.estimators.figure import LEVELS, coverages, draw_estimators
+from gpca.io.csv_file import write_csv
+from gpca.reporting.figures.style import GREY
+
+ESTIMATORS, METHODS = {"censi": "Censi", "own": "Own"}, {"point_to_point": "ICP"}
+
+
+@pytest.fixture
+def files(tmp_path):
+    random = np.random.default_rng(0)
+    frame = pd.DataFrame(
+        {
+            "sample": np.arange(8), "object": "cup", "method": "point_to_point", "failed": np.arange(8) > 3,
+            "add_relative": np.linspace(0.005, 0.2, 8), "failure": "", "kl_rotation": 0.1, "kl_translation": 0.1,
+            "error_ratio": 1.0, "mahalanobis": chi2.ppf(np.linspace(0.1, 0.9, 8), 6), "spread": 0.03,
+        } | covariance_columns(1e-3 * np.eye(6))
+    )  # fmt: skip
+    paths = []
+    for name in ("reference", *ESTIMATORS):
+        path = tmp_path / "cups" / name / "seed0.csv"
+        path.parent.mkdir(parents=True)
+        write_csv(path, frame)
+        paths.append(path)
+    samples = ReferenceSamples(
+        np.arange(8), np.full(8, "point_to_point"), 0.03 * random.normal(size=(240, 6)), np.arange(0, 241, 30),
+        0.01 * np.ones((8, 6)),
+    )  # fmt: skip
+    (tmp_path / "samples" / "cups").mkdir(parents=True)
+    samples.save(tmp_path / "samples/cups/seed0.npz", ("cups", 0))
+    return paths, tmp_path / "samples/cups/seed0.npz"
+
+
+def drawn(files, folder):
+    paths, samples = files
+    draw_estimators(
+        read_estimate_files(paths), samples, ESTIMATORS, METHODS, "Cups", folder / "a.pdf", folder / "a.png"
+    )
+    return (folder / "a.png").read_bytes()
+
+
+def test_both_files_are_written_and_the_same_again(files, tmp_path):
+    first = drawn(files, tmp_path)
+    assert (tmp_path / "a.pdf").stat().st_size > 1000
+    assert drawn(files, tmp_path) == first
+
+
+def test_samples_without_their_estimates_are_refused(files, tmp_path):
+    paths, samples = files
+    with pytest.raises(InputError, match="has no estimates of cups, seed 0"):
+        drawn((paths[1:], samples), tmp_path)
+
+
+def test_the_reference_is_seen_above_and_the_axes_are_named(files, tmp_path, figures):
+    paths, samples = files
+    outputs = tmp_path / "a.pdf", tmp_path / "a.png"
+    draw_estimators(read_estimate_files(paths), samples, ESTIMATORS, METHODS, "Cups", *outputs)
+    [figure] = figures
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["Reference", "Censi", "Own", "the reference's results", "true pose", "succeeded", "failed"]
+    upper = figure.axes[:4]
+    assert [panel.get_ylabel() for panel in upper] == [
+        f"second axis ({unit})" for unit in ("degrees", "% of the diameter") * 2
+    ]
+    assert all(GREY in [line.get_color() for line in panel.get_lines()] for panel in upper)
+    sides = {panel.get_title(): [text.get_text() for text in panel.texts] for panel in figure.axes[4:]}
+    assert sides["Reference"] == ["too confident", "too cautious"]  # above the diagonal, and below
+    assert sides["Coverage"] == ["too cautious"]  # above it
+
+
+def test_estimators_of_one_color_differ_in_their_line():
+    looks = [(colour, str(line)) for colour, line in STYLES.values()]
+    assert len(set(looks)) == len(looks)
+    assert STYLES["bayesian_icp"][0] != STYLES["stein_icp"][0]
+
+
+@pytest.mark.parametrize(("times", "whole"), [(1.5, True), (10.0, False)])
+def test_a_panel_holds_whole_ellipses_unless_they_are_far_wider(times, whole):
+    import matplotlib.pyplot as plt
+
+    random = np.random.default_rng(0)
+    twists = random.normal(size=(400, 6))
+    samples = ReferenceSamples(np.array([0]), np.array(["icp"]), twists, np.array([0, 400]), np.zeros((1, 6)))
+    deviation = times * 2.6 / np.sqrt(-2 * np.log(0.05))  # of an ellipse that is so many times as wide as the dots
+    row = pd.Series(covariance_columns(deviation**2 * np.eye(6)))
+    figure, panel = plt.subplots()
+    draw_ellipses(panel, samples, 0, {"own": row, "censi": None}, slice(0, 3), 1.0)
+    [outline, _] = panel.get_lines()
+    widest, edge = np.abs(outline.get_xydata()).max(), panel.get_xlim()[1]
+    assert (widest < edge) == whole
+    assert edge < 1.1 * WIDEST * 3.0
+    plt.close(figure)
+
+
+def test_an_ellipse_holds_what_it_says():
+    sigma = np.array([[2.0, 0.6], [0.6, 0.5]])
+    outline = ellipse(sigma)
+    distance = np.einsum("ni,ij,nj->n", outline, np.linalg.inv(sigma), outline)
+    assert distance == pytest.approx(np.full(len(outline), chi2.ppf(0.95, 2)))
+
+
+def test_a_right_covariance_lies_on_the_diagonal():
+    squares = np.random.default_rng(0).chisquare(6, size=20_000)
+    assert coverages(squares) == pytest.approx(LEVELS, abs=0.015)

@@ -1,0 +1,129 @@
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
+from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
+from gpca.attribution.metrics import read_metrics, write_metrics
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.errors import InputError
+from gpca.experiments.kernel_grid.grid import (
+    GRID_COLUMNS,
+    KernelGrid,
+    collect_grids,
+    evaluate_grid,
+    read_grids,
+    setting_name,
+    write_grid,
+)
+from gpca.pairs.perturbation import CONCEPTS
+
+GRID = KernelGrid(("rbf", "polynomial"), (0.1, 0.01), (2, 6), inducing=6, draws=40)
+
+
+@pytest.fixture(scope="module")
+def embedded(registrations):
+    random = np.random.default_rng(0)
+    target_S = [CONCEPTS.index(concept) for concept in registrations.concept]
+    embedding = 1.5 * random.normal(size=(3, 10))[target_S] + random.normal(size=(len(registrations), 10))
+    return replace(registrations, attached={"embedding": embedding})
+
+
+@pytest.fixture(scope="module")
+def grid(embedded):
+    return evaluate_grid(embedded, GRID, "tiny", 0)
+
+
+def test_there_is_a_row_for_every_kernel_rate_and_count(grid):
+    assert list(grid.columns) == list(GRID_COLUMNS)
+    assert len(grid) == 2 * 2 * 2
+    assert not grid.duplicated(["kernel", "learning_rate", "iterations"]).any()
+    assert np.isfinite(grid[list(GRID_COLUMNS[1:])].to_numpy()).all()
+
+
+@pytest.mark.parametrize("row", range(8))
+def test_every_row_is_that_of_a_fit_of_its_own(embedded, grid, row):
+    kernel, rate, iterations, *measured = grid.iloc[row]
+    gpc = GPC(CONCEPTS, GPCSettings(kernel, rate, int(iterations), inducing=6, draws=40), "tiny", 0)
+    train, test = embedded.rows("train"), embedded.rows("test")
+    gpc.fit(embedded.embedding[train], embedded.concept[train])
+    scores = gpc.attribute(embedded.embedding[test])[0]
+    target = np.array([CONCEPTS.index(concept) for concept in embedded.concept[test]])
+    assert measured == [
+        np.mean(scores.argmax(axis=1) == target),
+        gpc.elbo(),
+        scores.max(axis=1).mean(),
+        calibration_error(scores, target),
+        negative_log_likelihood(scores, target),
+    ]
+
+
+def test_a_larger_rate_raises_the_bound_further(grid):
+    last = grid[grid["iterations"] == 6].set_index(["kernel", "learning_rate"])["elbo"]
+    for kernel in GRID.kernels:
+        assert last[kernel, 0.1] > last[kernel, 0.01]
+
+
+def test_files_are_read_back_with_source_and_seed(grid, tmp_path):
+    paths = [tmp_path / "kernels/tiny" / f"seed{seed}.csv" for seed in (0, 3)]
+    for path in paths:
+        write_grid(path, grid)
+    read = read_grids(paths)
+    assert read["source"].unique().tolist() == ["tiny"]
+    assert read["seed"].tolist() == [0] * 8 + [3] * 8
+    assert read["accuracy"].to_numpy() == pytest.approx(np.tile(grid["accuracy"], 2), abs=1e-6)
+
+
+def test_bad_files_are_named(grid, tmp_path):
+    path = tmp_path / "kernels/tiny/seed0.csv"
+    write_grid(path, grid.assign(nll=np.nan))
+    with pytest.raises(InputError, match="column 'nll' contains values that are not finite numbers"):
+        read_grids([path])
+    write_grid(path, grid.drop(columns="ece"))
+    with pytest.raises(InputError, match="column 'ece' is missing"):
+        read_grids([path])
+    with pytest.raises(InputError, match="no files were given"):
+        read_grids([])
+
+
+@pytest.mark.parametrize("split", ["train", "test"])
+def test_a_missing_split_is_a_fault(embedded, split):
+    with pytest.raises(InputError, match="tiny, seed 0: lack a split"):
+        evaluate_grid(embedded.subset(embedded.rows(split)), GRID, "tiny", 0)
+
+
+# --- collected ---
+
+
+def test_every_setting_and_measure_of_every_seed_becomes_a_row(tmp_path):
+    files = []
+    for seed in (0, 1):
+        rows = [
+            ("rbf", 0.01, 100, 0.9 + 0.01 * seed, -1.5, 0.5, 0.3, 0.4),
+            ("matern32", 0.001, 20, 0.8, -2, 0.4, 0.2, 0.6),
+        ]
+        files.append(tmp_path / f"kernels/ycb/seed{seed}.csv")
+        write_grid(files[-1], pd.DataFrame(rows, columns=list(GRID_COLUMNS)))
+    metrics = collect_grids(files)
+    assert tuple(metrics.columns) == TIDY
+    assert len(metrics) == 2 * 2 * 5
+    assert set(metrics["method"]) == {"rbf-0.01-100", "matern32-0.001-20"}
+    of_row = metrics[(metrics["method"] == "rbf-0.01-100") & (metrics["metric"] == "accuracy")]
+    assert list(of_row.itertuples(index=False, name=None)) == [
+        ("kernels", "ycb", "rbf-0.01-100", "accuracy", "all", 0, 0.9),
+        ("kernels", "ycb", "rbf-0.01-100", "accuracy", "all", 1, 0.91),
+    ]
+    write_metrics(metrics, tmp_path / "kernels.csv")
+    assert read_metrics(tmp_path / "kernels.csv")["value"].sum() == pytest.approx(metrics["value"].sum())
+
+
+def test_a_setting_has_one_name():
+    assert setting_name("polynomial", 0.001, 200) == "polynomial-0.001-200"
+
+
+def test_no_files_are_a_fault():
+    with pytest.raises(InputError, match="no files were given"):
+        collect_grids([])

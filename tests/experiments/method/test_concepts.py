@@ -1,0 +1,169 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from gpca.alignment.rigid import scale_translation, transform
+from gpca.errors import InputError
+from gpca.experiments.method.concepts import (
+    choose_samples,
+    choose_view,
+    draw_concepts_figure,
+    severity_text,
+    source_before_icp,
+)
+from gpca.io.arrays import save_arrays
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, SEVERITIES_OF, Severities
+
+DIAMETERS_M = np.array([0.2, 0.5])
+NAMES = np.array(["block", "bar"])
+
+
+def rigid(rotvec, translation):
+    T = np.eye(4)
+    T[:3, :3] = trimesh.transformations.rotation_matrix(np.linalg.norm(rotvec), rotvec)[:3, :3]
+    T[:3, 3] = translation
+    return T
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    """Points of two boxes, relative to their diameters."""
+    boxes = [trimesh.creation.box(extents) for extents in ((3, 2, 1), (6, 1, 1))]
+    return [np.asarray(box.sample(2000, seed=1)) / np.linalg.norm(box.extents) for box in boxes]
+
+
+@pytest.fixture(scope="module")
+def files(clouds, tmp_path_factory):
+    """An objects and a registrations file, 12 test samples of each object; also the sources before ICP."""
+    folder = tmp_path_factory.mktemp("concepts")
+    random = np.random.default_rng(5)
+    points_m = np.concatenate([cloud * d for cloud, d in zip(clouds, DIAMETERS_M, strict=True)]).astype(np.float32)
+    save_arrays(
+        folder / "objects.npz",
+        {"names": NAMES, "points_m": points_m, "normals": np.full_like(points_m, 3**-0.5)}
+        | {"offsets": np.array([0, 2000, 4000]), "diameters_m": DIAMETERS_M},
+    )
+    T_init, T_icp = rigid([0.1, 0, 0.2], [0.01, 0, 0.03]), rigid([0, 0.7, 0.1], [0, 0.1, 0])
+    sources, aligned, severities, labels = [], [], [], []
+    for sample in range(24):
+        concept, row = CONCEPTS[sample % 3], sample // 3 % 2
+        perturbed = PERTURBATIONS[concept](clouds[row][:500], Severities(), random)
+        severities.append([perturbed.severity.get(n, 0.0) for n in SEVERITIES])
+        labels.append((concept, row))
+        to_diameters = 1 / DIAMETERS_M[row]
+        sources.append(transform(scale_translation(T_init, to_diameters), perturbed.points))
+        aligned.append(transform(scale_translation(T_icp, to_diameters), perturbed.points).astype(np.float32))
+    concepts, rows = (np.array(column) for column in zip(*labels, strict=True))
+    noise, rotation, translation, crop = np.array(severities).T
+    registrations = Registrations(
+        sample=np.arange(24),
+        split=np.array(["test"] * 24),
+        concept=concepts,
+        object_index=rows,
+        object_name=NAMES[rows],
+        diameter_m=DIAMETERS_M[rows],
+        points=np.concatenate(aligned),
+        offsets=np.cumsum([0, *map(len, aligned)]),
+        target_points=np.concatenate(aligned),
+        target_offsets=np.cumsum([0, *map(len, aligned)]),
+        severity_noise=noise,
+        severity_rotation_rad=rotation,
+        severity_translation=translation,
+        severity_crop=crop,
+        T_target_source_true=np.tile(np.eye(4), (24, 1, 1)),
+        T_target_source_init=np.tile(T_init, (24, 1, 1)),
+        T_target_source_icp=np.tile(T_icp, (24, 1, 1)),
+        fitness=np.ones(24),
+        inlier_rmse=np.zeros(24),
+        axes=("bricks", 0),
+    )
+    registrations.save(folder / "registrations.npz")
+    return folder, registrations, sources
+
+
+def test_source_before_icp_undoes_icp_in_the_right_units(files):
+    _, registrations, sources = files
+    for sample in (0, 4):  # one of each object, as their diameters differ
+        np.testing.assert_allclose(source_before_icp(registrations, sample), sources[sample], atol=1e-6)
+
+
+def test_samples_are_of_one_object_and_of_medium_severity(files):
+    _, registrations, _ = files
+    samples = choose_samples(registrations, "registrations.npz")
+    assert {registrations.concept[sample] for sample in samples.values()} == set(CONCEPTS)
+    assert len({registrations.object_name[sample] for sample in samples.values()}) == 1
+    for concept, sample in samples.items():
+        for name in SEVERITIES_OF[concept]:
+            severity_S = getattr(registrations, f"severity_{name}")
+            drawn = np.sort(severity_S[registrations.concept == concept])
+            assert drawn[0] < severity_S[sample] < drawn[-1]
+    named = choose_samples(registrations, "registrations.npz", "bar")
+    assert {registrations.object_name[sample] for sample in named.values()} == {"bar"}
+
+
+def test_training_samples_are_not_shown(files):
+    _, registrations, _ = files
+    first = choose_samples(registrations, "registrations.npz")
+    rest = np.array([row for row in range(24) if row not in first.values()])
+    split = np.where(np.isin(np.arange(24), rest), "test", "train")
+    again = choose_samples(replace(registrations, split=split), "registrations.npz")
+    assert not set(first.values()) & set(again.values())
+
+
+def test_an_object_without_all_concepts_is_refused(files):
+    _, registrations, _ = files
+    with pytest.raises(InputError, match=r"r\.npz.*object 'cat'"):
+        choose_samples(registrations, "r.npz", "cat")
+    with pytest.raises(InputError, match="any object"):
+        choose_samples(registrations.subset(np.flatnonzero(registrations.concept != "pose")), "r.npz")
+
+
+def test_the_view_is_a_rotation_that_sees_shift_and_length(clouds):
+    target = clouds[1]  # a bar along x
+    up = np.array([0, 0, 1.0])
+    view = choose_view(target, {"noise": target, "pose": target + 0.1 * up, "overlap": target[target[:, 0] > 0]})
+    np.testing.assert_allclose(view @ view.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(view) == pytest.approx(1)
+    assert view[1] @ up > 0.9
+    assert abs(view[0, 0]) > 0.9
+
+
+def test_severities_are_worded_with_their_units(files):
+    _, registrations, _ = files
+    assert severity_text(registrations, 0, "noise") == f"$\\sigma$ = {100 * registrations.severity_noise[0]:.1f} % $d$"
+    assert severity_text(registrations, 1, "pose").startswith(
+        f"{np.degrees(registrations.severity_rotation_rad[1]):.0f}°"
+    )
+    assert severity_text(registrations, 2, "overlap") == f"{100 * registrations.severity_crop[2]:.0f} % cut off"
+
+
+def test_draws_red_and_blue_in_three_panels_and_the_same_bytes_again(files, tmp_path):
+    from matplotlib.image import imread
+
+    folder, _, _ = files
+    for name in ("a", "b"):
+        outputs = (tmp_path / f"{name}.pdf", tmp_path / f"{name}.png")
+        draw_concepts_figure(folder / "objects.npz", folder / "registrations.npz", "Boxes", *outputs)
+    for suffix in ("pdf", "png"):
+        assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+    image = imread(tmp_path / "a.png")[..., :3]
+    head = image.shape[0] // 6
+    red, blue = image[head:, :, 0] - image[head:, :, 2], image[head:, :, 2] - image[head:, :, 0]
+    for colour in (red, blue):
+        panels = np.array_split(colour > 0.3, 3, axis=1)
+        assert all(panel.sum() > 100 for panel in panels)
+
+
+def test_objects_of_another_run_are_refused(files, tmp_path):
+    folder, _, _ = files
+    with np.load(folder / "objects.npz") as arrays:
+        save_arrays(tmp_path / "objects.npz", dict(arrays) | {"names": np.array(["cat", "duck"])})
+    with pytest.raises(InputError, match="has no object"):
+        draw_concepts_figure(
+            tmp_path / "objects.npz", folder / "registrations.npz", "Boxes", tmp_path / "a.pdf", tmp_path / "a.png"
+        )
+    assert not (tmp_path / "a.pdf").exists()

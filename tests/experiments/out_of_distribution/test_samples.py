@@ -1,0 +1,107 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.training import embed, train_encoder
+from gpca.experiments.out_of_distribution.samples import held_out_objects, make_sets
+from gpca.experiments.out_of_distribution.sets import TRAINED_ON
+from gpca.experiments.out_of_distribution.settings import ShiftSettings
+
+ENCODER = {"draw_points": 32, "draws": 1, "epochs": 1, "batch_size": 16, "options": {"k": 4, "point_features": 8}}
+SHIFT = {
+    "samples": 6,
+    "severities": {"noise": [0.1, 0.2], "rotation_deg": [60, 90], "translation": [0.3, 0.5], "crop": [0.6, 0.8]},
+    "held_out_share": 0.2,
+    "train": 18,
+    "encoder": {"epochs": 2},
+    "neighbours": 3,
+    "shape_points": 16,
+}
+SETTINGS = ShiftSettings.from_dicts(SHIFT, {"cloud_points": 256, "train": 36, "test": 18}, ENCODER)
+
+
+@pytest.fixture(scope="module")
+def embedded(registrations):
+    model, _ = train_encoder(registrations, "tiny", 0, EncoderSettings(**ENCODER))
+    h_S_d, _ = embed(model, registrations, "tiny", 0, EncoderSettings(**ENCODER))
+    return model, replace(registrations, attached={"embedding": h_S_d})
+
+
+@pytest.fixture(scope="module")
+def sets(objects, embedded):
+    model, registrations = embedded
+    return make_sets(objects, registrations, registrations, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+
+
+def test_settings_join_what_the_sections_say():
+    assert SETTINGS.beyond.train == 0
+    assert SETTINGS.beyond.test == SETTINGS.samples == 6
+    assert SETTINGS.beyond.cloud_points == 256
+    assert SETTINGS.beyond.severities.crop == (0.6, 0.8)
+    assert SETTINGS.encoder == EncoderSettings(**ENCODER | {"epochs": 2})
+
+
+def test_all_sets_are_there_and_of_the_declared_size(sets, embedded):
+    _, registrations = embedded
+    assert set(sets.set) == set(TRAINED_ON)
+    assert len(sets.rows("in_distribution", "train")) == 36
+    assert len(sets.rows("in_distribution", "test")) == 18
+    for name in ("severity", "source", "objects"):
+        assert len(sets.rows(name, "test")) == 6
+        assert len(sets.rows(name, "train")) == 0
+    in_distribution = sets.rows("in_distribution", "test")
+    assert np.array_equal(sets.h[in_distribution], registrations.embedding[registrations.rows("test")])
+
+
+def test_held_out_objects_are_unseen_by_that_encoder_and_its_learners(sets):
+    unseen = set(sets.object_name[sets.set == "objects"])
+    assert len(unseen) == 1
+    assert not unseen & set(sets.object_name[sets.set == "seen_objects"])
+    assert len(sets.rows("seen_objects", "train")) == 18
+    keys = list(zip(sets.split[sets.set == "objects"], sets.sample[sets.set == "objects"], strict=True))
+    assert len(set(keys)) == len(keys)
+
+
+def test_distances_are_finite_zero_for_training_samples_and_larger_for_larger_severities(sets):
+    assert (sets.distance[sets.split == "train"] == 0).all()
+    assert (sets.distance[sets.split == "test"] > 0).all()
+    near, far = (np.median(sets.distance[sets.rows(name, "test"), 0]) for name in ("in_distribution", "severity"))
+    assert far > 1.3 * near
+
+
+def test_without_another_source_that_set_is_left_out_and_the_others_are_the_same(sets, objects, embedded):
+    model, registrations = embedded
+    alone = make_sets(objects, registrations, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    kept = sets.set != "source"
+    assert set(alone.set) == set(sets.set[kept])
+    for name, array in vars(alone).items():
+        assert array.tobytes() == getattr(sets, name)[kept].astype(array.dtype).tobytes()
+
+
+def test_a_share_of_the_objects_at_least_one_and_never_all_is_held_out():
+    names = np.array([f"part{i}" for i in range(10)])
+    assert len(held_out_objects(names, 0.2, "mine", 0)) == 2
+    assert len(held_out_objects(names[:3], 0.2, "mine", 0)) == 1
+    assert len(held_out_objects(names[:3], 0.9, "mine", 0)) == 2
+    assert held_out_objects(names, 0.2, "mine", 0).tolist() == held_out_objects(names[::-1], 0.2, "mine", 0).tolist()
+    assert len({tuple(held_out_objects(names, 0.2, "mine", seed)) for seed in range(5)}) > 1
+
+
+def test_of_a_single_object_none_is_held_out_and_those_sets_are_left_out(objects, embedded):
+    model, registrations = embedded
+    assert len(held_out_objects(np.array(["cup", "cup"]), 0.2, "mine", 0)) == 0
+    alone = replace(registrations, object_name=np.full(len(registrations), "cup"))
+    sets = make_sets(objects, alone, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    assert set(sets.set) == {"in_distribution", "severity"}
+
+
+def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
+    model, registrations = embedded
+    views = {name: f"mug_{i // 2}_1_{i}" for i, name in enumerate(np.unique(registrations.object_name).tolist())}
+    viewed = replace(registrations, object_name=np.array([views[name] for name in registrations.object_name.tolist()]))
+    sets = make_sets(objects, viewed, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    seen, unseen = ({name[:5] for name in sets.object_name[sets.set == part]} for part in ("seen_objects", "objects"))
+    assert unseen
+    assert not seen & unseen

@@ -1,0 +1,45 @@
+import pytest
+
+from gpca.errors import InputError
+from gpca.experiments.out_of_distribution.tables import table5_compact, table5_learners, table5_shift
+
+REAL = {"ycb": {"title": "YCB", "stand_in": False}, "linemod": {"title": "LINEMOD", "stand_in": False}}
+STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
+LEARNERS = {"gpca": "GPC", "learner_forest": "Forest", "learner_linear_svm": "SVM"}
+
+
+def test_table5_shows_accuracy_and_diagnostics_and_marks_the_best(diagnostics):
+    markdown = table5_learners(diagnostics, REAL, LEARNERS).markdown()
+    assert "| Dataset | Learner | Accuracy (%) | ρ | AURC | E-AURC | AUGRC | ECE (share) |" in markdown
+    assert "| YCB | GPC | 96.0 ± 2.5 | **0.520 ± 0.050** | **0.0040 ± 0.0000** |" in markdown
+    assert "**99.0 ± 2.5**" in markdown
+    assert "**0.020 ± 0.000**" in markdown
+    assert "LINEMOD" not in markdown
+    assert "Mean over 3 seeds" in markdown
+
+
+def test_table5_has_the_papers_form_too(diagnostics):
+    markdown = table5_compact(diagnostics, REAL, LEARNERS).markdown()
+    assert "| Learner | YCB (%) | LINEMOD (%) | ρ | AURC | ECE (share) |" in markdown
+    assert "Mean over 3 seeds, 40 test samples each" in markdown
+    assert "the paper's AUC" in markdown
+    assert "| GPC | 96.0 ± 2.5 | – | **0.520 ± 0.050** | **0.0040 ± 0.0000** |" in markdown
+
+
+def test_table5_shift_has_every_kind_of_shift(diagnostics):
+    table = table5_shift(diagnostics, REAL, LEARNERS)
+    assert [key for key in table.columns if key.startswith("rho")] == ["rho_severity", "rho_source", "rho_objects"]
+    titles = [column.title for column in table.columns.values()]
+    assert len(set(titles)) == len(titles)
+    assert table.cells[0, "rho_objects"].test_samples == 3 * (40 + 40)
+    assert table.cells[0, "accuracy_objects"].test_samples == 3 * 40
+
+
+@pytest.mark.parametrize("make", [table5_learners, table5_compact, table5_shift])
+def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(diagnostics, make):
+    table = make(diagnostics, STAND_INS, LEARNERS)
+    assert "on procedural stand-ins" in table.caption
+    assert table.latex().count("{") == table.latex().count("}")
+    assert "nan" not in table.markdown().lower()
+    with pytest.raises(InputError, match=f"have no results for {make.__name__}"):
+        make(diagnostics[:0], REAL, LEARNERS)

@@ -1,0 +1,82 @@
+import pandas as pd
+import pytest
+
+from gpca.attribution.metrics import ALL, TIDY_COLUMNS
+from gpca.errors import InputError
+from gpca.experiments.real_world.tables import table6_backbones
+
+BACKBONES = {"dgcnn": 600_000, "pointnet": 150_000}
+
+
+def metrics(values, seeds=3):
+    """Metrics of method -> accuracies by seed; a concept's are half a point above."""
+    rows = []
+    for method, accuracies in values.items():
+        for seed, accuracy in enumerate(accuracies[:seeds]):
+            rows.append(("attribution", "real_rgbd", method, "accuracy", ALL, seed, accuracy))
+            rows.append(("attribution", "real_rgbd", method, "accuracy", "pose", seed, accuracy + 0.005))
+            rows.append(("attribution", "real_rgbd", method, "test_samples", ALL, seed, 300))
+    return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+
+
+VALUES = {
+    "dgcnn-none": (0.80, 0.84, 0.82),
+    "dgcnn-pca": (0.81, 0.85, 0.83),
+    "pointnet-none": (0.60, 0.70, 0.65),
+    "analytical_gpc": (0.7, 0.7, 0.7),
+}
+
+
+def make(values=VALUES, **changes):
+    return table6_backbones(metrics(values, **changes), "frames", BACKBONES, ("none", "pca"))
+
+
+def test_rows_are_backbones_by_reductions_and_the_classic_features_last():
+    labels = [tuple(key for key, _ in row) for row in make().rows]
+    assert labels == [("dgcnn", "none"), ("dgcnn", "pca"), ("pointnet", "none"), ("analytical_gpc", "none")]
+
+
+def test_mean_deviation_and_paired_difference_are_those_of_the_seeds():
+    cells = make().cells
+    assert cells[0, "accuracy"].mean == pytest.approx(82)
+    assert cells[0, "deviation"].mean == pytest.approx(2)
+    assert (0, "difference") not in cells
+    assert cells[1, "difference"].mean == pytest.approx(1.0)
+    assert cells[1, "difference"].half_width == pytest.approx(0.0, abs=1e-9)  # the same in all seeds
+    assert cells[2, "difference"].mean == pytest.approx(-17.0)
+    assert cells[2, "difference"].half_width == pytest.approx(4.3027 * 3 / 3**0.5, abs=1e-3)
+    assert cells[2, "pose"].mean == pytest.approx(65.5)
+    assert cells[2, "parameters"].mean == 150
+    assert (3, "parameters") not in cells
+    assert make().best() == {(1, "accuracy")}
+
+
+def test_a_difference_below_zero_is_not_clipped_in_the_csv():
+    row = next(r for r in make().records() if r[:3] == ("pointnet", "none", "difference"))
+    assert float(row[4]) < -17
+
+
+def test_one_seed_has_no_deviation_and_no_interval():
+    table = make(seeds=1)
+    assert (0, "deviation") not in table.cells
+    assert "| 82.0 |" in make({"dgcnn-none": (0.82,)}, seeds=1).markdown()
+    assert "Mean over 1 seed, 300 test samples each" in table.markdown()
+    assert table.best() == set()
+
+
+def test_what_was_not_run_has_no_row_and_nothing_at_all_is_refused():
+    assert len(make({"dgcnn-none": (0.8, 0.8)}).rows) == 1
+    with pytest.raises(InputError, match="have no accuracy for table6_backbones"):
+        make({"softmax_head": (0.8, 0.8)})
+
+
+def test_the_note_says_what_encoders_were_pretrained_on():
+    of = metrics(VALUES), "frames", BACKBONES, ("none", "pca")
+    assert "pretrained on whole objects, and GPC" in " ".join(table6_backbones(*of, "whole objects").footnotes)
+    assert "perturbations, encoder, and GPC" in " ".join(table6_backbones(*of).footnotes)
+
+
+def test_a_backbone_without_a_title_has_its_name():
+    values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
+    table = table6_backbones(metrics(values), "frames", {"mine": 1000, "pointnet": 150_000}, ("none",))
+    assert "| To mine (points) |" in table.markdown()

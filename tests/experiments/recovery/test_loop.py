@@ -1,0 +1,100 @@
+"""The loop on a tiny table, with a stub in place of a classifier."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.pose_error import CORRECT
+from gpca.attribution.scores import Attribution
+from gpca.experiments.recovery.episodes import Episode
+from gpca.experiments.recovery.loop import Loop
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.actions import ACTIONS, action_of
+from gpca.recovery.policies import POLICIES, Means
+from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
+from tests.recovery.conftest import LOOP
+
+
+def stub(concept):
+    """An explainer that names the same concept whatever it sees, and counts what it is asked."""
+
+    def explain(registrations):
+        assert (registrations.concept == "").all()  # no truth
+        assert np.isnan(registrations.T_target_source_true).all()
+        explain.asked += registrations.sample.tolist()
+        scores = np.tile(np.where(np.array(CONCEPTS) == concept, 0.8, 0.1), (len(registrations), 1))
+        said = Attribution.of_scores(CONCEPTS, scores, seconds=0.5)
+        return replace(said, bald_N=np.full(len(registrations), 0.1))
+
+    explain.asked = []
+    return explain
+
+
+@pytest.fixture
+def loop(start):
+    episode = Episode(0, *start, tries=5)
+    actions = {name: action_of(name, {}) for name in ACTIONS}
+
+    def run(policies, concept="overlap", others=(), **thresholds):
+        explain = stub(concept)
+        given = {"gpca": explain, "softmax_head": stub(concept)}
+        policy = RecoveryPolicy(Thresholds(**{"uncertain": 0.2, "dominant": 0.4} | thresholds))
+        rows, seconds = Loop([episode, *others], actions, given, Means(policy, tuple(actions)), LOOP, ("tiny", 0)).run(
+            policies
+        )
+        return rows, seconds, explain
+
+    return run
+
+
+def test_policies_share_what_an_action_gives_and_end_with_success_or_the_budget(loop):
+    rows, seconds, _ = loop(["gpca", "softmax_head", "always_new_view", "oracle"])
+    assert (rows[["episode", "policy", "step"]] == seconds[["episode", "policy", "step"]]).all(axis=None)
+    firsts = rows[rows["step"] == 1].set_index("policy")
+    for same in ("softmax_head", "always_new_view"):
+        assert firsts.loc[same, "error_after"] == firsts.loc["gpca", "error_after"]
+    assert firsts.loc["oracle", "action"] == "reinitialize"
+    for _, of_policy in rows.groupby("policy"):
+        assert not of_policy["recovered"].iloc[:-1].any()
+        assert of_policy["recovered"].iloc[-1] or len(of_policy) == LOOP.budget
+        assert (of_policy["error_before"].iloc[1:].to_numpy() == of_policy["error_after"].iloc[:-1].to_numpy()).all()
+    assert (rows["recovered"] == (rows["error_after"] <= CORRECT)).all()
+    assert (seconds.loc[rows["policy"] == "gpca", "explanation_seconds"] >= 0.5).all()
+
+
+def test_an_explainer_sees_each_registration_once(loop):
+    _, _, explain = loop(["gpca", "gpca_acting"])
+    assert len(explain.asked) == len(set(explain.asked))
+
+
+def test_a_queued_case_ends_there(loop):
+    rows, *_ = loop(["gpca", "gpca_acting"], uncertain=0.05)
+    queued = rows[rows["policy"] == "gpca"]
+    assert queued["action"].tolist() == [QUEUE]
+    assert not queued["recovered"].any()
+    assert (rows.loc[rows["policy"] == "gpca_acting", "action"] != QUEUE).all()
+
+
+def test_about_what_did_not_fail_a_policy_only_decides(loop, start):
+    situation, outcome = start
+    fine = Episode(1, situation, replace(outcome, error=0.01), tries=5)
+    rows, *_ = loop(["gpca_acting", "oracle"], others=[fine])
+    assert rows[rows["episode"] == 1].set_index("policy")["action"].to_dict() == {
+        "gpca_acting": "new_view",
+        "oracle": NOTHING,
+    }
+    assert not rows.loc[rows["episode"] == 1, ["failed", "recovered"]].any(axis=None)
+    assert list(fine.outcomes) == [()]
+
+
+def test_a_policy_does_not_insist_on_what_did_not_help(loop):
+    rows, *_ = loop(["gpca_acting"])
+    assert rows["action"].is_unique  # the stub's scores never fall
+
+
+def test_every_explainer_of_a_policy_exists():
+    from baselines.registry import explainer_entry
+
+    reads = {explainer_entry(entry.explainer).reads for entry in POLICIES.values() if entry.explainer}
+    assert reads == {"embeddings", "uncertainty/removal"}

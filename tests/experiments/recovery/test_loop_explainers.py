@@ -1,0 +1,38 @@
+import numpy as np
+import pytest
+
+from gpca.encoders.settings import EncoderSettings
+from gpca.experiments.recovery.loop_explainers import learn_explainers
+from gpca.uncertainty.settings import UncertaintySettings
+
+ENCODER = EncoderSettings(draw_points=32, draws=1, epochs=1, batch_size=12, options={"k": 4, "point_features": 16})
+SETTINGS = {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}}
+
+
+@pytest.fixture(scope="module")
+def learnt(registrations):
+    names = ("gpca", "sa_supervised")
+    uncertainty = UncertaintySettings(starts=13, icp_points=32)
+    return learn_explainers(names, registrations, ENCODER, SETTINGS, uncertainty, 9, "tiny", 0)
+
+
+def test_each_speaks_of_all_calibration_samples_and_is_judged_by_their_truth(learnt, registrations):
+    held_out = registrations.rows("test")
+    assert list(learnt.calibration) == ["gpca", "sa_supervised"]
+    for name, attribution in learnt.calibration.items():
+        assert attribution.scores_N_C.shape == (len(held_out), 3)
+        predicted = np.array([attribution.concepts[column] for column in attribution.scores_N_C.argmax(axis=1)])
+        assert (learnt.right(name) == (predicted == registrations.concept[held_out])).all()
+
+
+def test_remedies_cost_registrations_and_embeddings_none(learnt):
+    assert not learnt.calibration["gpca"].icp_calls_N.any()
+    assert (learnt.calibration["sa_supervised"].icp_calls_N > 0).all()
+
+
+def test_what_is_said_needs_no_label_and_takes_time(learnt, registrations):
+    some = registrations.subset(registrations.rows("test")[:3])
+    for name, explain in learnt.explain.items():
+        said = explain(some.without_labels())
+        assert said.scores_N_C == pytest.approx(learnt.calibration[name].scores_N_C[:3], abs=1e-4)
+        assert (said.seconds_N > 0).all()

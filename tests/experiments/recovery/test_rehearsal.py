@@ -1,0 +1,49 @@
+"""The threshold is chosen on rehearsed failures."""
+
+import numpy as np
+import pytest
+
+from gpca.attribution.scores import Attribution
+from gpca.experiments.recovery.loop_explainers import LoopExplainers
+from gpca.experiments.recovery.rehearsal import Rehearsal, robot_policy, summary
+from gpca.pairs.perturbation import CONCEPTS
+
+SECTION = {
+    "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},
+    "treatments": {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"},
+    "loop": {"budget": 3},
+}
+
+
+class Rehearsed:
+    def __init__(self, number):
+        self.number = number
+        self.failed = number < 4
+
+
+@pytest.fixture
+def rehearsal():
+    """Four failures of little uncertainty, and four others of much."""
+    episodes = [Rehearsed(number) for number in range(8)]
+    return Rehearsal(episodes, {}, {episode.number: 0.1 * (1 + episode.number) for episode in episodes})
+
+
+def test_half_of_the_rehearsed_failures_are_above_the_threshold(rehearsal):
+    policy = robot_policy(SECTION, rehearsal)
+    assert policy.thresholds.uncertain == pytest.approx(0.2)
+    assert policy.thresholds.attempts == 3
+
+
+def test_a_declared_threshold_stays_and_without_a_rehearsal_nothing_is_too_uncertain(rehearsal):
+    declared = SECTION | {"thresholds": SECTION["thresholds"] | {"uncertain": 0.05}}
+    assert robot_policy(declared, rehearsal).thresholds.uncertain == 0.05
+    assert robot_policy(SECTION, None).thresholds.uncertain == np.inf
+
+
+def test_the_summary_says_how_often_each_explainer_is_right(rehearsal):
+    said = Attribution.of_scores(CONCEPTS, np.tile([0.8, 0.1, 0.1], (30, 1)), seconds=0.0)
+    explainers = LoopExplainers({}, {}, {}, {"gpca": said}, np.array([CONCEPTS[0]] * 15 + [CONCEPTS[1]] * 15))
+    content = summary(robot_policy(SECTION, rehearsal), explainers)
+    assert content["calibration_accuracy"] == {"gpca": 0.5}
+    assert content["calibration_samples"] == 30
+    assert content["treatments"] == SECTION["treatments"]

@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.methods import registry
+from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome
+from gpca.alignment.methods.registry import make_method
+from gpca.errors import InputError
+from gpca.experiments.registration_methods.settings import PairSettings
+from gpca.experiments.registration_methods.trial import observed_pair, try_methods
+
+SETTINGS = PairSettings(samples=6, points=100)
+METHODS = {"point_to_point": {}, "fgr": {}, "point_to_plane": {"max_iterations": 1}}
+
+
+def tried(registrations, objects, methods=METHODS, **changes):
+    return try_methods(registrations, objects, "tiny", 100, methods, replace(SETTINGS, **changes))
+
+
+@pytest.fixture(scope="module")
+def rows(registrations, objects):
+    return tried(registrations, objects)
+
+
+def test_local_methods_start_twice_and_global_ones_once(rows):
+    assert list(rows) == list(METHODS)
+    for name, starts in {"point_to_point": ["initial", "fgr"], "fgr": ["none"]}.items():
+        assert rows[name]["start"].tolist() == starts * 6
+        assert rows[name]["sample"].tolist() == np.repeat(range(6), len(starts)).tolist()
+    assert sorted(rows["fgr"]["concept"]) == ["noise"] * 2 + ["overlap"] * 2 + ["pose"] * 2
+
+
+def test_a_row_is_what_the_method_found_on_that_pair(rows, registrations):
+    row = registrations.rows("test")[1]
+    pair = observed_pair(registrations, row, "tiny", 100, 100)
+    coarse = make_method("fgr")(pair)
+    fine = make_method("point_to_point")(pair.started_at(coarse.T_target_source))
+    for name, outcome in (("fgr", coarse), ("point_to_point", fine)):
+        of_name = rows[name]
+        found = of_name[(of_name["sample"] == 1) & (of_name["start"] != "initial")].iloc[0]
+        assert (found["fitness"], found["inlier_rmse"]) == (outcome.fitness, outcome.inlier_rmse)
+        assert found["object"] == registrations.object_name[row]
+        assert found["severity_noise"] == registrations.severity_noise[row]
+    assert (rows["point_to_point"]["seconds"] > 0).all()
+
+
+def test_a_success_is_near_the_truth_and_says_so(rows):
+    for of_method in rows.values():
+        near = of_method["add_relative"] < 0.02
+        assert of_method["success"].tolist() == (near & (of_method["failure"] == "")).tolist()
+    stopped = rows["point_to_plane"]
+    assert (stopped["failure"] == "has not converged in 1 iterations").any()
+
+
+def test_the_true_pose_is_the_initial_one_but_for_pose_errors(registrations, objects, monkeypatch):
+    still = MethodEntry("Still", lambda pair: Outcome.at(pair, pair.T_target_source_init, 0.1))
+    monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": {"still": still, "blind": BLIND}})
+    rows = tried(registrations, objects, {"still": {}, "blind": {}}, global_start="blind")["still"]
+    first = rows[rows["start"] == "initial"]
+    off = first["concept"] == "pose"
+    assert (first[~off][["add_relative", "rotation_error_rad", "translation_error"]] < 1e-6).all(axis=None)
+    np.testing.assert_allclose(first[off]["translation_error"], first[off]["severity_translation"], atol=0.02)
+    assert first[~off]["success"].all() and not first[off]["success"].any()
+
+
+def no_match(pair):
+    raise FailedRegistration("no match")
+
+
+BLIND = MethodEntry("Blind", no_match, is_global=True)
+
+
+def test_what_starts_at_a_failure_fails_with_its_reason(registrations, objects, monkeypatch):
+    local = registry.method_entry("point_to_point")
+    monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": {"blind": BLIND, "point_to_point": local}})
+    rows = tried(registrations, objects, {"point_to_point": {}, "blind": {}}, global_start="blind")
+    assert set(rows["blind"]["failure"]) == {"no match"}
+    assert not rows["blind"]["success"].any()
+    second = rows["point_to_point"][rows["point_to_point"]["start"] == "blind"]
+    assert len(second) == 6
+    assert set(second["failure"]) == {"blind: no match"}
+    assert not second["success"].any() and (second["fitness"] == 0).all()
+
+
+def test_more_samples_change_nothing_of_the_first(rows, registrations, objects):
+    three = tried(registrations, objects, samples=3)["point_to_point"].drop(columns="seconds")
+    assert three.equals(rows["point_to_point"].drop(columns="seconds").iloc[:6])
+
+
+def test_clouds_are_thinned_and_have_normals(registrations):
+    row = registrations.rows("test")[0]
+    pair = observed_pair(registrations, row, "tiny", 100, 70)
+    assert len(pair.source) == len(pair.target) == len(pair.source_normals) == 70
+    nearest = np.abs(registrations.source(row)[:, None] - pair.source).sum(axis=2).min(axis=0)
+    assert nearest.max() == 0
+
+
+@pytest.mark.parametrize(
+    ("methods", "changes", "message"),
+    [
+        ({"gicp": {}}, {}, "method_pairs.global_start: 'fgr' is not among the methods"),
+        (
+            {"gicp": {}},
+            {"global_start": "gicp"},
+            "'gicp': needs an initial pose; choose one of fgr, ",
+        ),
+        ({"icp": {}, "fgr": {}}, {}, "'icp': unknown"),
+        ({"fgr": {"radius": 1}}, {}, "unexpected keyword argument 'radius'"),
+    ],
+)
+def test_methods_that_cannot_run_are_refused(registrations, objects, methods, changes, message):
+    with pytest.raises(InputError, match=message):
+        tried(registrations, objects, methods, **changes)
+
+
+def test_other_objects_than_those_registered_are_refused(registrations, objects):
+    others = replace(objects, names=("brick", "capsule", "cone"))
+    with pytest.raises(InputError, match="object 1 is not 'cone', as in the registrations"):
+        tried(registrations, others)
+    with pytest.raises(InputError, match="have no test samples"):
+        tried(registrations.subset(registrations.rows("train")), objects)

@@ -1,0 +1,55 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.active_learning.rounds import make_task
+from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.classifier.settings import GPCSettings
+from gpca.errors import InputError
+from gpca.experiments.runtime.runtime import measure
+from gpca.io.csv_file import write_csv
+from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS, read_runtime
+
+
+@pytest.fixture(scope="module")
+def runtime(model, registrations):
+    from dataclasses import replace
+
+    h_S_d = np.random.default_rng(0).normal(size=(len(registrations), 32)).astype(np.float32)
+    settings = ActiveLearningSettings(initial=8, batch=2, gpc=GPCSettings(iterations=3, inducing=6, draws=20))
+    task = make_task(replace(registrations, attached={"embedding": h_S_d}), "overlap", settings, "tiny", 0)
+    return measure(model, registrations, task, settings, 3, 1, "tiny", 0)
+
+
+def test_every_component_is_measured_so_often(runtime):
+    on_cpu = runtime[runtime["device"] == "CPU"]
+    assert on_cpu["component"].tolist() == list(COMPONENTS)
+    assert set(OF_ONE_EXPLANATION) < set(COMPONENTS)
+    assert (runtime["repeats"] == 3).all()
+    assert (runtime[["mean_s", "median_s"]] > 0).all(axis=None)
+    assert on_cpu["hardware"].str.endswith("cores").all()
+
+
+def test_an_explanation_takes_longer_than_its_embedding(runtime):
+    median_s = runtime.drop_duplicates("component").set_index("component")["median_s"]
+    assert median_s["explanation"] > median_s["features"]
+
+
+def test_the_file_is_read_as_it_was_written(runtime, tmp_path):
+    write_csv(tmp_path / "runtime.csv", runtime)
+    rows = read_runtime(tmp_path / "runtime.csv")
+    assert tuple(rows.columns) == RUNTIME_COLUMNS
+    np.testing.assert_allclose(rows["mean_s"], runtime["mean_s"], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "message"),
+    [("component", "cooling", "unknown component 'cooling'"), ("mean_s", "long", "column 'mean_s' contains values")],
+)
+def test_a_spoilt_file_is_one_line(runtime, tmp_path, column, value, message):
+    write_csv(tmp_path / "runtime.csv", runtime.astype(object).assign(**{column: value}))
+    with pytest.raises(InputError, match=message):
+        read_runtime(tmp_path / "runtime.csv")
+    pd.DataFrame(columns=RUNTIME_COLUMNS[1:]).to_csv(tmp_path / "runtime.csv", index=False)
+    with pytest.raises(InputError, match="column 'component' is missing"):
+        read_runtime(tmp_path / "runtime.csv")

@@ -1,0 +1,64 @@
+"""SHAP and sensitivity analysis: the protocol's own reading is what the explainers say."""
+
+import numpy as np
+import pytest
+
+from baselines.sensitivity import local_derivatives
+from baselines.shap_kl import shapley_values
+from gpca.experiments.specification_curve import knobs
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.uncertainty.evaluation import design_rows, evaluate_design
+from tests.experiments.specification_curve.conftest import rows_of
+
+
+@pytest.fixture(scope="module")
+def outcomes(given):
+    registrations = Registrations.load(given.registrations["tiny", 0])
+    chosen = registrations.subset(design_rows(registrations, "additive", 6))
+    return chosen.concept, evaluate_design("additive", chosen, "tiny", 0, given.uncertainty())[0].uncertainty
+
+
+def accuracy(concept_S, values_S_3):
+    return np.mean((np.array(CONCEPTS)[values_S_3.argmax(axis=1)] == concept_S) & (np.ptp(values_S_3, axis=1) > 0))
+
+
+def test_the_protocols_readings_are_what_the_explainers_say(given, outcomes):
+    concept_S, uncertainty_S_K = outcomes
+    sa = {"quantity": ["divergence"], "sign": ["signed", "lowest"], "unit": ["range"], "step": ["small"]}
+    found = rows_of(knobs.sensitivity, given, sa)
+    expected = {
+        sign: accuracy(concept_S, factor * local_derivatives(uncertainty_S_K))
+        for sign, factor in (("signed", 1), ("lowest", -1))
+    }
+    for sign, value in expected.items():
+        assert found[("divergence", sign, "range", "small"), "sa_local_additive", "accuracy", "all"] == value
+    shap = {
+        "starts": [5, 13], "background": ["observed", "clean"], "quantity": ["divergence"], "floor": [1e-4],
+        "sign": ["signed"],
+    }  # fmt: skip
+    found = rows_of(knobs.shap, given, shap)
+    of_protocol = found[(13, "observed", "divergence", 1e-4, "signed"), "shap_additive", "accuracy", "all"]
+    assert of_protocol == accuracy(concept_S, shapley_values(uncertainty_S_K[:, :8]))
+    assert len(found) == 4
+
+
+def test_every_quantity_is_measured_in_every_condition(given):
+    quantities = ["divergence", "divergence_reversed", "log_determinant", "trace", "residual", "inlier_rmse",
+                  "inlier_rmse_of_one"]  # fmt: skip
+    settings = given.uncertainty()
+    [(_, _, pairs)] = knobs._pairs(given, knobs.ReadingSizes(samples=3), settings, 13, "test")
+    measured = knobs._steps(next(pairs)[1]["observed"], settings)
+    assert set(measured) == set(quantities)
+    for values_K in measured.values():
+        assert values_K.shape == (7,)
+        assert np.isfinite(values_K).all()
+    assert max(measured["divergence"][0], measured["divergence_reversed"][0]) < 1e-12
+
+
+def test_equal_values_name_nothing():
+    values_S_3 = np.array([[1.0, 1, 1], [-5, 1, 2]])
+    concept_S = np.array(["noise", "noise"])
+    assert knobs._accuracy(concept_S, values_S_3, "signed") == 0
+    assert knobs._accuracy(concept_S, values_S_3, "absolute") == 0.5
+    assert knobs._accuracy(concept_S, values_S_3, "lowest") == 0.5

@@ -1,0 +1,60 @@
+"""Table XIII and the figure of the same readings."""
+
+import pandas as pd
+import pytest
+
+from gpca.comparison.readings import READING_COLUMNS
+from gpca.errors import InputError
+from gpca.experiments.specification_curve.figure import draw_readings
+from gpca.experiments.specification_curve.tables import table13_readings
+
+GROUPS = {"start": "How it starts", "pool": "What there is"}
+REAL = {"ycb": {"title": "YCB", "stand_in": False}}
+
+
+def rows(verdict="not reproduced"):
+    records = [
+        ("IV", "RBF", column, "%", printed, printed, 95.0, verdict, "start", name, value, False, 2,
+         (value - printed) / 3, abs(value - printed) <= 3)
+        for column, printed in (("YCB", 69.3), ("LINEMOD", 50.6))
+        for name, value in (("kmeans/median", 95.0), ("random/default", 51.0))
+    ]  # fmt: skip
+    return pd.DataFrame(records, columns=list(READING_COLUMNS))
+
+
+def test_a_row_says_where_the_number_lies_and_which_reading_is_nearest():
+    text = table13_readings(rows(), GROUPS, REAL).markdown()
+    [line] = [line for line in text.splitlines() if "LINEMOD" in line]
+    cells = [cell.strip() for cell in line.strip("|").split("|")]
+    assert cells[:6] == ["IV, RBF, LINEMOD", "%", "How it starts", "produced", "random, default", "1 of 2"]
+    assert cells[6] == "random, default (1 of 2)"
+    assert cells[7:] == ["50.6", "95", "51", "95", "51"]
+    assert "between" in text
+
+
+def test_numbers_on_stand_ins_are_shown_as_such_and_reproduced_ones_are_not():
+    stand_in = {"ycb": {"title": "YCB", "stand_in": True}}
+    assert "procedural stand-in" in table13_readings(rows("not comparable"), GROUPS, stand_in).markdown()
+    with pytest.raises(InputError, match="no missed number"):
+        table13_readings(rows("reproduced"), GROUPS, REAL)
+
+
+def test_each_curve_of_the_figure_is_named_below_its_panel(tmp_path, figures):
+    many = pd.concat([rows().assign(row=f"kernel {i}") for i in range(8)], ignore_index=True)
+    draw_readings(many, GROUPS, REAL, tmp_path / "a.pdf", tmp_path / "a.png")
+    panel = figures[0].axes[0]
+    named = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert len(named) == len(set(named)) == len(many[["row", "column"]].drop_duplicates())
+    assert {"IV: kernel 0, YCB", "IV: kernel 7, LINEMOD"} < set(named)
+    looks = {(line.get_color(), line.get_linestyle()) for line in panel.get_lines()}
+    assert len(looks) == len(named)
+    renderer = figures[0].canvas.get_renderer()
+    assert panel.get_legend().get_window_extent(renderer).y1 < panel.get_window_extent(renderer).y0
+
+
+def test_the_figure_has_a_panel_for_each_group_with_readings(tmp_path):
+    draw_readings(rows(), GROUPS, REAL, tmp_path / "a.pdf", tmp_path / "a.png")
+    draw_readings(rows(), GROUPS, REAL, tmp_path / "b.pdf", tmp_path / "b.png")
+    assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
+    with pytest.raises(InputError, match="has no readings"):
+        draw_readings(rows("reproduced"), GROUPS, REAL, tmp_path / "c.pdf", tmp_path / "c.png")

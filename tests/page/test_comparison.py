@@ -1,0 +1,82 @@
+import pytest
+
+from gpca.errors import InputError
+from gpca.page.comparison import page_comparison
+
+HEAD = (
+    "table,row,column,unit,published,upper,deviation,decimals,reproduced,ci_low,ci_high,n,at_least,difference,factor,"
+)
+HEAD += "verdict,reason,objects\n"
+LINES = (
+    "I,YCB,GP-CA,%,99.6,,,1,97.44,95.41,99.4,5,False,-2.16,,close,too few epochs,YCB\n",
+    "I,YCB,SHAP,%,31.4,,,1,31.42,26.0,27.0,5,False,0.02,,reproduced,,YCB\n",
+    "III,YCB,random,labels,350.0,550.0,,-1,812.4,,,5,True,262.4,1.477,not reproduced,easier pool,YCB\n",
+    "VI,DGCNN,none,%,85.2,,2.43,1,,,,,False,,,not run,asked for alone,\n",
+)
+
+
+def written(folder, text):
+    path = folder / "comparison.csv"
+    path.write_text(text)
+    return path
+
+
+def test_numbers_have_the_papers_digits_and_verdicts_a_tone(tmp_path):
+    shown = page_comparison(written(tmp_path, HEAD + "".join(LINES)))
+    close, same, bound, not_run = shown["rows"]
+    assert (close["published"], close["reproduced"], close["interval"]) == ("99.6", "97.4", "[95.4, 99.4]")
+    assert (close["difference"], close["tone"], close["reason"]) == ("-2.2", "near", "too few epochs")
+    assert same["difference"] == "0.02"  # not "0.0", which would claim more
+    assert (bound["published"], bound["reproduced"], bound["interval"]) == ("350 to 550", "> 812", "")
+    assert (bound["difference"], bound["factor"]) == ("262", "× 1.5")
+    assert (not_run["published"], not_run["reproduced"], not_run["tone"]) == ("85.2 ± 2.4", "", "")
+    assert shown["tables"] == ["I", "III", "VI"]
+
+
+def test_verdicts_are_counted_from_the_best_to_the_worst(tmp_path):
+    shown = page_comparison(written(tmp_path, HEAD + "".join(LINES) + LINES[0]))
+    assert shown["verdicts"] == [
+        ("reproduced", "good", 1),
+        ("close", "near", 2),
+        ("not reproduced", "bad", 1),
+        ("not run", "", 1),
+    ]
+
+
+def test_where_nothing_is_judged_the_verdicts_are_the_references(tmp_path):
+    (tmp_path / "real").mkdir()
+    reference = written(tmp_path / "real", HEAD + "".join(LINES))
+    own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
+    shown = page_comparison(written(tmp_path, HEAD + own), reference)
+    assert shown["of_reference"]
+    assert [row["verdict"] for row in shown["rows"]] == ["close", "reproduced", "not reproduced", "not run"]
+    assert [row["this_run"] for row in shown["rows"]] == ["88.8", "", "", ""]
+    judged = page_comparison(written(tmp_path, HEAD + own + LINES[1]), reference)
+    assert not judged["of_reference"]
+    assert [row["verdict"] for row in judged["rows"]] == ["not comparable", "reproduced"]
+
+
+def test_repeats_and_standard_deviations_are_counted_apart(tmp_path):
+    head = HEAD.replace("verdict,", "verdict,repeat_of,statistic,")
+    repeat = LINES[0].replace(",close,", ",close,I / YCB / SA,mean,")
+    deviation = LINES[1].replace(",reproduced,", ",reproduced,,deviation,")
+    shown = page_comparison(written(tmp_path, head + repeat + deviation))
+    assert shown["verdicts"] == [("standard deviation", "", 1), ("repeat", "", 1)]
+    assert shown["rows"][0]["reason"] == "repeat of I / YCB / SA; too few epochs"
+    assert (shown["rows"][0]["group"], shown["rows"][0]["verdict"]) == ("repeat", "close")
+
+
+def test_there_need_not_be_a_comparison(tmp_path):
+    assert page_comparison(tmp_path / "comparison.csv") is None
+
+
+def test_a_file_of_another_form_is_refused(tmp_path):
+    with pytest.raises(InputError, match="column 'decimals' is missing"):
+        page_comparison(written(tmp_path, HEAD.replace("decimals", "digits") + LINES[0]))
+    for name, line in (
+        ("published", LINES[0].replace("99.6", "many")),
+        ("factor", LINES[0].replace(",close,", "many,close,")),
+        ("decimals", LINES[0].replace(",,,1,", ",,,many,")),
+    ):
+        with pytest.raises(InputError, match=f"'{name}' contains a value that is not a number: 'many'"):
+            page_comparison(written(tmp_path, HEAD + line))

@@ -1,0 +1,176 @@
+"""The page of a small folder of results: its HTML by a parser, and what is refused."""
+
+import json
+import re
+
+import pytest
+
+from gpca.errors import InputError
+from gpca.io.files import whole_file
+from gpca.page.page import read_provenance, write_page
+from gpca.process.processor import describe
+from tests.page.small_run import FIGURES, TABLES, Page, results, run_of
+from tests.page.test_comparison import HEAD, LINES
+
+# --- the HTML ---
+
+
+def test_every_link_leads_to_a_file_or_a_place_on_the_page(page, folder):
+    assert page.stack == []
+    local = [link for link in page.links if not link.startswith("data:,")]
+    assert len(local) > 15
+    assert [link for link in local if link.startswith("#") and link[1:] not in page.ids] == []
+    assert [link for link in local if not link.startswith("#") and not (folder / link).is_file()] == []
+    assert [source for source in page.sources if not (folder / source).is_file()] == []
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    assert re.findall(r"(?:https?:)?//[\w-]+\.[\w.-]+", page.text) == []
+
+
+def test_ids_are_there_once(page):
+    assert len(set(page.ids)) == len(page.ids)
+
+
+def test_every_table_and_figure_is_shown_with_its_caption_in_the_papers_order(page):
+    shown = [name for name in page.ids if name in (*TABLES, *FIGURES)]
+    assert shown == ["objects_bricks", *TABLES, "reliability"]
+    for name in shown:
+        assert f"Title of {name}" in page.text
+        assert f'What <span class="docutils literal">{name}</span> shows.' in page.text
+    assert page.text.count('<td class="number best">97.7 ± 0.4</td>') == len(TABLES)
+    assert page.text.count('<td class="number">33.3 ± 2.0</td>') == len(TABLES)
+    assert page.text.count("A footnote.") == len(TABLES)
+
+
+def test_the_page_opens_with_what_was_found_and_ends_with_where_it_comes_from(page):
+    order = ["findings", "comparison", "objects_bricks", "registrations", "provenance"]
+    assert [name for name in page.ids if name in order] == order
+    assert "<dt>75 to 90 %</dt><dd>Under the paper's protocol" in page.text.replace("&#39;", "'")
+    folded = page.text.index("<details>")
+    assert page.text.index('id="provenance"') < folded < page.text.index("SHA-256") < page.text.index("</details>")
+    assert page.text.count("SHA-256") == page.text[folded:].count("SHA-256")
+
+
+def test_a_run_on_stand_ins_shows_the_verdicts_of_the_reference_as_such(copied):
+    folder, _ = copied
+    reference = folder.parent / "reference.csv"
+    reference.write_text(HEAD + "".join(LINES))
+    own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
+    (folder / "comparison.csv").write_text(HEAD + own)
+    write_page(folder, run_of(folder, reference=reference))
+    text = (folder / "index.html").read_text()
+    assert "These are the verdicts <strong>of the reference run on real objects</strong>" in text
+    assert re.search(r'aria-pressed="true"><b>1</b> close<', text)
+    assert "not comparable" not in text
+    assert '<td data-label="This run" class="number">88.8</td>' in text
+    assert "The objects of this run are stand-ins, so none of its numbers is judged" in text
+
+
+def test_the_comparison_comes_with_its_verdicts_counted_and_named(page):
+    assert page.text.index('id="comparison"') < page.text.index('id="objects_bricks"')
+    for verdict in ("reproduced", "close", "not reproduced", "not run"):
+        assert re.search(rf'data-verdict="{verdict}" aria-pressed="true"><b>1</b> {verdict}<', page.text)
+        assert re.search(rf'<span class="verdict[^"]*">{verdict}</span>', page.text)
+
+
+def test_stand_ins_are_labelled_and_real_objects_are_not(page):
+    assert 'Bricks &lt;b&gt; <span class="badge">procedural stand-in</span>' in page.text
+    assert "<li>Cones</li>" in page.text
+
+
+def test_a_run_on_real_objects_has_no_notice(copied):
+    folder, _ = copied
+    sources = {name: {"title": name, "stand_in": False} for name in ("bricks", "cones")}
+    write_page(folder, run_of(folder, sources=sources))
+    assert "stand-in</span>" not in (folder / "index.html").read_text()
+    assert "stand-ins</strong>" not in (folder / "index.html").read_text()
+
+
+def test_what_comes_from_files_cannot_become_markup(page):
+    assert "Accuracy (%) of &lt;GP-CA&gt; &amp; co., by <code>gpca</code>" in page.text
+    assert "alert(1)</script>" not in page.text.replace("&lt;", "<").split("<pre>")[0]
+    assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page.text
+
+
+def test_the_samples_are_plain_json(page):
+    [text] = re.findall(r'<script type="application/json" id="samples">(.*)</script>', page.text)
+    samples = json.loads(text)
+    assert [sample["concept"] for sample in samples] == ["noise"] * 2 + ["pose"] * 2 + ["overlap"] * 2
+    assert {sample["source"]["title"] for sample in samples} == {"Bricks <b>"}
+
+
+def test_the_same_results_give_the_same_bytes_and_not_many(folder, copied):
+    copy, run = copied
+    write_page(copy, run)
+    assert (copy / "index.html").read_bytes() == (folder / "index.html").read_bytes()
+    assert (folder / "index.html").stat().st_size < 1e6
+    assert (folder / "page/plotly.min.js").stat().st_size < 6e6
+
+
+def test_without_comparison_and_samples_there_is_no_word_of_them(copied):
+    folder, _ = copied
+    (folder / "comparison.csv").unlink()
+    write_page(folder, run_of(folder, samples={}))
+    page = Page((folder / "index.html").read_text())
+    assert "comparison" not in page.ids
+    assert "registrations" not in page.ids
+    assert page.sources == ["figures/objects_bricks.png", "figures/reliability.png"]
+
+
+def test_records_of_provenance_are_counted(tmp_path):
+    record = {"code": {"commit": "abc", "dirty": True}, "config_sha256": None, "environment_lock_sha256": "1"}
+    record |= {"device": describe() | {"gpu": "a GPU"}, "python": "3.11", "libraries": {"numpy": "2"}}
+    for name in ("a.csv", "b.csv"):
+        with whole_file(tmp_path / f"{name}.provenance.json") as partial:
+            partial.write_text(json.dumps(record))
+    facts = read_provenance([tmp_path / name for name in ("a.csv", "b.csv", "c.csv")])
+    assert facts["Code"] == {"abc with uncommitted changes": 2, "not recorded": 1}
+    assert facts["numpy"] == {"2": 2}
+    [device] = set(facts["Device"]) - {"not recorded"}
+    assert describe()["name"] in device
+    assert device.endswith(", a GPU")
+    (tmp_path / "a.csv.provenance.json").write_text("[]")
+    with pytest.raises(InputError, match=r"a\.csv\.provenance\.json: is not a record of provenance"):
+        read_provenance([tmp_path / "a.csv"])
+
+
+# --- what is refused ---
+
+
+def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
+    folder, run = copied
+    for name in ("tables/table4_mine.md", "figures/reliability.pdf", "predictions/bricks/gpca/seed0.csv"):
+        (folder / name).unlink()
+    with pytest.raises(InputError) as caught:
+        write_page(folder, run)
+    assert str(caught.value) == (
+        f"{folder}: lacks tables/table4_mine.md, figures/reliability.pdf, "
+        f"{folder / 'predictions/bricks/gpca/seed0.csv'}; make them with 'snakemake -j2 results/tiny/index.html'"
+    )
+    assert not (folder / "index.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("damaged", "text", "fault"),
+    [
+        ("tiny/tables/table4_mine.md", "no table", "is not a caption with a table below it"),
+        ("tiny/figures/reliability.png", "no image", "is not a readable image"),
+        ("tiny/comparison.csv", "", "is empty"),
+        ("tiny/registrations/bricks/seed0.npz", "PK", "is not a readable npz archive"),
+    ],
+)
+def test_a_damaged_file_is_named(copied, damaged, text, fault):
+    folder, run = copied
+    (folder.parent / damaged).write_text(text)
+    with pytest.raises(InputError, match=f"{re.escape(damaged)}: {fault}"):
+        write_page(folder, run)
+    assert not (folder / "index.html").exists()
+
+
+@pytest.mark.parametrize("caption", [".. nonsense::", ".. raw:: html\n\n   <b>"])
+def test_a_fault_in_a_caption_is_named(copied, caption):
+    folder, _ = copied
+    with pytest.raises(InputError, match="caption of reliability: is not valid reStructuredText"):
+        write_page(folder, run_of(folder, results=results({"reliability": caption})))
+    assert not (folder / "index.html").exists()

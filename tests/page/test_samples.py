@@ -1,0 +1,124 @@
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.alignment.rigid import inverse, transform
+from gpca.causes.settings import Limits
+from gpca.errors import InputError
+from gpca.experiments.method.concepts import source_before_icp
+from gpca.page.samples import OF_EACH_CONCEPT, POINTS, first_of_each_concept, page_samples, severity_words
+from gpca.pairs.perturbation import CONCEPTS
+from tests.reporting.conftest import write_uncertainties
+
+SOURCE = {"title": "Bricks", "stand_in": True}
+
+
+LIMITS = Limits(nominal=0.02, failed=0.03)
+
+
+@pytest.fixture
+def files(registrations, predicted, tmp_path):
+    return predicted(registrations, tmp_path)
+
+
+@pytest.fixture
+def samples(files):
+    return page_samples(files, SOURCE, LIMITS)
+
+
+def moved(sample, which):
+    points = np.array(sample["points"]).reshape(-1, 3) / 1000
+    return transform(np.array(sample[which]).reshape(4, 4), points)
+
+
+def test_the_first_test_samples_of_each_concept_are_shown(registrations):
+    shuffled = registrations.subset(np.random.default_rng(0).permutation(len(registrations)))
+    rows = first_of_each_concept(shuffled)
+    assert shuffled.concept[rows].tolist() == [c for c in CONCEPTS for _ in range(OF_EACH_CONCEPT)]
+    assert set(shuffled.split[rows]) == {"test"}
+    for concept in CONCEPTS:
+        numbers = np.sort(shuffled.sample[(shuffled.concept == concept) & (shuffled.split == "test")])
+        of_concept = [row for row in rows if shuffled.concept[row] == concept]
+        assert shuffled.sample[of_concept].tolist() == numbers[:OF_EACH_CONCEPT].tolist()
+
+
+def test_the_clouds_are_those_of_the_file_to_a_thousandth_of_the_diameter(samples, registrations):
+    for sample, row in zip(samples, first_of_each_concept(registrations), strict=True):
+        cloud = registrations.cloud(row)
+        assert len(cloud) < POINTS  # so that none is left out
+        np.testing.assert_allclose(np.array(sample["points"]).reshape(-1, 3) / 1000, cloud, atol=5.1e-4)
+        target = np.array(sample["target_points"]).reshape(-1, 3) / 1000
+        np.testing.assert_allclose(target, registrations.target(row), atol=5.1e-4)
+
+
+def test_the_transforms_take_the_source_to_its_initial_and_to_its_true_pose(samples, registrations):
+    for sample, row in zip(samples, first_of_each_concept(registrations), strict=True):
+        np.testing.assert_allclose(moved(sample, "initial"), source_before_icp(registrations, row), atol=1e-3)
+        T_true_icp = registrations.T_target_source("true", row) @ inverse(registrations.T_target_source("icp", row))
+        np.testing.assert_allclose(moved(sample, "truth"), transform(T_true_icp, registrations.cloud(row)), atol=1e-3)
+
+
+def test_a_large_cloud_is_thinned_evenly(registrations, predicted, tmp_path):
+    many = np.repeat(registrations.points, 20, axis=0)
+    large = replace(registrations, points=many, offsets=registrations.offsets * 20)
+    for sample in page_samples(predicted(large, tmp_path), SOURCE, LIMITS):
+        assert len(sample["points"]) == 3 * POINTS
+
+
+def test_scores_and_deviations_are_those_of_the_predictions(samples, files):
+    rows = pd.read_csv(files["predictions"])
+    rows = rows[rows["split"] == "test"].set_index("sample")
+    for sample in samples:
+        row = rows.loc[sample["sample"]]
+        assert sample["predicted"] == row["concept_predicted"]
+        assert sample["source"] == SOURCE
+        for score in sample["scores"]:
+            assert score["mean"] == pytest.approx(row[f"score_{score['concept']}"], abs=5.1e-4)
+            assert score["deviation"] == pytest.approx(np.sqrt(row[f"variance_{score['concept']}"]), abs=5.1e-4)
+
+
+def test_an_abstention_has_no_scores(registrations, files):
+    rows = pd.read_csv(files["predictions"], dtype=str, keep_default_na=False)
+    rows["abstained"], rows["concept_predicted"] = "True", ""
+    rows[[f"score_{c}" for c in CONCEPTS]] = ""
+    rows.to_csv(files["predictions"], index=False)
+    shown = page_samples(files, SOURCE, LIMITS)
+    assert {sample["predicted"] for sample in shown} == {""}
+    assert {score["mean"] for sample in shown for score in sample["scores"]} == {None}
+
+
+def test_the_words_say_what_was_done(registrations):
+    words = {registrations.concept[row]: severity_words(registrations, row) for row in range(len(registrations))}
+    assert words["noise"].startswith("σ = ")
+    assert words["pose"].startswith("turned by ")
+    assert words["overlap"].endswith(" % of the points cut off")
+
+
+def test_predictions_of_other_samples_are_refused(files):
+    rows = pd.read_csv(files["predictions"], dtype=str)
+    rows[rows["split"] == "train"].to_csv(files["predictions"], index=False)
+    with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; regenerate both"):
+        page_samples(files, SOURCE, LIMITS)
+
+
+def test_the_page_says_how_far_off_icp_ends(samples, registrations):
+    for sample, row in zip(samples, first_of_each_concept(registrations), strict=True):
+        target = registrations.target(row).astype(float)
+        T_off = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("true", row))
+        off = np.linalg.norm(transform(T_off, target) - target, axis=1).mean()
+        assert 0 <= sample["error_percent"] <= 100 * off + 1e-3  # ADD-S is never above ADD
+        assert sample["state"] == ("nominal" if sample["error_percent"] < 2 else "failed" if sample["error_percent"] > 3
+                                   else "borderline")  # fmt: skip
+    assert len({sample["state"] for sample in samples}) > 1
+    assert {sample["uncertainty"] for sample in samples} == {None}
+
+
+def test_states_follow_the_limits_and_uncertainties_are_those_of_the_file(files, registrations, tmp_path):
+    write_uncertainties(tmp_path / "u.csv", registrations)
+    strict = Limits(nominal=1e-6, failed=1e-5)
+    for sample in page_samples(files | {"uncertainty": tmp_path / "u.csv"}, SOURCE, strict):
+        assert sample["state"] == "failed"
+        assert sample["uncertainty"] == sample["sample"] / 10
+        assert sample["clean_uncertainty"] == 1
