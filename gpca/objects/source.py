@@ -114,20 +114,13 @@ def data_files(entry: dict) -> list[Path]:
     return sorted(path for path in found if path.is_file())
 
 
-def data_options(entry: dict, data_dir: str | None, downloads: str) -> list[str]:
-    """Return the options of ``python -m gpca objects`` for the one folder that a resolved entry's data comes from.
+def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str, str]:
+    """Return the one folder that a resolved entry's data comes from, by the name that steps give it.
 
     No other folder is named, so that a change of another one does not make the objects anew.
     """
-    if entry["origin"] == "local":
-        return folder_options(data_dir, None)
-    return folder_options(None, downloads) if entry["origin"] == "download" else []
-
-
-def folder_options(data_dir: str | None, downloads: str | None) -> list[str]:
-    """Return the options that tell a step where data lies, and where downloads go, as far as either is given."""
-    folders = {"--data-dir": data_dir, "--downloads": downloads}
-    return [word for option, folder in folders.items() if folder for word in (option, folder)]
+    folders = {"local": {"data_dir": data_dir}, "download": {"downloads": downloads}}.get(entry["origin"], {})
+    return {name: folder for name, folder in folders.items() if folder}
 
 
 def source_modules(entry: dict) -> list[str]:

@@ -2,58 +2,33 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-from baselines.registry import explainer_entry, require_settings
+from baselines.registry import explainer_entry
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.errors import InputError
 from gpca.explainers.interface import Describing, ExplainerEntry
 from gpca.io.axes import Axes
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.process.arguments import SEED, per_seed
+from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.settings import check_settings
 from gpca.uncertainty.conditions import CONDITIONS
 from gpca.uncertainty.outcomes import Outcomes, read_seconds
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names, one of each per seed; ``--settings`` are the explainer's in the config."""
-    parser.add_argument("--explainer", required=True)
-    parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
-    parser.add_argument("--registrations", required=True, type=Path, nargs="+")
-    parser.add_argument("--files-of", help="source of these files, where it is another than --source")
-    parser.add_argument("--files-seed", type=SEED, help="their seed, where it is one for all --seeds")
-    parser.add_argument("--embeddings", type=Path, nargs="*", help="embeddings, for explainers that read them")
-    parser.add_argument(
-        "--uncertainty", type=Path, nargs="*", help="outcomes of a design, for explainers that read them"
-    )
-    parser.add_argument("--uncertainty-timings", type=Path, nargs="*", help="CSVs of their run times")
-    parser.add_argument(
-        "--input-timings", required=True, type=Path, nargs="+", help="CSVs of the time spent before this step"
-    )
-    parser.add_argument("--predictions", required=True, type=Path, nargs="+")
-    parser.add_argument("--timings", required=True, type=Path, nargs="+")
-
-
-def run(options: Namespace) -> None:
+def run(job: Job) -> None:
     """Fit on the training rows and explain every row, seed by seed."""
-    require_settings(options.explainer, options.settings)
-    check_settings(options.settings, "explainers", options.explainer)
-    entry = explainer_entry(options.explainer)
-    for name in ("embeddings", "uncertainty", "uncertainty_timings"):
-        setattr(options, name, getattr(options, name) or [None] * len(options.seeds))
-    files = ("registrations", "embeddings", "uncertainty", "uncertainty_timings", "input_timings")
-    for seed, *inputs, predictions, timings in per_seed(options, *files, "predictions", "timings"):
-        explainer = entry.make(options.source, seed, **options.settings)
-        with record_provenance([predictions, timings], [path for path in inputs if path], options.settings, seed=seed):
-            own_seed = seed if options.files_seed is None else options.files_seed
-            axes = (options.files_of or options.source, own_seed)
-            registrations = _load(options.explainer, entry, axes, *inputs)
+    entry = explainer_entry(job.explainer)
+    none = [None] * len(job.seeds)
+    optional = [job.get(name, none) for name in ("embeddings", "uncertainty", "uncertainty_timings")]
+    files = zip(job.registrations, *optional, job.input_timings, strict=True)
+    for (seed, predictions, timings), inputs in zip(job.per_seed("predictions", "timings"), files, strict=True):
+        explainer = entry.make(job.source, seed, **job.settings)
+        with record_provenance([predictions, timings], [path for path in inputs if path], job.settings, seed=seed):
+            axes = (job.get("files_of", job.source), job.get("files_seed", seed))
+            registrations = _load(job.explainer, entry, axes, *inputs)
             observed = registrations if entry.oracle else registrations.without_labels()
             started = perf_counter()
             if isinstance(explainer, Describing):  # once, for what it learns from and what it is asked about

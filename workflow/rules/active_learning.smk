@@ -3,10 +3,11 @@ rule embed_without:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
         code=code_files(
-            "gpca.experiments.active_learning.without_step", encoder_module(config["embedding"]["encoder"])
+            "gpca.experiments.active_learning.without_step",
+            encoder_module(config["embedding"]["encoder"]),
         ),
     output:
-        "<results>/embeddings/{source}/without/seed{seed}.npz",
+        out="<results>/embeddings/{source}/without/seed{seed}.npz",
     log:
         "<logs>/embeddings/{source}/without/seed{seed}.log",
     benchmark:
@@ -14,30 +15,28 @@ rule embed_without:
     priority: 7
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.active_learning.without_step",
         settings=as_json(
             config["encoders"][config["embedding"]["encoder"]]
             | config["active_learning"]["without"]
         ),
         concepts=config["active_learning"]["held_out"],
-    shell:
-        "python -m gpca without --threads {threads} --registrations {input.registrations} "
-        "--source {wildcards.source} --seed {wildcards.seed} --concepts {params.concepts} "
-        "--settings {params.settings:q} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule learn_actively:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
         embeddings=f"<results>/embeddings/{{source}}/{EMBEDDING}/seed{{seed}}.npz",
-        without="<results>/embeddings/{source}/without/seed{seed}.npz",
+        embeddings_without="<results>/embeddings/{source}/without/seed{seed}.npz",
         code=code_files("gpca.experiments.active_learning.step"),
     output:
-        collect(
+        out=collect(
             "<results>/active_learning/{{source}}/{strategy}/seed{{seed}}.csv",
             strategy=NAMES["strategy"],
         ),
@@ -48,18 +47,15 @@ rule learn_actively:
     priority: 4
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.active_learning.step",
         settings=settings("active_learning"),
         strategies=NAMES["strategy"],
-    shell:
-        "python -m gpca active_learning --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
-        "--registrations {input.registrations} --embeddings {input.embeddings} "
-        "--embeddings-without {input.without} --settings {params.settings:q} "
-        "--strategies {params.strategies} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule active_learning:
@@ -80,7 +76,6 @@ rule active_learning:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,
@@ -119,7 +114,7 @@ rule learn_new_concepts:
             backbone_module(DIAGNOSIS["encoder"]),
         ),
     output:
-        collect(
+        out=collect(
             "<results>/new_concepts/{{source}}/{strategy}/seed{{seed}}.csv",
             strategy=NAMES["new_concept_strategy"],
         ),
@@ -130,20 +125,16 @@ rule learn_new_concepts:
     priority: 6
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.new_concepts.step",
         settings=as_json(NEW_SETTINGS | ICP),
         encoders_of=lambda wildcards: [*encoders_of_others(wildcards)],
         strategies=NAMES["new_concept_strategy"],
-    shell:
-        "python -m gpca new_concepts --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
-        "--registrations {input.registrations} --encoders {input.encoders} --encoders-of {params.encoders_of} "
-        "--objects {input.objects} --causes {input.causes} --descriptors {input.descriptors} "
-        "--cause-encoder {input.cause_encoder} --cause-embeddings {input.cause_embeddings} "
-        "--settings {params.settings:q} --strategies {params.strategies} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule new_concepts:
@@ -164,7 +155,6 @@ rule new_concepts:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,
@@ -184,7 +174,7 @@ rule learn_on_frames:
         ),
         code=code_files("gpca.experiments.frame_labels.step"),
     output:
-        collect(
+        out=collect(
             f"<results>/frame_labels/{FRAMES}/{{strategy}}/seed{{{{seed}}}}.csv",
             strategy=NAMES["new_concept_strategy"],
         ),
@@ -195,11 +185,11 @@ rule learn_on_frames:
     priority: 4
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=30,
     params:
+        step="gpca.experiments.frame_labels.step",
         settings=as_json(
             {
                 "frame_labels": config["frame_labels"],
@@ -209,7 +199,5 @@ rule learn_on_frames:
         source=FRAMES,
         backbones=config["real_world"]["backbones"],
         strategies=NAMES["new_concept_strategy"],
-    shell:
-        "python -m gpca frame_labels --threads {threads} --source {params.source} --seed {wildcards.seed} "
-        "--registrations {input.registrations} --backbones {params.backbones} --embeddings {input.embeddings} "
-        "--settings {params.settings:q} --strategies {params.strategies} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"

@@ -34,22 +34,20 @@ rule sample_causes:
         source="|".join(SOURCES),
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=60,
     params:
+        step="gpca.steps.causes",
         settings=as_json(config["causes"] | ICP),
-    shell:
-        "python -m gpca causes --threads {threads} --objects {input.objects} --source {wildcards.source} "
-        "--seed {wildcards.seed} --settings {params.settings:q} --out {output.causes} "
-        "--candidates {output.candidates} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule describe:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",
-        timings="<results>/timings/{source}/causes/seed{seed}.csv",
+        causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
         code=code_files("gpca.steps.describe"),
     output:
         descriptors="<results>/descriptors/{source}/seed{seed}.npz",
@@ -60,22 +58,20 @@ rule describe:
         "<benchmarks>/descriptors/{source}/seed{seed}.tsv"
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=30,
     params:
+        step="gpca.steps.describe",
         settings=as_json(DIAGNOSIS["descriptors"] | ICP),
-    shell:
-        "python -m gpca describe --threads {threads} --causes {input.causes} --causes-timings {input.timings} "
-        "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.descriptors} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule train_on_causes:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",
-        timings="<results>/timings/{source}/causes/seed{seed}.csv",
+        causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
         code=code_files(
             "gpca.steps.train_on_causes", backbone_module(DIAGNOSIS["encoder"])
         ),
@@ -91,17 +87,14 @@ rule train_on_causes:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.steps.train_on_causes",
         settings=as_json(DIAGNOSIS["encoder"]),
-    shell:
-        "python -m gpca train_on_causes --threads {threads} --causes {input.causes} "
-        "--causes-timings {input.timings} --source {wildcards.source} --seed {wildcards.seed} "
-        "--settings {params.settings:q} --weights {output.weights} --curve {output.curve} "
-        "--out {output.embeddings} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule diagnose:
@@ -111,12 +104,13 @@ rule diagnose:
             f"<results>/{read_by(wildcards.cause_explainer)}/{wildcards.source}/seed{{seed}}.npz",
             seed=SEEDS,
         ),
-        timings=lambda wildcards: collect(
+        read_timings=lambda wildcards: collect(
             f"<results>/timings/{wildcards.source}/{read_by(wildcards.cause_explainer)}/seed{{seed}}.csv",
             seed=SEEDS,
         ),
         code=lambda wildcards: code_files(
-            "gpca.experiments.diagnosis.step", explainer_module(wildcards.cause_explainer, CAUSES)
+            "gpca.experiments.diagnosis.step",
+            explainer_module(wildcards.cause_explainer, CAUSES),
         ),
     output:
         predictions=collect(
@@ -133,20 +127,18 @@ rule diagnose:
         "<benchmarks>/diagnoses/{source}/{cause_explainer}.tsv"
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=30,
     params:
+        step="gpca.experiments.diagnosis.step",
+        explainer=lambda wildcards: wildcards.cause_explainer,
         settings=lambda wildcards: as_json(
             DIAGNOSIS["explainers"][wildcards.cause_explainer] or {}
         ),
         seeds=SEEDS,
-    shell:
-        "python -m gpca diagnose --threads {threads} --explainer {wildcards.cause_explainer} "
-        "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
-        "--causes {input.causes} --read {input.read} --read-timings {input.timings} "
-        "--predictions {output.predictions} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule cause_metrics:
@@ -170,7 +162,6 @@ rule cause_metrics:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=10,
@@ -194,7 +185,6 @@ rule cause_intervals:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=10,

@@ -79,7 +79,6 @@ rule comparison:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,
@@ -107,9 +106,7 @@ rule page:
             f"<results>/uncertainty/{{source}}/causal/seed{SEEDS[0]}.csv",
             source=UNCERTAIN,
         ),
-        code=code_files(
-            "gpca.page.page", "gpca.page.crate", "gpca.reporting.script"
-        ),
+        code=code_files("gpca.page.page", "gpca.page.crate", "gpca.reporting.script"),
     output:
         page="<results>/index.html",
         crate="<results>/ro-crate-metadata.json",
@@ -121,7 +118,6 @@ rule page:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

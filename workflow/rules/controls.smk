@@ -35,29 +35,27 @@ rule train_control:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.controls.train_step",
         settings=lambda wildcards: control_settings(wildcards),
-    shell:
-        "python -m gpca train_control --threads {threads} --control {wildcards.control} "
-        "--registrations {input.registrations} --source {wildcards.source} --seed {wildcards.seed} "
-        "--settings {params.settings:q} --out {output.embeddings} --curve {output.curve} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule explain_controls:
     input:
         objects="<results>/objects/{source}.npz",
         registrations="<results>/registrations/{source}/seed{seed}.npz",
-        others=lambda wildcards: collect(
+        other_registrations=lambda wildcards: collect(
             f"<results>/registrations/{{source}}/seed{wildcards.seed}.npz",
             source=other_sources(wildcards),
         ),
         encoder=f"<results>/encoders/{{source}}/{CONTROL_ENCODER}/seed{{seed}}.pt",
         embeddings=f"<results>/embeddings/{{source}}/{CONTROL_ENCODER}/none/seed{{seed}}.npz",
-        retrained=lambda wildcards: collect(
+        retrained_embeddings=lambda wildcards: collect(
             f"<results>/control_embeddings/{{control}}/{wildcards.source}/seed{wildcards.seed}.npz",
             control=retrained(wildcards),
         ),
@@ -77,11 +75,11 @@ rule explain_controls:
     priority: 5
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.controls.step",
         settings=lambda wildcards: control_settings(
             wildcards,
             explainers=CONTROL_EXPLAINERS,
@@ -90,12 +88,8 @@ rule explain_controls:
         ),
         retrained=retrained,
         others=other_sources,
-    shell:
-        "python -m gpca controls --threads {threads} --source {wildcards.source} --seed {wildcards.seed} "
-        "--objects {input.objects} --registrations {input.registrations} --encoder {input.encoder} "
-        "--embeddings {input.embeddings} --retrained {params.retrained} --retrained-embeddings {input.retrained} "
-        "--others {params.others} --other-registrations {input.others} --settings {params.settings:q} "
-        "--out {output.predictions} --samples {output.samples} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule control_metrics:
@@ -111,7 +105,6 @@ rule control_metrics:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=10,

@@ -18,7 +18,7 @@ rule fit_kernel_grid:
         ),
         code=code_files("gpca.experiments.kernel_grid.step"),
     output:
-        collect("<results>/kernels/{{source}}/seed{seed}.csv", seed=SEEDS),
+        out=collect("<results>/kernels/{{source}}/seed{seed}.csv", seed=SEEDS),
     log:
         "<logs>/kernels/{source}.log",
     benchmark:
@@ -26,17 +26,15 @@ rule fit_kernel_grid:
     priority: 4
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.kernel_grid.step",
         settings=settings("kernel_grid"),
         seeds=SEEDS,
-    shell:
-        "python -m gpca kernel_grid --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--registrations {input.registrations} --embeddings {input.embeddings} "
-        "--settings {params.settings:q} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule kernels:
@@ -56,7 +54,6 @@ rule kernels:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,
@@ -95,14 +92,16 @@ rule shift:
             f"<results>/encoders/{{{{source}}}}/{ENCODER}/seed{{seed}}.pt", seed=SEEDS
         ),
         # Of a source that the encoder never saw, the first other one.
-        other=lambda wildcards: collect(
+        other_registrations=lambda wildcards: collect(
             "<results>/registrations/{source}/seed{seed}.npz",
             source=[name for name in SOURCES if name != wildcards.source][:1],
             seed=SEEDS,
         ),
-        code=code_files("gpca.experiments.out_of_distribution.shift_step", encoder_module(ENCODER)),
+        code=code_files(
+            "gpca.experiments.out_of_distribution.shift_step", encoder_module(ENCODER)
+        ),
     output:
-        collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
+        out=collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
     log:
         "<logs>/shifted/{source}.log",
     benchmark:
@@ -110,11 +109,11 @@ rule shift:
     priority: 6
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.out_of_distribution.shift_step",
         settings=as_json(
             {
                 "shift": config["shift"],
@@ -123,22 +122,19 @@ rule shift:
             }
         ),
         seeds=SEEDS,
-        other=lambda wildcards, input: (
-            ["--other-registrations", *input.other] if input.get("other") else []
-        ),
-    shell:
-        "python -m gpca shift --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--objects {input.objects} --registrations {input.registrations} {params.other} "
-        "--embeddings {input.embeddings} --encoders {input.encoders} --settings {params.settings:q} "
-        "--out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule fit_learners:
     input:
         sets=collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
-        code=code_files("gpca.experiments.out_of_distribution.learners_step", *map(explainer_module, LEARNER_SETTINGS)),
+        code=code_files(
+            "gpca.experiments.out_of_distribution.learners_step",
+            *map(explainer_module, LEARNER_SETTINGS),
+        ),
     output:
-        collect(
+        out=collect(
             "<results>/learners/{{source}}/{learner}/seed{seed}.csv",
             learner=LEARNER_SETTINGS,
             seed=SEEDS,
@@ -150,25 +146,25 @@ rule fit_learners:
     priority: 4
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.out_of_distribution.learners_step",
         settings=as_json(LEARNER_SETTINGS),
         learners=list(LEARNER_SETTINGS),
         seeds=SEEDS,
-    shell:
-        "python -m gpca learners --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--learners {params.learners} --settings {params.settings:q} --sets {input.sets} "
-        "--out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule diagnostics:
     input:
         prediction_files=rules.learners.input,
         set_files=rules.shifted.input,
-        code=collector_code("gpca.experiments.out_of_distribution.metrics:collect_diagnostics"),
+        code=collector_code(
+            "gpca.experiments.out_of_distribution.metrics:collect_diagnostics"
+        ),
     output:
         "<results>/diagnostics.csv",
     log:
@@ -178,7 +174,6 @@ rule diagnostics:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -46,16 +46,14 @@ rule train_encoder:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.steps.train",
         settings=encoder_settings,
-    shell:
-        "python -m gpca train --threads {threads} --registrations {input.registrations} "
-        "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.weights} --curve {output.curve} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule pretrain_encoder:
@@ -72,20 +70,19 @@ rule pretrain_encoder:
     priority: 11
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=180,
     params:
+        step="gpca.steps.train",
+        source="pretraining",
         settings=lambda wildcards: encoder_settings(
             wildcards, REAL_WORLD["pretraining"]
         ),
         seed=SEEDS[0],
-        sources=PRETRAINING_SOURCES,
-    shell:
-        "python -m gpca train --threads {threads} --registrations {input.registrations} "
-        "--registrations-of {params.sources} --source pretraining --seed {params.seed} --settings {params.settings:q} "
-        "--out {output.weights} --curve {output.curve} 2> {log}"
+        registrations_of=PRETRAINING_SOURCES,
+    script:
+        "../scripts/step.py"
 
 
 rule train_on_frames:
@@ -110,29 +107,24 @@ rule train_on_frames:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.steps.train",
         settings=lambda wildcards: encoder_settings(
             wildcards, (REAL_WORLD["training"] or {}).get(wildcards.backbone)
         ),
         source=FRAMES,
-        start=lambda wildcards, input: (
-            ["--start", input.start] if input.get("start") else []
-        ),
-    shell:
-        "python -m gpca train --threads {threads} --registrations {input.registrations} --poses {input.poses} "
-        "{params.start:q} --source {params.source} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.weights} --curve {output.curve} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule embed:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
-        timings="<results>/timings/{source}/icp/seed{seed}.csv",
-        weights="<results>/encoders/{source}/{backbone}/seed{seed}.pt",
+        registration_timings="<results>/timings/{source}/icp/seed{seed}.csv",
+        encoder="<results>/encoders/{source}/{backbone}/seed{seed}.pt",
         code=encoder_code("embed"),
     output:
         embeddings="<results>/embeddings/{source}/{backbone}/none/seed{seed}.npz",
@@ -144,20 +136,17 @@ rule embed:
     priority: 11  # the longest reading waits for those of the frames
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.steps.embed",
         settings=encoder_settings,
         encoder_of=lambda wildcards: (
             FRAMES if wildcards.source in NAMES["condition"] else wildcards.source
         ),
-    shell:
-        "python -m gpca embed --threads {threads} --registrations {input.registrations} "
-        "--registration-timings {input.timings} --encoder {input.weights} --encoder-of {params.encoder_of} "
-        "--source {wildcards.source} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.embeddings} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 # Under other initial poses the encoder is that of the frames, and the classifier learns anew.
@@ -179,7 +168,7 @@ rule reduce_embeddings:
         ),
         code=code_files("gpca.steps.reduce"),
     output:
-        collect(
+        out=collect(
             "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",
             seed=SEEDS,
         ),
@@ -189,13 +178,12 @@ rule reduce_embeddings:
         "<benchmarks>/embeddings/{source}/{backbone}/{reduction}.tsv"
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=30,
     params:
+        step="gpca.steps.reduce",
         settings=settings("reductions", "{reduction}"),
         seeds=SEEDS,
-    shell:
-        "python -m gpca reduce --threads {threads} --reduction {wildcards.reduction} --source {wildcards.source} "
-        "--seeds {params.seeds} --settings {params.settings:q} --embeddings {input.embeddings} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"

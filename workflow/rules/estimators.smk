@@ -47,20 +47,18 @@ rule estimate:
     priority: 2
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=60,
     params:
+        step="gpca.experiments.estimators.step",
         settings=as_json(
             {name: config[name] for name in ("estimator_pairs", "estimators")}
         ),
         estimators=NAMES["estimator"],
         seeds=SEEDS,
-    shell:
-        "python -m gpca estimate --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--estimators {params.estimators} --settings {params.settings:q} --objects {input.objects} "
-        "--causes {input.causes} --samples {output.samples} --out {output.rows} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule estimator_metrics:
@@ -76,7 +74,6 @@ rule estimator_metrics:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -35,7 +35,7 @@ rule explain_exchanged:
             *map(estimator_module, EXCHANGE["estimators"]),
         ),
     output:
-        collect("<results>/exchange/{{source}}/seed{seed}.csv", seed=EXCHANGE_SEEDS),
+        out=collect("<results>/exchange/{{source}}/seed{seed}.csv", seed=EXCHANGE_SEEDS),
     log:
         "<logs>/exchange/{source}.log",
     benchmark:
@@ -45,11 +45,11 @@ rule explain_exchanged:
     priority: 2
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.substitution.step",
         settings=as_json(
             {
                 "exchange": {
@@ -70,10 +70,8 @@ rule explain_exchanged:
             }
         ),
         seeds=EXCHANGE_SEEDS,
-    shell:
-        "python -m gpca exchange --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--objects {input.objects} --registrations {input.registrations} --encoders {input.encoders} "
-        "--settings {params.settings:q} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 use rule control_metrics as exchange_metrics with:

@@ -44,29 +44,16 @@ rule attribute:
     priority: 11  # as `embed`
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.steps.attribute",
         explainer=lambda wildcards: explainer_of(wildcards.explainer, NAMES),
         settings=lambda wildcards: as_json(explainer_settings(wildcards)),
         seeds=SEEDS,
-        files_of=lambda wildcards: (
-            ["--files-of", FRAMES, "--files-seed", SEEDS[0]]
-            if wildcards.source == ONE_ENCODER
-            else []
-        ),
-        attached=lambda wildcards, input: [
-            word
-            for option in files_behind(wildcards.explainer, NAMES)
-            for word in (f"--{option.replace('_', '-')}", *input.get(option))
-        ],
-    shell:
-        "python -m gpca attribute --threads {threads} --explainer {params.explainer} "
-        "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
-        "--registrations {input.registrations} {params.files_of} {params.attached} "
-        "--predictions {output.predictions} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 # Classifiers of several seeds on what the first seed's encoder makes of the first seed's frames.
@@ -87,6 +74,9 @@ use rule attribute as attribute_one_encoder with:
         code=code_files("gpca.steps.attribute", explainer_module("gpca")),
     wildcard_constraints:
         source=ONE_ENCODER,
+    params:
+        files_of=FRAMES,
+        files_seed=SEEDS[0],
 
 
 rule metrics:
@@ -112,7 +102,6 @@ rule metrics:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,
@@ -140,7 +129,6 @@ rule timings:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -25,7 +25,7 @@ rule measure_frame_causes:
             *(explainer_module(name, CAUSES) for name in DIAGNOSIS["explainers"]),
         ),
     output:
-        causes="<results>/frame_causes/seed{seed}.npz",
+        frame_causes="<results>/frame_causes/seed{seed}.npz",
         samples="<results>/frame_causes/seed{seed}.csv",
         predictions="<results>/frame_diagnoses/seed{seed}.csv",
     log:
@@ -34,11 +34,11 @@ rule measure_frame_causes:
         "<benchmarks>/frame_causes/seed{seed}.tsv"
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.frame_causes.step",
         settings=as_json(
             {
                 "frames": REAL_WORLD["causes"],
@@ -49,17 +49,9 @@ rule measure_frame_causes:
             }
         ),
         source=FRAMES,
-        frames=lambda wildcards, input: (
-            ["--scenes", input.scenes]
-            if input.get("scenes")
-            else folder_options(config["data_dir"], config["downloads"])
-        ),
-    shell:
-        "python -m gpca frame_causes --threads {threads} --source {params.source} --seed {wildcards.seed} "
-        "--settings {params.settings:q} {params.frames:q} --instances {input.instances} --objects {input.objects} "
-        "--causes {input.causes} --descriptors {input.descriptors} --encoders {input.encoders} "
-        "--embeddings {input.embeddings} --out {output.causes} --samples {output.samples} "
-        "--predictions {output.predictions} 2> {log}"
+        folders=DATA_FOLDERS,
+    script:
+        "../scripts/step.py"
 
 
 rule frame_causes:
@@ -83,7 +75,6 @@ rule frame_causes:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -1,6 +1,5 @@
 # Depth frames, of datasets or rendered in their place -> partial clouds -> registrations.
 from gpca.frames.source import ONE_ENCODER, conditions_of, frame_files
-from gpca.objects.source import folder_options
 
 REAL_WORLD = config["real_world"]
 CONDITIONS = {FRAMES: REAL_WORLD["initial_pose"]} | {
@@ -10,6 +9,12 @@ if REAL_WORLD["datasets"]:
     FRAMES_FROM = {"data": frame_files(REAL_WORLD["datasets"], config["data_dir"])}
 else:
     FRAMES_FROM = {"scenes": f"<results>/scenes/{FRAMES}"}
+# Where a step looks for data and keeps downloads; nowhere, where frames are rendered.
+DATA_FOLDERS = (
+    {name: config[name] for name in ("data_dir", "downloads")}
+    if REAL_WORLD["datasets"]
+    else {}
+)
 # What is asked about frames: source -> methods.
 ASKED = {
     FRAMES: [*NAMES["backbone"], *NAMES["classic"], *NAMES["frame_explainer"]],
@@ -37,7 +42,7 @@ rule render_scenes:
             *shapes_code(REAL_WORLD["scenes"]["families"]),
         ),
     output:
-        directory(f"<results>/scenes/{FRAMES}"),
+        out=directory(f"<results>/scenes/{FRAMES}"),
     log:
         "<logs>/scenes.log",
     benchmark:
@@ -45,17 +50,15 @@ rule render_scenes:
     priority: 12
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=30,
     params:
+        step="gpca.steps.scenes",
         settings=settings("real_world", "scenes"),
         source=FRAMES,
-        data=[],
-    shell:
-        "python -m gpca scenes --threads {threads} --source {params.source} "
-        "--settings {params.settings:q} {params.data:q} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule instances:
@@ -72,11 +75,11 @@ rule instances:
     priority: 12
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.steps.instances",
         settings=lambda wildcards: as_json(
             {
                 "datasets": REAL_WORLD["datasets"],
@@ -85,15 +88,10 @@ rule instances:
         ),
         source=FRAMES,
         name="{frames}",
-        frames=lambda wildcards, input: (
-            ["--scenes", input.scenes]
-            if input.get("scenes")
-            else folder_options(config["data_dir"], config["downloads"])
-        ),
+        folders=DATA_FOLDERS,
         surface_points=config["objects"]["surface_points"],
-    shell:
-        "python -m gpca instances --threads {threads} --source {params.source} --name {params.name} --settings {params.settings:q} "
-        "{params.frames:q} --surface-points {params.surface_points} --out {output.instances} --objects {output.objects} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule register_frames:
@@ -112,11 +110,11 @@ rule register_frames:
     priority: 11
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=30,
     params:
+        step="gpca.steps.frame_registrations",
         settings=as_json(
             config["registrations"]
             | {
@@ -126,10 +124,8 @@ rule register_frames:
         ),
         source=FRAMES,  # conditions have its splits and draws
         name="{frames}",
-    shell:
-        "python -m gpca frame_registrations --threads {threads} --instances {input.instances} "
-        "--objects {input.objects} --source {params.source} --name {params.name} --seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.registrations} --poses {output.poses} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule real_world:
@@ -163,7 +159,6 @@ rule real_world:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -37,11 +37,11 @@ rule follow_gradients:
         "<benchmarks>/saliency/{source}.tsv"
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
     params:
+        step="gpca.experiments.gradients.step",
         settings=as_json(
             {
                 "gradients": config["gradients"],
@@ -50,11 +50,8 @@ rule follow_gradients:
             }
         ),
         seeds=SEEDS,
-    shell:
-        "python -m gpca gradients --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--registrations {input.registrations} --encoders {input.encoders} --embeddings {input.embeddings} "
-        "--settings {params.settings:q} --deletions {output.deletions} --maps {output.maps} "
-        "--tcav {output.tcav} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule gradient_metrics:
@@ -75,7 +72,6 @@ rule gradient_metrics:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -26,7 +26,9 @@ rule register_methods:
         registrations=collect(
             "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
-        code=code_files("gpca.experiments.registration_methods.step", *map(method_module, METHODS)),
+        code=code_files(
+            "gpca.experiments.registration_methods.step", *map(method_module, METHODS)
+        ),
     output:
         rows=collect(
             "<results>/methods/{{source}}/{method}/seed{seed}.csv",
@@ -47,11 +49,11 @@ rule register_methods:
     priority: 2
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=60,
     params:
+        step="gpca.experiments.registration_methods.step",
         settings=as_json(
             {
                 "method_pairs": config["method_pairs"],
@@ -60,16 +62,16 @@ rule register_methods:
         ),
         methods=METHODS,
         seeds=SEEDS,
-    shell:
-        "python -m gpca register_methods --threads {threads} --source {wildcards.source} --seeds {params.seeds} "
-        "--methods {params.methods} --settings {params.settings:q} --objects {input.objects} "
-        "--registrations {input.registrations} --out {output.rows} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule registration_methods:
     input:
         files=rules.methods.input,
-        code=collector_code("gpca.experiments.registration_methods.metrics:collect_trials"),
+        code=collector_code(
+            "gpca.experiments.registration_methods.metrics:collect_trials"
+        ),
     output:
         "<results>/registration_methods.csv",
     log:
@@ -79,7 +81,6 @@ rule registration_methods:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -66,28 +66,25 @@ rule model:
         ),
         code=code_files("gpca.steps.model", encoder_module(MODEL_ENCODER)),
     output:
-        "<results>/model.pt",
+        out="<results>/model.pt",
     log:
         "<logs>/model.log",
     benchmark:
         "<benchmarks>/model.tsv"
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=10,
     params:
+        step="gpca.steps.model",
         source=MODEL_SOURCE,
         seed=SEEDS[0],
         title=SHOWN["model"]["title"],
-        stand_in="--stand-in" if SHOWN["model"]["stand_in"] else "",
+        stand_in=SHOWN["model"]["stand_in"],
         settings=as_json(MODEL_SETTINGS),
-    shell:
-        "python -m gpca model --threads {threads} --source {params.source} --seed {params.seed} "
-        "--title {params.title:q} {params.stand_in} --registrations {input.registrations} --encoder {input.encoder} "
-        "--embeddings {input.embeddings} --causes {input.causes} --descriptors {input.descriptors} "
-        "--settings {params.settings:q} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule time_stages:
@@ -96,7 +93,7 @@ rule time_stages:
         model="<results>/model.pt",
         code=code_files("gpca.experiments.runtime.step", encoder_module(MODEL_ENCODER)),
     output:
-        "<results>/runtime.csv",
+        out="<results>/runtime.csv",
     log:
         "<logs>/runtime.log",
     benchmark:
@@ -109,12 +106,12 @@ rule time_stages:
         mem_mb=2000,
         runtime=10,
     params:
+        step="gpca.experiments.runtime.step",
+        threads=1,
         source=MODEL_SOURCE,
         seed=SEEDS[0],
         settings=as_json(
             {name: config[name] for name in ("runtime", "active_learning")}
         ),
-    shell:
-        "python -m gpca runtime --threads 1 --source {params.source} --seed {params.seed} "
-        "--model {input.model} --registrations {input.registrations} --embeddings {input.embeddings} "
-        "--settings {params.settings:q} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"

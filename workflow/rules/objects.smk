@@ -1,5 +1,5 @@
 # Sources -> canonical clouds.
-from gpca.objects.source import data_files, data_options, source_modules
+from gpca.objects.source import data_files, data_folders, source_modules
 
 
 rule objects:
@@ -14,7 +14,7 @@ rule sample_objects:
             "gpca.steps.objects", *source_modules(SOURCES[wildcards.source])
         ),
     output:
-        "<results>/objects/{source}.npz",
+        out="<results>/objects/{source}.npz",
     log:
         "<logs>/objects/{source}.log",
     benchmark:
@@ -24,16 +24,15 @@ rule sample_objects:
     priority: 20  # everything waits for it
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=30,
     params:
+        step="gpca.steps.objects",
         settings=settings("sources", "{source}"),
-        data=lambda wildcards: data_options(
+        folders=lambda wildcards: data_folders(
             SOURCES[wildcards.source], config["data_dir"], config["downloads"]
         ),
         surface_points=config["objects"]["surface_points"],
-    shell:
-        "python -m gpca objects --threads {threads} --source {wildcards.source} --settings {params.settings:q} "
-        "{params.data:q} --surface-points {params.surface_points} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"

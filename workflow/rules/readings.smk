@@ -30,7 +30,7 @@ rule reading:
             ),
         ),
     output:
-        "<results>/readings/{reading_group}.csv",
+        out="<results>/readings/{reading_group}.csv",
     log:
         "<logs>/readings/{reading_group}.log",
     benchmark:
@@ -40,11 +40,12 @@ rule reading:
     priority: 12  # that of the frames' clouds trains encoders: the longest job, with many cores to be started early
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=4000,
         runtime=120,
     params:
+        step="gpca.experiments.specification_curve.step",
+        group=lambda wildcards: wildcards.reading_group,
         settings=lambda wildcards: as_json(
             {
                 "choices": READINGS["groups"][wildcards.reading_group],
@@ -52,14 +53,8 @@ rule reading:
                 **reading_sections(wildcards.reading_group),
             }
         ),
-        files=lambda wildcards, input: [
-            word
-            for kind in GROUPS[wildcards.reading_group].reads
-            for word in (f"--{kind}", *input.get(kind))
-        ],
-    shell:
-        "python -m gpca readings --threads {threads} --group {wildcards.reading_group} {params.files} "
-        "--settings {params.settings:q} --out {output} 2> {log}"
+    script:
+        "../scripts/step.py"
 
 
 rule reading_values:
@@ -78,7 +73,6 @@ rule reading_values:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -1,5 +1,5 @@
 # Failures on virtual tables, and what every policy makes of them -> recovery.csv.
-from gpca.objects.source import data_files, data_options, source_modules
+from gpca.objects.source import data_files, data_folders, source_modules
 from gpca.recovery.policies import policy_entry
 
 RECOVERY = config["recovery"]
@@ -46,16 +46,15 @@ rule recover:
     priority: 6
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=3000,
         runtime=30,
     params:
+        step="gpca.experiments.recovery.step",
         settings=as_json(RECOVERY_SETTINGS),
-        data=data_options(STANDING, config["data_dir"], config["downloads"]),
-    shell:
-        "python -m gpca recover --threads {threads} --seed {wildcards.seed} --settings {params.settings:q} {params.data:q} "
-        "--out {output.rows} --timings {output.timings} --queue {output.queue} --policy {output.policy} --example {output.example} 2> {log}"
+        folders=data_folders(STANDING, config["data_dir"], config["downloads"]),
+    script:
+        "../scripts/step.py"
 
 
 rule recovery:
@@ -71,7 +70,6 @@ rule recovery:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=1000,
         runtime=10,

@@ -24,13 +24,11 @@ rule register:
     priority: 15  # more than any training: with many cores, the longest ones would start late
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=30,
     params:
+        step="gpca.steps.registrations",
         settings=settings("registrations"),
-    shell:
-        "python -m gpca registrations --threads {threads} --objects {input.objects} --source {wildcards.source} "
-        "--seed {wildcards.seed} --settings {params.settings:q} "
-        "--out {output.registrations} --timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"

@@ -47,8 +47,7 @@ for result in RESULTS:
             localrule: True
             conda:
                 "../envs/gpca.yaml"
-            threads: 1
-            resources:
+                    resources:
                 mem_mb=2000,
                 runtime=10,
             params:
@@ -77,8 +76,7 @@ for result in RESULTS:
             localrule: True
             conda:
                 "../envs/gpca.yaml"
-            threads: 1
-            resources:
+                    resources:
                 mem_mb=2000,
                 runtime=10,
             params:

@@ -56,6 +56,5 @@ rule misspelt:
         name=r"\w+",
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     shell:
         "exit 2"

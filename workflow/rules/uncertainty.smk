@@ -33,18 +33,15 @@ rule run_icp:
     priority: 3
     conda:
         "../envs/gpca.yaml"
-    threads: 1
     resources:
         mem_mb=2000,
         runtime=60,
     params:
+        step="gpca.steps.uncertainty",
         settings=lambda wildcards: as_json(
             config["uncertainty"][wildcards.design]
             | {"icp": config["registrations"]["icp"]}
         ),
         seeds=SEEDS,
-    shell:
-        "python -m gpca uncertainty --threads {threads} --design {wildcards.design} "
-        "--source {wildcards.source} --seeds {params.seeds} --settings {params.settings:q} "
-        "--registrations {input.registrations} --out {output.outcomes} --tables {output.tables} "
-        "--timings {output.timings} 2> {log}"
+    script:
+        "../scripts/step.py"

@@ -15,7 +15,7 @@ use rule render_scenes as render_models with:
         **FRAMES_FROM,
         code=code_files("gpca.steps.scenes"),
     output:
-        directory(f"<results>/scenes/{VIRTUAL}"),
+        out=directory(f"<results>/scenes/{VIRTUAL}"),
     log:
         f"<logs>/scenes/{VIRTUAL}.log",
     benchmark:
@@ -23,7 +23,7 @@ use rule render_scenes as render_models with:
     params:
         settings=as_json({**SCENES, **TABLES, "datasets": REAL_WORLD["datasets"]}),
         source=VIRTUAL,
-        data=folder_options(config["data_dir"], config["downloads"]),
+        folders=DATA_FOLDERS,
 
 
 use rule instances as virtual_instances with:
@@ -41,7 +41,7 @@ use rule instances as virtual_instances with:
         settings=as_json({"initial_pose": {"form": "true_pose"}}),
         source=VIRTUAL,
         name=VIRTUAL,
-        frames=lambda wildcards, input: ["--scenes", input.scenes],
+        folders={},
         surface_points=config["objects"]["surface_points"],
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
+from baselines.registry import CAUSES, explainer_entry
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import labelled
@@ -17,36 +16,19 @@ from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
 from gpca.features.dataset import Descriptors
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.process.arguments import SEED, per_seed
+from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.settings import check_settings
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names, one of each per seed; ``--settings`` are the explainer's in the config."""
-    parser.add_argument("--explainer", required=True)
-    parser.add_argument("--source", required=True)
-    parser.add_argument("--seeds", required=True, type=SEED, nargs="+")
-    parser.add_argument("--causes", required=True, type=Path, nargs="+")
-    parser.add_argument(
-        "--read", required=True, type=Path, nargs="+", help="the descriptors or embeddings that the explainer reads"
-    )
-    parser.add_argument("--read-timings", required=True, type=Path, nargs="+", help="CSVs of the time spent on these")
-    parser.add_argument("--predictions", required=True, type=Path, nargs="+")
-    parser.add_argument("--timings", required=True, type=Path, nargs="+")
-
-
-def run(options: Namespace) -> None:
+def run(job: Job) -> None:
     """Fit on the training rows that have a label and explain every row, seed by seed."""
-    require_settings(options.explainer, options.settings, CAUSES)
-    check_settings(options.settings, "diagnosis", "explainers", options.explainer)
-    entry = explainer_entry(options.explainer, CAUSES)
+    entry = explainer_entry(job.explainer, CAUSES)
     files = ("causes", "read", "read_timings", "predictions", "timings")
-    for seed, causes_file, read, read_timing, predictions, timings in per_seed(options, *files):
-        explainer = entry.make(options.source, seed, **options.settings)
+    for seed, causes_file, read, read_timing, predictions, timings in job.per_seed(*files):
+        explainer = entry.make(job.source, seed, **job.settings)
         inputs = [causes_file, read, read_timing]
-        with record_provenance([predictions, timings], inputs, options.settings, seed=seed):
-            causes = Causes.load(causes_file, (options.source, seed))
+        with record_provenance([predictions, timings], inputs, job.settings, seed=seed):
+            causes = Causes.load(causes_file, (job.source, seed))
             registrations = with_what_it_reads(labelled(causes), entry, read)
             seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
             explainer.fit(registrations.subset(training_rows(registrations, causes_file)))

@@ -5,15 +5,13 @@ The explainers have learned from registrations whose causes were drawn, those of
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
+from baselines.registry import CAUSES, explainer_entry
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
@@ -23,7 +21,6 @@ from gpca.causes.frames import chosen_instances, measure_frames
 from gpca.causes.labels import LABELS, labelled
 from gpca.causes.settings import CauseSettings
 from gpca.encoders.settings import EncoderSettings
-from gpca.errors import InputError
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
 from gpca.features.dataset import Descriptors, describe_all
 from gpca.features.settings import DescriptorSettings
@@ -33,99 +30,48 @@ from gpca.frames.plausibility import require_of_objects
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, joined
-from gpca.process.arguments import SEED
+from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.settings import checked_sections
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SECTIONS = {
-    "frames": ("real_world", "causes"),
-    "datasets": ("real_world", "datasets"),
-    "causes": ("causes",),
-    "icp": ("registrations", "icp"),
-    "descriptors": ("diagnosis", "descriptors"),
-    "encoder": ("diagnosis", "encoder"),
-    "explainers": ("diagnosis", "explainers"),
-}
 
-
-def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config.
-
-    What explainers learn from is a file of each source, in the same order.
-    """
-    parser.add_argument("--source", required=True, help="name of the frames, which seeds the draws")
-    parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--scenes", type=Path, help="folder written by the step scenes, in place of datasets")
-    parser.add_argument("--data-dir", help="folder with the datasets; what is there is not downloaded")
-    parser.add_argument("--downloads", default="data/downloads", type=Path, help="where downloads are kept")
-    parser.add_argument("--instances", required=True, type=Path)
-    parser.add_argument("--objects", required=True, type=Path, help="canonical clouds of the frames' objects")
-    parser.add_argument("--causes", required=True, type=Path, nargs="+", help="drawn causes")
-    parser.add_argument(
-        "--descriptors", required=True, type=Path, nargs="+", help="their descriptors, in the same order"
-    )
-    parser.add_argument("--encoders", required=True, type=Path, nargs="+", help="weights of encoders trained on them")
-    parser.add_argument(
-        "--embeddings", required=True, type=Path, nargs="+", help="their embeddings from these encoders"
-    )
-    parser.add_argument("--out", required=True, type=Path, help="measured causes of the frames")
-    parser.add_argument("--samples", required=True, type=Path, help="CSV of where each was seen and what was found")
-    parser.add_argument("--predictions", required=True, type=Path, help="CSV of what every explainer says about each")
-
-
-def run(options: Namespace) -> None:
+def run(job: Job) -> None:
     """Measure the instances, describe them, and ask every explainer."""
     import pandas as pd
-    import torch
 
-    torch.set_num_threads(options.threads)
-    given = checked_sections(options.settings, SECTIONS)
-    for name, settings in given["explainers"].items():
-        require_settings(name, settings or {}, CAUSES)
-    lessons = _files_of_sources(options)
-    frames = files_behind(given["datasets"], options.data_dir, options.scenes)
-    inputs = [options.instances, options.objects, *frames, *(path for files in lessons for path in files)]
-    outputs = [options.out, options.samples, options.predictions]
-    with record_provenance(outputs, inputs, options.settings, seed=options.seed):
-        causes, samples = _measure(options, given)
-        axes = (options.source, options.seed)
-        icp = ICPSettings(**given["icp"])
-        described, _, _ = describe_all(causes, *axes, DescriptorSettings(**given["descriptors"]), icp)
-        said = _Asked(causes, described, EncoderSettings(**given["encoder"]), axes, lessons)
+    # Of each source: causes, descriptors, encoder, embeddings.
+    lessons = list(zip(job.causes, job.descriptors, job.encoders, job.embeddings, strict=True))
+    frames = files_behind(job.section("datasets"), job.folders.get("data_dir"), job.get("scenes"))
+    inputs = [job.instances, job.objects, *frames, *(path for files in lessons for path in files)]
+    outputs = [job.frame_causes, job.samples, job.predictions]
+    with record_provenance(outputs, inputs, job.settings, seed=job.seed):
+        causes, samples = _measure(job)
+        axes = (job.source, job.seed)
+        icp = ICPSettings(**job.section("icp"))
+        described, _, _ = describe_all(causes, *axes, DescriptorSettings(**job.section("descriptors")), icp)
+        said = _Asked(causes, described, EncoderSettings(**job.section("encoder")), axes, lessons)
         said_of: list[pd.DataFrame] = []
-        for name, settings in given["explainers"].items():
+        for name, settings in job.section("explainers").items():
             attribution = said.attribution(name, settings or {})
             said_of.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
-        causes.save(options.out)
-        write_csv(options.samples, samples)
-        write_csv(options.predictions, pd.concat(said_of))
+        causes.save(job.frame_causes)
+        write_csv(job.samples, samples)
+        write_csv(job.predictions, pd.concat(said_of))
 
 
-def _files_of_sources(options: Namespace) -> list[tuple[Path, Path, Path, Path]]:
-    """Return the files of each source: causes, descriptors, encoder, embeddings."""
-    for name in ("descriptors", "encoders", "embeddings"):
-        if (found := len(getattr(options, name))) != len(options.causes):
-            raise InputError(
-                f"--{name}", f"{found} file(s) for {len(options.causes)} file(s) of --causes", "give one for each"
-            )
-    return list(zip(options.causes, options.descriptors, options.encoders, options.embeddings, strict=True))
-
-
-def _measure(options: Namespace, given: dict) -> tuple[Causes, pd.DataFrame]:
-    instances, objects = (
-        Instances.load(options.instances, options.source),
-        ObjectClouds.load(options.objects, options.source),
+def _measure(job: Job) -> tuple[Causes, pd.DataFrame]:
+    instances, objects = Instances.load(job.instances, job.source), ObjectClouds.load(job.objects, job.source)
+    require_of_objects(instances, objects, job.instances)
+    chosen = FrameCauseSettings(**job.section("frames"))
+    rows = chosen_instances(instances, job.source, chosen)
+    datasets = datasets_of(
+        job.section("datasets"), job.folders.get("data_dir"), Path(job.folders.get("downloads", "")), job.get("scenes")
     )
-    require_of_objects(instances, objects, options.instances)
-    chosen = FrameCauseSettings(**given["frames"])
-    rows = chosen_instances(instances, options.source, chosen)
-    datasets = datasets_of(given["datasets"], options.data_dir, options.downloads, options.scenes)
     meshes = meshes_of(models_of(datasets), objects, instances.object_index[rows].tolist())
-    settings = CauseSettings.from_dict(given["causes"], given["icp"])
-    return measure_frames(instances, rows, objects, meshes, options.source, options.seed, settings, chosen.points)
+    settings = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
+    return measure_frames(instances, rows, objects, meshes, job.source, job.seed, settings, chosen.points)
 
 
 class _Asked:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-import torch
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.active_learning.embedded import Embedded
 from gpca.active_learning.new_concepts import Experiment, run_experiment
 from gpca.active_learning.settings import (
     FROM_OTHERS,
-    NEW_CONCEPT_STRATEGIES,
     ActiveLearningSettings,
     NewConceptSettings,
 )
@@ -38,89 +34,49 @@ from gpca.features.settings import DescriptorSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.arguments import SEED, require_files
+from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
-from gpca.settings import checked_sections
-
-SECTIONS = {
-    "new_concepts": ("new_concepts",),
-    "active_learning": ("active_learning",),
-    "encoder": ("encoders", "*"),
-    "cause_encoder": ("diagnosis", "encoder"),
-    "causes": ("causes",),
-    "descriptors": ("diagnosis", "descriptors"),
-    "icp": ("registrations", "icp"),
-}
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` holds what `SECTIONS` names of the config."""
-    parser.add_argument("--source", required=True)
-    parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--registrations", required=True, type=Path)
-    parser.add_argument(
-        "--encoders", nargs="*", default=[], type=Path, help="weights trained on other samples and sources"
-    )
-    parser.add_argument(
-        "--encoders-of",
-        nargs="*",
-        default=[],
-        choices=FROM_OTHERS,
-        help="what each encoder was trained on, in the same order",
-    )
-    parser.add_argument("--objects", required=True, type=Path)
-    parser.add_argument("--causes", required=True, type=Path)
-    parser.add_argument("--descriptors", required=True, type=Path, help="descriptors of the causes")
-    parser.add_argument("--cause-encoder", required=True, type=Path, help="weights trained on the causes")
-    parser.add_argument("--cause-embeddings", required=True, type=Path, help="embeddings from that encoder")
-    parser.add_argument("--strategies", required=True, nargs="+", choices=NEW_CONCEPT_STRATEGIES)
-    parser.add_argument("--out", required=True, type=Path, nargs="+", help="one CSV per strategy, in the same order")
-
-
-def run(options: Namespace) -> None:
+def run(job: Job) -> None:
     """Learn every new concept from every embedding."""
-    torch.set_num_threads(options.threads)
-    given = checked_sections(options.settings, SECTIONS)
-    own = NewConceptSettings.from_dict(given["new_concepts"])
-    require_files(options, "out", len(options.strategies), "value(s) of --strategies")
-    require_files(options, "encoders", len(options.encoders_of), "value(s) of --encoders-of")
-    inputs = [options.registrations, *options.encoders, options.objects, options.causes, options.descriptors]
-    inputs += [options.cause_encoder, options.cause_embeddings]
-    with record_provenance(options.out, inputs, options.settings, seed=options.seed):
-        settings = ActiveLearningSettings.from_dict(given["active_learning"])
-        work = _Work(options, given, own)
-        curves: dict[str, dict] = {strategy: {} for strategy in options.strategies}
-        for experiment in progress(work.experiments(), f"new concepts of {options.source}"):
-            learnt = run_experiment(experiment, options.strategies, settings, options.source, options.seed)
+    own = NewConceptSettings.from_dict(job.section("new_concepts"))
+    inputs = [job.registrations, *job.encoders, job.objects, job.causes, job.descriptors]
+    inputs += [job.cause_encoder, job.cause_embeddings]
+    with record_provenance(job.out, inputs, job.settings, seed=job.seed):
+        settings = ActiveLearningSettings.from_dict(job.section("active_learning"))
+        work = _Work(job, own)
+        curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
+        for experiment in progress(work.experiments(), f"new concepts of {job.source}"):
+            learnt = run_experiment(experiment, job.strategies, settings, job.source, job.seed)
             for setting, strategy, curve in learnt:
                 curves[strategy][setting, experiment.held_out] = curve
-        for strategy, path in zip(options.strategies, options.out, strict=True):
+        for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], POOL_COLUMNS)
 
 
 class _Work:
     """What the experiments of one source and seed read; all files are read at once, so that a fault is found first."""
 
-    def __init__(self, options: Namespace, given: dict[str, dict], own: NewConceptSettings) -> None:
-        self._options = options
-        self._given = given
+    def __init__(self, job: Job, own: NewConceptSettings) -> None:
+        self._job = job
         self._own = own
-        self._axes = (options.source, options.seed)
-        self._encoder = EncoderSettings(**given["encoder"])
-        self._cause_encoder = EncoderSettings(**given["cause_encoder"])
-        self._registrations = Registrations.load(options.registrations, self._axes)
+        self._axes = (job.source, job.seed)
+        self._encoder = EncoderSettings(**job.section("encoder"))
+        self._cause_encoder = EncoderSettings(**job.section("cause_encoder"))
+        self._registrations = Registrations.load(job.registrations, self._axes)
         self._models = {
             name: load_model(path, self._encoder, unlike=self._axes)
-            for name, path in zip(options.encoders_of, options.encoders, strict=True)
+            for name, path in zip(job.encoders_of, job.encoders, strict=True)
         }
         self._cause_model = load_model(
-            options.cause_encoder, self._cause_encoder, LABELS, self._axes, step="train_on_causes"
+            job.cause_encoder, self._cause_encoder, LABELS, self._axes, step="train_on_causes"
         )
-        causes = Causes.load(options.causes, self._axes)
-        h_S_d = read_embedding(options.cause_embeddings, causes.registrations, "train_on_causes")["embedding"]
-        self._seen = _seen(causes, h_S_d, Descriptors.load(options.descriptors, causes.registrations))
-        self._objects = ObjectClouds.load(options.objects, options.source)
+        causes = Causes.load(job.causes, self._axes)
+        h_S_d = read_embedding(job.cause_embeddings, causes.registrations, "train_on_causes")["embedding"]
+        self._seen = _seen(causes, h_S_d, Descriptors.load(job.descriptors, causes.registrations))
+        self._objects = ObjectClouds.load(job.objects, job.source)
 
     def experiments(self) -> Iterator[Experiment]:
         """Yield every new concept, in every embedding."""
@@ -128,7 +84,7 @@ class _Work:
         for name, h_S_d in self._embeddings(registrations):
             samples = Embedded(h_S_d, registrations.concept, registrations.split)
             errors = self._own.errors if name in self._own.erring else ()
-            for concept in self._given["active_learning"].get("held_out", CONCEPTS):
+            for concept in self._job.section("active_learning").get("held_out", CONCEPTS):
                 yield Experiment(name, samples, concept, CONCEPTS, errors)
         yield from self._of_causes()
 
@@ -140,12 +96,14 @@ class _Work:
             if name == "pair":
                 yield name, pair_S_F
             elif name == "self_supervised":
-                own = EncoderSettings(**self._given["encoder"] | self._given["new_concepts"].get("encoder", {}))
+                own = EncoderSettings(
+                    **self._job.section("encoder") | self._job.section("new_concepts").get("encoder", {})
+                )
                 yield name, self_supervised(registrations, pair_S_F, *self._axes, own)
             elif name in self._models:
                 yield name, embed(self._models[name], registrations, *self._axes, self._encoder)[0]
             else:
-                _leave_out(self._options.source, name, f"it needs {FROM_OTHERS[name]}")
+                _leave_out(self._job.source, name, f"it needs {FROM_OTHERS[name]}")
 
     def _of_causes(self) -> Iterator[Experiment]:
         """Yield what has causes as new concepts: by the encoder of the causes, and by what was measured of the pair."""
@@ -156,7 +114,10 @@ class _Work:
             yield Experiment("pair", self._normalised(seen["pair"]), NOMINAL, known)
         if GEOMETRY in self._own.causes and (drawn := self._geometry()) is not None:
             h_G_d = embed(self._cause_model, drawn.registrations, *self._axes, self._cause_encoder)[0]
-            icp, descriptors = ICPSettings(**self._given["icp"]), DescriptorSettings(**self._given["descriptors"])
+            icp, descriptors = (
+                ICPSettings(**self._job.section("icp")),
+                DescriptorSettings(**self._job.section("descriptors")),
+            )
             new = _seen(drawn, h_G_d, describe_all(drawn, *self._axes, descriptors, icp)[0], GEOMETRY)
             both = {name: seen[name].followed_by(new[name]) for name in new}
             yield Experiment("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
@@ -166,13 +127,13 @@ class _Work:
         drawn = draw_geometry(
             self._objects,
             *self._axes,
-            CauseSettings.from_dict(self._given["causes"], self._given["icp"]),
+            CauseSettings.from_dict(self._job.section("causes"), self._job.section("icp")),
             {"train": self._own.geometry_train, "test": self._own.geometry_test},
             self._own.geometry_candidates,
         )
         if drawn is None:
             why = f"none of {self._own.geometry_candidates} candidates of a split fails without a cause"
-            _leave_out(self._options.source, GEOMETRY, why)
+            _leave_out(self._job.source, GEOMETRY, why)
         return drawn
 
     def _normalised(self, samples: Embedded) -> Embedded:

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
-
-import torch
 
 from gpca.experiments.recovery.episodes import find_episodes, is_right
 from gpca.experiments.recovery.example import ACTION, save_example
@@ -20,7 +17,7 @@ from gpca.experiments.recovery.virtual_tables import lay_tables, register_situat
 from gpca.io.csv_file import write_csv
 from gpca.io.files import whole_file
 from gpca.objects.source import data_files, resolve, surfaces
-from gpca.process.arguments import SEED
+from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.recovery.actions import action_of
 from gpca.recovery.chances import learn_utility
@@ -30,33 +27,18 @@ from gpca.recovery.settings import RecoverySettings
 SOURCE = "recovery"  # names every random number of this step, tables included
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files; ``--settings`` holds the sections of the config that are read."""
-    parser.add_argument("--seed", required=True, type=SEED)
-    parser.add_argument("--data-dir", help="folder with the objects' data; what is there is not downloaded")
-    parser.add_argument("--downloads", default="data/downloads", help="where downloads are kept")
-    parser.add_argument("--out", required=True, type=Path, help="CSV with a row per failure, policy and step")
-    parser.add_argument("--timings", required=True, type=Path, help="CSV of their run times")
-    parser.add_argument(
-        "--queue", required=True, type=Path, help="CSV of the error by the number of labeled queued cases"
-    )
-    parser.add_argument("--policy", required=True, type=Path, help="JSON file of the chosen thresholds")
-    parser.add_argument("--example", required=True, type=Path, help="npz file of one failure, for the figure")
-
-
-def run(options: Namespace) -> None:
+def run(job: Job) -> None:
     """Learn the classifier, rehearse, find failures and let every policy act on them."""
-    torch.set_num_threads(options.threads)
-    settings = RecoverySettings.from_sections(options.settings)
+    settings = RecoverySettings.from_sections(job.settings)
     recovery = settings.section
     loop = settings.loop
-    objects = resolve(dict(settings.objects), options.data_dir)
+    objects = resolve(dict(settings.objects), job.folders.get("data_dir"))
     actions = {name: action_of(name, given or {}) for name, given in recovery["actions"].items()}
     entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
-    outputs = [options.out, options.timings, options.queue, options.policy, options.example]
-    axes = (SOURCE, options.seed)
-    with record_provenance(outputs, data_files(objects), options.settings, seed=options.seed):
-        tables = lay_tables(surfaces(objects, options.downloads), settings, *axes)
+    outputs = [job.rows, job.timings, job.queue, job.policy, job.example]
+    axes = (SOURCE, job.seed)
+    with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
+        tables = lay_tables(surfaces(objects, Path(job.folders.get("downloads", ""))), settings, *axes)
         registrations = register_situations(tables, recovery["train"], recovery["calibration"], loop)
         explainers = learn_explainers(
             [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],
@@ -74,18 +56,18 @@ def run(options: Namespace) -> None:
             taught = rehearsal.trials.values()
             utility = learn_utility(taught, recovery["costs"], tuple(actions), recovery["needless"])
         policy = robot_policy(recovery, rehearsal)
-        _write_summary(options.policy, summary(policy, explainers))
+        _write_summary(job.policy, summary(policy, explainers))
         means = Means(policy, tuple(actions), utility)
         episodes = find_episodes(tables["failures"], loop)
         rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes).run(recovery["policies"])
         judged = [episode for episode in episodes if episode.failed]
         solved = [{name: is_right(e.take((name,), actions, loop)) for name in actions} for e in judged]
         learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers, loop.budget)
-        write_csv(options.queue, error_by_labels(learners, solved, rehearsal, axes))
-        write_csv(options.out, rows)
-        write_csv(options.timings, seconds)
+        write_csv(job.queue, error_by_labels(learners, solved, rehearsal, axes))
+        write_csv(job.rows, rows)
+        write_csv(job.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}
-        save_example(options.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop, axes)
+        save_example(job.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop, axes)
 
 
 def _write_summary(path: Path, content: dict) -> None:

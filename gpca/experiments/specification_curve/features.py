@@ -31,7 +31,7 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
         train, test = (registrations.rows(split) for split in ("train", "test"))
         for reading in readings:
             chosen_S_F = features_S_F[:, COLUMNS[reading["features"]]]
-            gpc = GPC(CONCEPTS, GPCSettings(**given.sections["gpca_paper"]), source, seed)
+            gpc = GPC(CONCEPTS, GPCSettings(**given.section("gpca_paper")), source, seed)
             gpc.fit(chosen_S_F[train], registrations.concept[train])
             scores_S_C, _, _ = gpc.attribute(chosen_S_F[test])
             for (metric, concept), value in accuracies(registrations.concept[test], scores_S_C).items():

@@ -58,7 +58,7 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
 def pretrained(given: Given, cloud: str, frames: str) -> dict[str, torch.Tensor] | None:
     """Return the weights after the training on all sources but the frames; None where the config has none of it."""
     parts = [(path, axes) for axes, path in given.registrations.items() if axes[0] != frames]
-    if not parts or not given.sections["pretraining"]:
+    if not parts or not given.section("pretraining"):
         return None
     seed = min(seed for source, seed in given.registrations if source != frames)
     settings = _settings(given, cloud, "pretraining")
@@ -76,7 +76,7 @@ def named(
     model, _ = train_encoder(seen, source, seed, settings, start=start, group_S=instance_S)
     embedded = replace(shown, attached={"embedding": embed(model, seen, source, seed, settings)[0]})
     train, test = (embedded.subset(embedded.rows(split)) for split in ("train", "test"))
-    gpc = GPC(CONCEPTS, GPCSettings(**given.sections["gpca"]), source, seed)
+    gpc = GPC(CONCEPTS, GPCSettings(**given.section("gpca")), source, seed)
     scores_S_C, _, _ = gpc.fit(train.embedding, train.concept).attribute(test.embedding)
     return np.array(CONCEPTS)[scores_S_C.argmax(axis=1)]
 
@@ -87,11 +87,11 @@ def _train_samples(path: Path, axes: Axes) -> Registrations:
 
 
 def _settings(given: Given, cloud: str, part: str) -> EncoderSettings:
-    return EncoderSettings(**given.sections["encoder"] | given.sections[part] | {"reading": cloud})
+    return EncoderSettings(**given.section("encoder") | given.section(part) | {"reading": cloud})
 
 
 def _icp(given: Given) -> ICPSettings:
-    return ICPSettings(**given.sections["icp"])
+    return ICPSettings(**given.section("icp"))
 
 
 def _frames(given: Given, source: str, seed: int) -> Path:

@@ -35,7 +35,7 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
                     named_S = _predicted(given, source, method, seed)
                 else:
                     shown = given.embedded(source, method, first)
-                    named_S = refitted(shown, given.sections["gpca"], repeats == "samples", source, seed)
+                    named_S = refitted(shown, given.section("gpca"), repeats == "samples", source, seed)
                 for reading in wanted:
                     chosen_S = of_objects(shown, reading["objects"])
                     if not chosen_S.any():

@@ -36,7 +36,7 @@ class Given:
         registrations, sets: (source, seed) -> file of the step ``registrations`` or ``shift``.
         poses: (source, seed) -> CSV beside the registrations of depth frames.
         predictions, embeddings: (source, method, seed) -> file.
-        sections: name -> settings of the config's section `SECTIONS` of that name, for what a reading leaves as it is.
+        settings: sections of the config by name, for what a reading leaves as it is.
     """
 
     registrations: Mapping[tuple[str, int], Path] = field(default_factory=dict)
@@ -44,12 +44,16 @@ class Given:
     poses: Mapping[tuple[str, int], Path] = field(default_factory=dict)
     predictions: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
     embeddings: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
-    sections: Mapping[str, dict] = field(default_factory=dict)
+    settings: Mapping[str, dict] = field(default_factory=dict)
+
+    def section(self, name: str) -> dict:
+        """Return a section of the settings; an absent one is empty."""
+        return self.settings.get(name) or {}
 
     def uncertainty(self) -> UncertaintySettings:
         """Return the settings of Monte-Carlo ICP under fixed knobs."""
-        runs = {name: value for name, value in self.sections["uncertainty"].items() if name != "samples"}
-        return UncertaintySettings(**runs, icp=ICPSettings(**self.sections["icp"]))
+        runs = {name: value for name, value in self.section("uncertainty").items() if name != "samples"}
+        return UncertaintySettings(**runs, icp=ICPSettings(**self.section("icp")))
 
     def in_distribution(self) -> Iterator[tuple[str, int, ShiftedSets, Registrations]]:
         """Yield source, seed, sets, and the samples like the training's with their embeddings attached."""

@@ -42,7 +42,7 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
         for reading in progress(readings, f"starts of the GPC on {source}, seed {seed}"):
             for kernel, rate, iterations in FITTED:
                 schedule = {"kernel": kernel, "learning_rate": rate, "iterations": iterations}
-                settings = GPCSettings(**given.sections["gpca_paper"] | schedule)
+                settings = GPCSettings(**given.section("gpca_paper") | schedule)
                 # A polynomial kernel has no lengthscale.
                 relevant = {k: v for k, v in reading.items() if kernel != "polynomial" or k != "lengthscale"}
                 key = (kernel, rate, iterations, *relevant.values())

@@ -99,5 +99,5 @@ def passes(
 
 
 def _base(given: Given) -> tuple[ActiveLearningSettings, float]:
-    section = given.sections["active_learning"]
+    section = given.section("active_learning")
     return ActiveLearningSettings.from_dict(section), section["target"]

@@ -30,7 +30,7 @@ def kernel(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> I
         distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         for name in dict.fromkeys(reading["kernel"] for reading in readings):
             of_kernel = {reading["iterations"]: reading for reading in readings if reading["kernel"] == name}
-            settings = GPCSettings(**{**given.sections["gpca_paper"], "kernel": name})
+            settings = GPCSettings(**{**given.section("gpca_paper"), "kernel": name})
             gpc = GPC(CONCEPTS, settings, source, seed)
             for iterations in gpc.fit_up_to(of_kernel, train.embedding, train.concept):
                 scores_S_C, _, _ = gpc.attribute(test.embedding)
@@ -80,13 +80,13 @@ def encoder_head(given: Given, readings: Sequence[Reading], sizes: ReadingSizes)
         of_heads = {"linear": registrations}
         if number < sizes.encoders:
             clouds = Registrations.load(given.registrations[source, seed], (source, seed))
-            settings = EncoderSettings(**{**given.sections["encoder"], "head": "two_layer"})
+            settings = EncoderSettings(**{**given.section("encoder"), "head": "two_layer"})
             model, _ = train_encoder(clouds, source, seed, settings)
             h_S_d, _ = embed(model, clouds, source, seed, settings)
             of_heads["two_layer"] = replace(clouds, attached={"embedding": h_S_d})
         for head, embedded in of_heads.items():
             train, test = (embedded.subset(embedded.rows(split)) for split in ("train", "test"))
-            gpc = GPC(CONCEPTS, GPCSettings(**given.sections["gpca_paper"]), source, seed)
+            gpc = GPC(CONCEPTS, GPCSettings(**given.section("gpca_paper")), source, seed)
             gpc.fit(train.embedding, train.concept)
             trees = forest(source, seed)
             trees.fit(train)
