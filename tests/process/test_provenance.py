@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from gpca import __version__, provenance
+from gpca import __version__
+from gpca.process import provenance
 from gpca.process.processor import describe
 from gpca.process.provenance import record_provenance, sha256_of_settings
 
