@@ -37,7 +37,7 @@ pathvars:
 
 TOPICS = (
     "common functions objects registrations methods causes estimators frames virtual_frames frame_causes encoders "
-    "uncertainty explainers active_learning diagnostics controls model recovery"
+    "uncertainty explainers active_learning diagnostics model recovery"
 )
 RULES = Path(workflow.current_basedir, "workflow/rules")
 EXPERIMENTS = [

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 from gpca.config.checks.estimators import check_estimators
 from gpca.config.checks.explainers import (
-    check_controls,
     check_diagnosis,
     check_encoders,
     check_explainers,
@@ -77,7 +76,6 @@ def check(config: dict) -> dict[str, dict]:
     check_diagnosis(whole)
     check_strategies(whole)
     check_learners(whole)
-    check_controls(whole)
     for experiment in experiments():
         experiment.check(whole, lambda key: names_left_out(config, key))
     check_tolerances(whole)

@@ -18,7 +18,7 @@ from gpca.recovery.policies import ALWAYS, POLICIES
 LEAVABLE_OF_EXPERIMENTS = {key: names for each in experiments() for key, names in each.leavable.items()}
 # Mappings of which any entry may be false.
 LEAVABLE = (
-    *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
+    *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners"),
     *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
     "readings.groups",
     *LEAVABLE_OF_EXPERIMENTS,
@@ -63,7 +63,7 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     gone = left_out["encoders"]
     _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    for key in ("explainers", "controls.explainers", *EXPLAINED):
+    for key in ("explainers", *EXPLAINED):
         _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
     acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
     reading = {name for name, entry in POLICIES.items() if entry.explainer in without}

@@ -13,15 +13,13 @@ from baselines.registry import CAUSES, explainer_entry
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.alignment.methods.registry import installed, left_out, method_entry
-from gpca.experiments.controls.settings import TRANSFER, UNSEEN
 from gpca.experiments.kernel_grid.tables import PRINTED
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
 from gpca.experiments.registry import experiments
 from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.explainers.interface import BARE
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
-from gpca.objects.title import stand_in_clause, title_of
+from gpca.objects.title import title_of
 from gpca.recovery.policies import policy_entry
 from gpca.uncertainty.estimators.registry import estimator_entry
 
@@ -44,11 +42,6 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "estimator": list(config["estimators"]),
         "explainer": list(config["explainers"]),
         "cause_explainer": list(config["diagnosis"]["explainers"]),
-        "control_seed": controlled_seeds(config),
-        "control": list(config["controls"]["controls"]),
-        "control_encoder": _compared_encoders(config["controls"]),
-        "timed_control": [name for name in config["controls"]["explainers"] if explainer_entry(name).reads == BARE],
-        "transfer_source": list(sources) if transfers(config, sources) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
         "strategy": strategies,
@@ -128,9 +121,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
         "explainer_titles": explainers,
         "cause_explainers": {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]},
-        "control_explainers": {name: explainer_entry(name).title for name in config["controls"]["explainers"]},
-        "controls": list(config["controls"]["controls"]),
-        "controls_title": _title_of_all(shown),
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": learners,
         "strategies": strategies,
@@ -193,25 +183,9 @@ def _title_of_pose(settings: Mapping) -> str:
     )
 
 
-def _title_of_all(sources: Mapping[str, Mapping]) -> str:
-    """Return the titles of all sources, and whether there are stand-ins among them."""
-    titles = ", ".join(entry["title"] for entry in sources.values())
-    return titles + stand_in_clause(sources.values())
-
-
-def controlled_seeds(config: Mapping) -> list[int]:
-    """Return the seeds for which the controls are run."""
-    return list(config["seeds"])[: config["controls"]["seeds"]]
-
-
 def new_concept_seeds(config: Mapping) -> list[int]:
     """Return the seeds for which new concepts are learned where no encoder has seen them."""
     return list(config["seeds"])[: config["new_concepts"]["seeds"]]
-
-
-def transfers(config: Mapping, sources: Mapping) -> bool:
-    """Return whether explainers are asked about sources that they did not learn from; one alone admits no transfer."""
-    return TRANSFER in config["controls"]["controls"] and len(sources) > 1
 
 
 def reading_groups(config: Mapping) -> list[str]:
@@ -219,12 +193,6 @@ def reading_groups(config: Mapping) -> list[str]:
     groups, frames = config["readings"]["groups"], config["real_world"]
     trains = config["readings"]["frame_seeds"] and "none" in frames["reductions"]
     return [name for name in groups if name != FRAME_INPUT or trains]
-
-
-def _compared_encoders(controls: Mapping) -> list[str]:
-    """Return the ways to train GP-CA's encoder that are compared, on the samples that the unseen objects need."""
-    of_gpca = any(name in GPCA_FORMS for name in controls["explainers"])
-    return list(controls["encoders"]) if of_gpca and UNSEEN in controls["controls"] else []
 
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:

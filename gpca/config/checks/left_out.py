@@ -35,7 +35,6 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "estimator_pairs.methods": ("registration method", methods()),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
-        "controls.explainers": ("explainer", explainers()),
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
         "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
         "recovery.actions": ("action", ACTIONS),
