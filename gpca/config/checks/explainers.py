@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
+from baselines.registry import explainer_entry, require_settings
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
@@ -39,13 +39,6 @@ def check_registrations(config: dict) -> None:
         if size > LARGEST_BYTES:
             fault = f"{samples} samples take {size / 2**30:.0f} GiB of points, all held by one job"
             raise InputError(f"config key {section}.train", fault, f"use fewer or lower {key}")
-
-
-def check_diagnosis(config: dict) -> None:
-    """Check the encoder and the explainers of causes."""
-    with_key("diagnosis.encoder.backbone", require_backbone, config["diagnosis"]["encoder"]["backbone"])
-    for name, settings in config["diagnosis"]["explainers"].items():
-        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
 
 
 def check_encoders(config: dict, left_out: Set[str]) -> None:
