@@ -163,8 +163,9 @@ def schema_text() -> str:
     """Return the schema file's text."""
     whole = schema_of(Config)
     for experiment in experiments():
-        whole["required"].append(experiment.name)
-        whole["properties"][experiment.name] = _section_of(experiment)
+        for name, settings in experiment.sections.items():
+            whole["required"].append(name)
+            whole["properties"][name] = _section_of(experiment, name, settings)
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Configuration of GP-CA Bench",
@@ -176,9 +177,9 @@ def schema_text() -> str:
     )
 
 
-def _section_of(experiment: Experiment) -> dict[str, Any]:
-    section = schema_of(experiment.settings, COMPLETE)
-    if experiment.explainers:
+def _section_of(experiment: Experiment, name: str, settings: Any) -> dict[str, Any]:
+    section = schema_of(settings, COMPLETE)
+    if f"{name}.explainers" in experiment.leavable:
         section["required"].append("explainers")
         section["properties"]["explainers"] = schema_of(EXPLAINED)
     return section

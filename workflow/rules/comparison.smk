@@ -11,7 +11,7 @@ COLLECTED = [
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
     *("readings.csv", "new_concepts.csv"),
-    *(experiment.tidy for experiment in experiments() if experiment.is_run(NAMES)),
+    *(name for each in experiments() if each.is_run(NAMES) for name in each.tidy),
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

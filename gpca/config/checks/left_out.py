@@ -20,6 +20,9 @@ def check_left_out(config: dict) -> None:
     """Check the names that are false; sources, encoders and datasets may have any name."""
     for key, (noun, known) in _known().items():
         require_names(key, sorted(names_left_out(config, key)), known, noun)
+    for experiment in experiments():
+        for key, names in {**experiment.leavable, **experiment.switches}.items():
+            require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
 
 
 def _known() -> dict[str, tuple[str, Collection[str]]]:
@@ -33,7 +36,6 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
         "controls.explainers": ("explainer", explainers()),
-        **{f"{each.name}.explainers": ("explainer", explainers()) for each in experiments() if each.explainers},
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
         "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
         "recovery.actions": ("action", ACTIONS),

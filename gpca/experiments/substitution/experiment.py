@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import Experiment
+from gpca.experiments.experiment import EXPLAINERS, Experiment
 from gpca.experiments.substitution.settings import ExchangeSettings
 
 # What these functions import inside loads numba, and this module is loaded by every command.
@@ -74,12 +74,12 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="exchange",
     summary="registrations -> explanations based on other registration methods and estimators",
-    settings=Section,
-    tidy="exchange.csv",
     folder="substitution",
+    sections={"exchange": Section},
+    tidy=("exchange.csv",),
     names=names,
     shown=shown,
     check=check,
-    lists={"sources": "sources", "methods": "methods", "estimators": "estimators"},
-    explainers=True,
+    leavable={"exchange.explainers": EXPLAINERS},
+    lists={f"exchange.{name}": name for name in ("sources", "methods", "estimators")},
 )
