@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import fields
 
 from baselines.registry import explainers
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.alignment.methods.registry import methods
 from gpca.config.leave_out import names_left_out
+from gpca.config.schema import DESIGNS
+from gpca.config.sections import Reductions
 from gpca.errors import require_names
 from gpca.experiments.registry import experiments
 from gpca.recovery.actions import ACTIONS
 from gpca.recovery.policies import ALWAYS, POLICIES
-from gpca.settings import load_schema
 from gpca.uncertainty.estimators.registry import estimators
 
 
@@ -23,10 +25,9 @@ def check_left_out(config: dict) -> None:
 
 
 def _known() -> dict[str, tuple[str, Collection[str]]]:
-    sections = load_schema()["properties"]
     return {
-        "reductions": ("reduction", sections["reductions"]["properties"]),
-        "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
+        "reductions": ("reduction", [field.name for field in fields(Reductions)]),
+        "uncertainty": ("uncertainty", DESIGNS),
         "methods": ("registration method", methods()),
         "estimators": ("estimator", estimators()),
         "estimator_pairs.methods": ("registration method", methods()),

@@ -6,17 +6,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import Experiment
+from gpca.experiments.experiment import Experiment, Explained
 from gpca.experiments.substitution.settings import ExchangeSettings
+from gpca.settings import Distinct
 
 # What these functions import inside loads numba, and this module is loaded by every command.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section(ExchangeSettings):
-    """The settings, and the sources whose registrations are explained."""
+    """The settings, the sources whose registrations are explained, and the explainers."""
 
-    sources: tuple[str, ...]
+    sources: Distinct[str]
+    explainers: Explained
 
 
 def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
@@ -24,7 +26,6 @@ def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
     from baselines.registry import require_settings
     from gpca.errors import require_names, with_key
     from gpca.experiments.substitution.asked import require_exchangeable
-    from gpca.settings import check_settings
 
     exchange = config["exchange"]
     for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
@@ -33,7 +34,6 @@ def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
         key = f"exchange.explainers.{name}"
         own = (config["explainers"].get(name) or {}) | (settings or {})
         with_key(key, require_settings, name, own)
-        with_key(key, check_settings, own, "explainers", name)
         with_key(key, require_exchangeable, name)
 
 
