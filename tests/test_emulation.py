@@ -10,7 +10,7 @@ import pytest
 
 from gpca.code_files import ROOT
 
-from .test_processor import needs_the_level
+from .process.test_processor import needs_the_level
 
 QEMU = shutil.which("qemu-x86_64")
 PROGRAM = (

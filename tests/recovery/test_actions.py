@@ -6,9 +6,9 @@ from gpca.errors import InputError
 from gpca.experiments.recovery.cases import RobotIn, register_after, register_held
 from gpca.recovery import actions
 from gpca.recovery.actions import ACTIONS, action_of, best_start
+from tests.failures import LOOP
 
 from ..documents import block
-from .conftest import LOOP
 
 ICP = LOOP.icp
 

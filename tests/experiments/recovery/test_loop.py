@@ -13,7 +13,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import POLICIES, Means
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
-from tests.recovery.conftest import LOOP
+from tests.failures import LOOP
 
 
 def stub(concept):

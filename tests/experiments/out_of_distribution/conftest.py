@@ -1,4 +1,4 @@
-"""What tests of several tables share."""
+"""Diagnostics of learners that tests of several tables share."""
 
 import pandas as pd
 import pytest

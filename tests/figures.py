@@ -1,4 +1,4 @@
-"""What tests of the page and of the method's figures share."""
+"""What tests of figures and of the page share."""
 
 import numpy as np
 import pytest

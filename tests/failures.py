@@ -9,7 +9,7 @@ from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import Shelf, Situations, SituationSettings
 from gpca.recovery.settings import LoopSettings
 
-from ..frames.tiny import scene_settings, surfaces
+from .frames.tiny import scene_settings, surfaces
 
 LOOP = LoopSettings(failures=1, tries=12, budget=3, cloud_points=400)
 
