@@ -1,11 +1,6 @@
 """Settings: what the types of a settings class, or of a function's arguments, allow. pydantic checks them.
 
-A settings class is a frozen dataclass whose fields say in their types what values they take::
-
-    @dataclass(frozen=True)
-    class Rounds:
-        batch: Annotated[int, Bounds(minimum=2)]
-        kernels: Distinct[Kernel]
+A settings class is a frozen dataclass with fields such as ``batch: Annotated[int, Bounds(minimum=2)]``.
 """
 
 from __future__ import annotations
@@ -139,9 +134,9 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
 
     adapter: TypeAdapter = _adapter(kind)  # type: ignore[arg-type]
     try:
-        return adapter.validate_json(json.dumps([settings]))[0]
+        return adapter.validate_json(json.dumps([settings], default=repr))[0]
     except ValidationError as fault:
-        raise _input_error(fault.errors(include_url=False), settings, adapter, subject) from None
+        raise _input_error(fault.errors(), settings, adapter, subject) from None
 
 
 def require_arguments(subject: str, function: Callable, given: int, settings: Mapping[str, object]) -> None:
@@ -168,10 +163,8 @@ def _settings_of_arguments(function: Callable, given: int) -> Any:
 def _arguments(function: Callable, given: int) -> tuple[dict[str, Any], set[str], bool]:
     """Return the types of the arguments after the first, those without a default, and whether these are all."""
     bound, plain = (function.keywords, function.func) if isinstance(function, partial) else ({}, function)
-    hints = get_type_hints(
-        plain.__init__ if isclass(plain) and not is_dataclass(plain) else plain,
-        include_extras=True,
-    )
+    made = isclass(plain) and not is_dataclass(plain)
+    hints = get_type_hints(plain.__init__ if made else plain, include_extras=True)
     kinds: dict[str, Any] = {}
     others: dict[str, Any] = {}
     required, closed = set(), True
@@ -266,48 +259,32 @@ def check_settings(settings: Mapping, *section: str) -> None:
 
     from pydantic import ValidationError
 
-    config = import_module("gpca.config.schema").whole_config()
+    adapter = _adapter(import_module("gpca.config.schema").whole_config())
     whole: Any = settings
     for key in reversed(section):
         whole = {key: whole}
     try:
-        _adapter(config).validate_json(json.dumps([whole]))
+        adapter.validate_json(json.dumps([whole]))
     except ValidationError as invalid:
-        inside: list[Any] = [
-            {**fault, "loc": (0, *fault["loc"][len(section) + 1 :])}
-            for fault in invalid.errors(include_url=False)
-            if fault["loc"][1 : len(section) + 1] == section
-            and fault["type"] != "missing"
-            and "[key]" not in fault["loc"]
-        ]
-        if inside:
-            raise _input_error(inside, settings, _adapter(config), "setting") from None
+        faults = [fault for fault in invalid.errors() if fault["loc"][1 : len(section) + 1] == section]
+        if faults := [fault for fault in faults if not {fault["type"], *fault["loc"]} & {"missing", "[key]"}]:
+            raise _input_error(faults, whole, adapter, "setting") from None
 
 
 def checked_sections(
     settings: Mapping[str, dict], sections: Mapping[str, tuple[str, ...]], by_name: Collection[str] = ()
 ) -> dict[str, dict]:
-    """Return the parts of ``--settings`` by name, each checked like a section of the config; what is absent is empty.
-
-    Args:
-        settings: name -> part.
-        sections: name -> path of the section.
-        by_name: further parts, which are for :func:`checked_by_name`.
-    """
-    known = (*sections, *by_name)
-    if unknown := set(settings) - set(known):
-        raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"choose one of {', '.join(known)}")
-    given = {name: settings.get(name) or {} for name in known}
+    """Return the parts of ``--settings`` by name, each checked like a section of the config; absent ones are empty."""
+    given = {name: settings.get(name) or {} for name in (*sections, *by_name)}
     for name, section in sections.items():
         check_settings(given[name], *section)
     return given
 
 
 def checked_by_name(
-    given: dict[str, Any], section: str, names: Collection[str], require: Callable[[str, Mapping], None]
+    given: dict[str, Any], _section: str, names: Collection[str], require: Callable[[str, Mapping], None]
 ) -> dict[str, dict]:
     """Return the settings of each of the names, none for those that a section of the config does not give."""
-    given = given or dict.fromkeys(names)
     for name in (*given, *names):
         require(name, given.get(name) or {})
     return {name: given.get(name) or {} for name in names}
@@ -315,8 +292,6 @@ def checked_by_name(
 
 def checked_with_icp(settings: Mapping[str, Any], *section: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return ``--settings`` that are a section of the config, and those of ICP, which they hold under ``icp``."""
-    given = dict(settings)
-    icp = given.pop("icp", {})
+    given = {name: value for name, value in settings.items() if name != "icp"}
     check_settings(given, *section)
-    check_settings(icp, "registrations", "icp")
-    return given, icp
+    return given, settings.get("icp", {})

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.published import UNITS
+from gpca.comparison.reference import Allowance
 from gpca.comparison.verdicts import Tolerance
 from gpca.config import sections
 from gpca.config.robot_sections import RealWorld, Recovery
@@ -100,7 +101,7 @@ class Sections:
     runtime: sections.Runtime
     recovery: Recovery
     comparison: Comparison
-    reference: sections.Reference
+    reference: Allowance
     figures: sections.Figures
     sources: Annotated[dict[Name, NamedSource], Field(min_length=1)]
 

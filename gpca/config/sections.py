@@ -18,10 +18,8 @@ from gpca.settings import (
     Count,
     Distinct,
     Keys,
-    NotNegative,
     OpenShare,
     PositiveShare,
-    Share,
     changes_of,
     read_settings,
 )
@@ -136,26 +134,3 @@ class Figures:
     """The source that the figures of one registration show."""
 
     source: str
-
-
-@dataclass(frozen=True)
-class ReferenceTolerances:
-    """What a mean over the seeds may differ by, by kind of quantity."""
-
-    share: NotNegative
-    percent: NotNegative
-    correlation: NotNegative
-    nats: NotNegative
-    degrees: NotNegative
-    count: NotNegative
-
-
-@dataclass(frozen=True)
-class Reference:
-    """How a run is compared with a reference run."""
-
-    half_widths: NotNegative
-    flipped: Share
-    deviations: NotNegative
-    ratio: Share
-    tolerances: ReferenceTolerances
