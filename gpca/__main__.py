@@ -52,7 +52,7 @@ STEPS = {
     "check-config": "configs -> whether a run can use them",
     "check-reference": "folder of a run -> whether its numbers agree with the reference",
 }
-EXPERIMENTS = {experiment.name: experiment for experiment in experiments()}
+EXPERIMENTS = {experiment.name: experiment for experiment in experiments() if experiment.summary}
 STEPS |= {name: experiment.summary for name, experiment in EXPERIMENTS.items()}
 _IN = "gpca.experiments."
 MODULES = {

@@ -5,31 +5,31 @@ A config that is laid over another can add to its mappings but take nothing away
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 from baselines.registry import explainers
 from gpca.errors import InputError
+from gpca.experiments.experiment import EXPLAINERS, LeftOut
 from gpca.experiments.registry import experiments
-from gpca.recovery.policies import ALWAYS, POLICIES
 
-EXPLAINED = tuple(f"{each.name}.explainers" for each in experiments() if each.explainers)
+LEAVABLE_OF_EXPERIMENTS = {key: names for each in experiments() for key, names in each.leavable.items()}
 # Mappings of which any entry may be false.
 LEAVABLE = (
-    *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
-    *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
-    "readings.groups",
-    *EXPLAINED,
+    *("sources", "encoders", "reductions", "uncertainty", "explainers", "learners", "readings.groups"),
+    *LEAVABLE_OF_EXPERIMENTS,
 )
+EXPLAINED = [key for key, names in LEAVABLE_OF_EXPERIMENTS.items() if names is EXPLAINERS]
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
-SWITCHES = ("active_learning.strategies", "recovery.policies")
-# Lists that lose the names of what is left out elsewhere: the list's key, and that of the mapping.
-LISTED = {
+SWITCHES = (
+    "active_learning.strategies",
+    *(key for each in experiments() for key in each.switches),
+)
+# Lists and mappings that lose the names of what is left out elsewhere: the key, and that of the other mapping.
+LISTED: dict[str, str | Callable[[LeftOut], Collection[str]]] = {
     "kernel_grid.sources": "sources",
-    **{f"{each.name}.{key}": mapping for each in experiments() for key, mapping in each.lists.items()},
-    "real_world.backbones": "encoders",
-    "real_world.condition_backbones": "encoders",
-    "real_world.reductions": "reductions",
+    **{key: names for each in experiments() for key, names in each.lists.items()},
 }
 
 
@@ -49,19 +49,13 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     for key in SWITCHES:
         _change(whole, key, lambda switches, key=key: list(_names_switched_on(key, switches)))
     for key, of in LISTED.items():
-        _change(
-            whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone] or names, list
-        )
+        gone = left_out[of] if isinstance(of, str) else of(lambda key: names_left_out(config, key))
+        _change(whole, key, partial(_without, gone=gone), (list, dict))
     if left_out["real_world.datasets"] and not _at(whole, "real_world.datasets"):
         _change(whole, "real_world.virtual", lambda _frames: None)  # no models are left to render
-    gone = left_out["encoders"]
-    _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    for key in ("explainers", "controls.explainers", *EXPLAINED):
+    for key in ("explainers", *EXPLAINED):
         _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
-    acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
-    reading = {name for name, entry in POLICIES.items() if entry.explainer in without}
-    _change(whole, "recovery.policies", lambda names: [n for n in names if n not in acting | reading], list)
     return whole
 
 
@@ -90,7 +84,14 @@ def _at(config: Mapping[str, Any], key: str) -> Any:
     return found
 
 
-def _change(config: dict[str, Any], key: str, change, kind: type = dict) -> None:
+def _without(names: list | dict, gone: Collection[str]) -> list | dict:
+    """Return what is left of a list or mapping; a list of nothing else stays."""
+    if isinstance(names, dict):
+        return {name: entry for name, entry in names.items() if name not in gone}
+    return [name for name in names if name not in gone] or names
+
+
+def _change(config: dict[str, Any], key: str, change, kind: type | tuple[type, ...] = dict) -> None:
     """Replace what is at the key by what `change` makes of it, in copies of the sections on the way."""
     *path, last = key.split(".")
     if not isinstance(_at(config, key), kind):

@@ -109,5 +109,5 @@ class Sections:
 @cache
 def whole_config() -> type:
     """Return the settings class of a config."""
-    own = [(experiment.name, experiment.settings, field()) for experiment in experiments()]
+    own = [(name, kind, field()) for experiment in experiments() for name, kind in experiment.sections.items()]
     return make_dataclass("Config", own, bases=(Sections,), frozen=True, kw_only=True)

@@ -47,6 +47,7 @@ class Result:
         only: name of a list -> those of its members that are shown.
         needs: names that must not be empty, besides those of the inputs.
         paper: it is a table or figure of the paper.
+        after: name of the result of another experiment below which it stands in their section.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Result:
     only: Mapping[str, tuple[str, ...]]
     needs: tuple[str, ...]
     paper: bool
+    after: str = ""
 
     @property
     def modules(self) -> list[str]:
@@ -219,6 +221,7 @@ def _result(section: str, entry: Mapping) -> Result:
         only={key: tuple(members) for key, members in entry.get("only", {}).items()},
         needs=tuple(entry.get("needs", ())),
         paper=entry.get("paper", False),
+        after=entry.get("after", ""),
     )
 
 

@@ -7,35 +7,28 @@ from dataclasses import fields
 
 from baselines.registry import explainers
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
-from gpca.alignment.methods.registry import methods
 from gpca.config.leave_out import names_left_out
 from gpca.config.schema import DESIGNS
 from gpca.config.sections import Reductions
 from gpca.errors import require_names
 from gpca.experiments.registry import experiments
-from gpca.recovery.actions import ACTIONS
-from gpca.recovery.policies import ALWAYS, POLICIES
-from gpca.uncertainty.estimators.registry import estimators
 
 
 def check_left_out(config: dict) -> None:
     """Check the names that are false; sources, encoders and datasets may have any name."""
     for key, (noun, known) in _known().items():
         require_names(key, sorted(names_left_out(config, key)), known, noun)
+    for experiment in experiments():
+        for key, names in {**experiment.leavable, **experiment.switches}.items():
+            if names.known:
+                require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
 
 
 def _known() -> dict[str, tuple[str, Collection[str]]]:
     return {
         "reductions": ("reduction", [field.name for field in fields(Reductions)]),
         "uncertainty": ("uncertainty", DESIGNS),
-        "methods": ("registration method", methods()),
-        "estimators": ("estimator", estimators()),
-        "estimator_pairs.methods": ("registration method", methods()),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
-        "controls.explainers": ("explainer", explainers()),
-        **{f"{each.name}.explainers": ("explainer", explainers()) for each in experiments() if each.explainers},
         "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
-        "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
-        "recovery.actions": ("action", ACTIONS),
     }

@@ -33,8 +33,8 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="gradients",
     summary="registrations, encoder and embeddings -> what GP-CA's scores respond to: saliency maps and TCAV",
-    settings=GradientSettings,
-    tidy="gradients.csv",
+    sections={"gradients": GradientSettings},
+    tidy=("gradients.csv",),
     needs=("gradient_source",),
     names=names,
     shown=lambda config, _sources: {"gradients": config["gradients"]},

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import Experiment, Explained
+from gpca.experiments.experiment import EXPLAINERS, Experiment, Explained
 from gpca.experiments.substitution.settings import ExchangeSettings
 from gpca.settings import Distinct
 
@@ -23,17 +23,14 @@ class Section(ExchangeSettings):
 
 def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
     """Check the names; as under controls, an explainer's settings add to those that it has as an explainer."""
-    from baselines.registry import require_settings
     from gpca.errors import require_names, with_key
+    from gpca.experiments.explained import require_explained
     from gpca.experiments.substitution.asked import require_exchangeable
 
     exchange = config["exchange"]
     for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
         require_names(f"exchange.{key}", exchange[key], config[key], noun, left_out(key))
-    for name, settings in exchange["explainers"].items():
-        key = f"exchange.explainers.{name}"
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(key, require_settings, name, own)
+    for key, name in require_explained(config, "exchange.explainers"):
         with_key(key, require_exchangeable, name)
 
 
@@ -74,12 +71,12 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="exchange",
     summary="registrations -> explanations based on other registration methods and estimators",
-    settings=Section,
-    tidy="exchange.csv",
     folder="substitution",
+    sections={"exchange": Section},
+    tidy=("exchange.csv",),
     names=names,
     shown=shown,
     check=check,
-    lists={"sources": "sources", "methods": "methods", "estimators": "estimators"},
-    explainers=True,
+    leavable={"exchange.explainers": EXPLAINERS},
+    lists={f"exchange.{name}": name for name in ("sources", "methods", "estimators")},
 )
