@@ -78,12 +78,12 @@ def check(config: dict) -> dict[str, dict]:
     check_strategies(whole)
     check_learners(whole)
     check_controls(whole)
-    for experiment in experiments():
-        experiment.check(whole, lambda key: names_left_out(config, key))
     check_tolerances(whole)
     check_real_world(whole, encoders)
     check_recovery(whole, actions, designs, sources)
     check_sizes(whole)
+    for experiment in experiments():
+        experiment.check(whole, lambda key: names_left_out(config, key))
     resolved = resolve_sources(whole)
     check_named_sources(whole, sources, encoders)
     return resolved

@@ -26,7 +26,6 @@ LEAVABLE = (
 EXPLAINED = [key for key, names in LEAVABLE_OF_EXPERIMENTS.items() if names is EXPLAINERS]
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
 SWITCHES = (
-    "active_learning.strategies",
     "recovery.policies",
     *(key for each in experiments() for key in each.switches),
 )

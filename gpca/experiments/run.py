@@ -10,7 +10,6 @@ from pathlib import PurePath
 from typing import Any
 
 from baselines.registry import CAUSES, explainer_entry
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.alignment.methods.registry import installed, left_out, method_entry
 from gpca.experiments.controls.settings import TRANSFER, UNSEEN
@@ -35,7 +34,6 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """
     frames, kernels = config["real_world"], config["kernel_grid"]
     backbones = names_of_backbones(frames)
-    strategies = list(config["active_learning"]["strategies"])
     return {
         "source": list(sources),
         "seed": list(config["seeds"]),
@@ -51,12 +49,10 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "transfer_source": list(sources) if transfers(config, sources) else [],
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
-        "strategy": strategies,
         "new_concept_strategy": list(NEW_CONCEPT_STRATEGIES),
         "erring": list(config["new_concepts"]["erring"]),
         "new_concept_seed": new_concept_seeds(config),
         "frame_label_seed": list(config["seeds"])[: config["frame_labels"]["seeds"]],
-        "pool_strategy": [name for name in strategies if name in STRATEGIES],
         "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
         "shown_source": config["figures"]["source"],
         "reading_group": reading_groups(config),
@@ -91,13 +87,11 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     first_reduction = next(iter(frames["reductions"]))
     explainers = {name: entry.title for name, entry in entries.items()}
     learners = {name: explainer_entry(name).title.removesuffix(" on the embedding") for name in config["learners"]}
-    strategies = {
-        name: STRATEGIES[name].title if name in STRATEGIES else STREAMS[name] for name in learning["strategies"]
-    }
+    own = {name: value for each in experiments() for name, value in each.shown(config, sources).items()}
     return {
         "sources": shown,
         "compared_sources": {**shown, REAL_WORLD: of_frames, ONE_ENCODER: of_frames, "model": of_model},
-        "compared_titles": learners | strategies | explainers,
+        "compared_titles": learners | own["strategies"] | explainers,
         "source_titles": {name: title_of(entry) for name, entry in shown.items()},
         "shown_title": title_of(shown[config["figures"]["source"]]),
         "source_datasets": datasets,
@@ -133,8 +127,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "controls_title": _title_of_all(shown),
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": learners,
-        "strategies": strategies,
-        "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
         "reading_groups": {name: GROUPS[name].title for name in reading_groups(config)},
         "new_concepts": {
             **learning,
@@ -146,7 +138,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "frame_labels": {**learning, **config["frame_labels"], "train": frames["train"], "test": frames["test"]},
         "unreduced_methods": unreduced_methods(frames),
         "frame_encoders": {name: encoder_title(name, "none") for name in frames["backbones"]},
-        "target": learning["target"],
         "test_samples": config["registrations"]["test"],
         "kernel_sources": of_grid,
         "kernel_source_titles": {name: title_of(entry) for name, entry in of_grid.items()},
@@ -158,7 +149,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "recovery_title": f"Tables of the virtual camera, {title_of(shown[recovery['objects']])}",
         "treatments": recovery["treatments"],
         "budget": recovery["loop"]["budget"],
-        **{name: value for each in experiments() for name, value in each.shown(config, sources).items()},
+        **own,
     }
 
 

@@ -7,7 +7,7 @@ from gpca.comparison.published import read_published
 from gpca.experiments.registry import experiments
 
 COLLECTED = [
-    *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
+    *("metrics.csv", "timings.csv", "real_world.csv"),
     *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
     *("registration_methods.csv", "estimators.csv", "controls.csv"),
     *("readings.csv", "new_concepts.csv"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from baselines.registry import explainers
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.alignment.methods.registry import methods
 from gpca.config.leave_out import names_left_out
 from gpca.errors import require_names
@@ -36,7 +35,6 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
         "controls.explainers": ("explainer", explainers()),
-        "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
         "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
         "recovery.actions": ("action", ACTIONS),
     }
