@@ -1,5 +1,7 @@
 """What tests of figures and of the page share."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -75,31 +77,45 @@ def write_uncertainties(path, registrations):
 
 
 @pytest.fixture
-def figures(monkeypatch):
-    """Keep every figure that is drawn, in place of its PNG."""
-    from gpca.reporting.figures import style
+def same_bytes(tmp_path):
+    """Check that a figure that is drawn twice is the same files, and return its pixels."""
+    from gpca.io.files import read_image
+    from gpca.reporting.figures.style import save_figure
 
-    kept = []
-    monkeypatch.setattr(style, "save_png", lambda figure, path: kept.append(figure))
-    yield kept
-    import matplotlib.pyplot as plt
+    def pixels(draw):
+        files = []
+        for turn in "ab":
+            paths = [tmp_path / f"{turn}.{suffix}" for suffix in ("pdf", "png")]
+            save_figure(draw(), *paths)
+            files.append([path.read_bytes() for path in paths])
+        assert files[0] == files[1]
+        return read_image(paths[1], "")
 
-    plt.close("all")
+    return pixels
 
 
-@pytest.fixture
-def written(monkeypatch):
-    """Draw and return all words of the figure that was saved last, of its panels too."""
-    from gpca.reporting.figures import style
+def words_of(figure):
+    """Return all words of a figure, and of its panels."""
+    from matplotlib.text import Text
 
-    words = []
-    save_png = style.save_png
+    return [text.get_text() for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
 
-    def listening(figure, *args, **options):
-        from matplotlib.text import Text
 
-        words[:] = [text.get_text() for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
-        save_png(figure, *args, **options)
+def assert_words_are_large_enough_and_inside(figure):
+    from matplotlib.text import Text
 
-    monkeypatch.setattr(style, "save_png", listening)
-    return words
+    figure.draw_without_rendering()
+    for text in figure.findobj(Text):
+        if text.get_text() and text.get_visible():
+            assert text.get_fontsize() >= 7, text.get_text()
+            box, page = text.get_window_extent(), figure.bbox
+            assert box.x0 >= -1 and box.x1 <= page.width + 1, text.get_text()
+            assert box.y0 >= -1 and box.y1 <= page.height + 1, text.get_text()
+
+
+@pytest.fixture(autouse=True)
+def figures_closed():
+    """Matplotlib keeps every figure that a test draws."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gpca.config.checks.estimators import check_estimators
 from gpca.config.checks.explainers import (
-    check_controls,
-    check_diagnosis,
     check_encoders,
     check_explainers,
     check_learners,
@@ -15,11 +12,9 @@ from gpca.config.checks.explainers import (
     check_strategies,
     check_tolerances,
 )
-from gpca.config.checks.frames import check_real_world
+from gpca.config.checks.frames import check_frame_labels
 from gpca.config.checks.left_out import check_left_out
-from gpca.config.checks.methods import check_methods
 from gpca.config.checks.places import check_places
-from gpca.config.checks.recovery import check_recovery
 from gpca.config.checks.sizes import check_sizes
 from gpca.config.checks.sources import check_named_sources, resolve_sources
 from gpca.config.command_line import with_types
@@ -64,23 +59,16 @@ def check(config: dict) -> dict[str, dict]:
     require_plain(config, "config key")
     whole = without_false(config)
     require_valid(whole, load_schema(), "config key")
-    encoders, designs, sources, actions = (
-        names_left_out(config, key) for key in ("encoders", "uncertainty", "sources", "recovery.actions")
-    )
+    encoders, designs, sources = (names_left_out(config, key) for key in ("encoders", "uncertainty", "sources"))
     check_left_out(config)
     check_places(whole)
     check_registrations(whole)
     check_encoders(whole, encoders)
-    check_methods(whole, names_left_out(config, "methods"))
-    check_estimators(whole)
     check_explainers(whole, designs)
-    check_diagnosis(whole)
     check_strategies(whole)
     check_learners(whole)
-    check_controls(whole)
     check_tolerances(whole)
-    check_real_world(whole, encoders)
-    check_recovery(whole, actions, designs, sources)
+    check_frame_labels(whole)
     check_sizes(whole)
     for experiment in experiments():
         experiment.check(whole, lambda key: names_left_out(config, key))

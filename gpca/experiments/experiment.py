@@ -17,10 +17,15 @@ LeftOut = Callable[[str], set[str]]  # key of a mapping of the config -> names t
 
 @dataclass(frozen=True)
 class Names:
-    """The names that a mapping of the config may have: what they are names of, and a function that returns them."""
+    """The names that a mapping of the config may have.
+
+    Attributes:
+        noun: for what has such a name.
+        known: returns all of them; None where any name may stand.
+    """
 
     noun: str
-    known: Callable[[], Collection[str]]
+    known: Callable[[], Collection[str]] | None = None
 
 
 def _explainers() -> Collection[str]:

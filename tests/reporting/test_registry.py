@@ -26,9 +26,8 @@ def given(pattern, **fields):
 @pytest.mark.parametrize("name", ENTRIES)
 def test_every_builder_and_reader_takes_what_its_entry_gives(name):
     entry = ENTRIES[name]
-    paths = {"pdf_path", "png_path"} if entry.kind == "figures" else set()
     builder = inspect.signature(load(entry.builder))
-    builder.bind(**dict.fromkeys({each.argument for each in entry.inputs} | set(entry.settings) | paths))
+    builder.bind(**dict.fromkeys({each.argument for each in entry.inputs} | set(entry.settings)))
     for each in entry.inputs:
         if each.read:
             keywords = {key: None for key in each.files if key}

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
+from baselines.registry import explainer_entry, require_settings
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.controls.settings import ControlSettings
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import check_settings
 
@@ -41,13 +40,6 @@ def check_registrations(config: dict) -> None:
             raise InputError(f"config key {section}.train", fault, f"use fewer or lower {key}")
 
 
-def check_diagnosis(config: dict) -> None:
-    """Check the encoder and the explainers of causes."""
-    with_key("diagnosis.encoder.backbone", require_backbone, config["diagnosis"]["encoder"]["backbone"])
-    for name, settings in config["diagnosis"]["explainers"].items():
-        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
-
-
 def check_encoders(config: dict, left_out: Set[str]) -> None:
     """Check the backbones, and the encoder whose embeddings are explained."""
     for name, encoder in config["encoders"].items():
@@ -61,24 +53,6 @@ def check_explainers(config: dict, left_out: Set[str]) -> None:
         with_key(f"explainers.{name}", require_settings, name, settings or {})
         if design := explainer_entry(name).design:
             require_names(f"explainers.{name}", [design], config["uncertainty"], "uncertainty", left_out)
-
-
-def check_controls(config: dict) -> None:
-    """Check that the settings agree, and that every explainer takes its own and finds what it reads under a control.
-
-    As a learner's, its settings add to those that it has as an explainer.
-    """
-    controls = config["controls"]
-    with_key("controls", ControlSettings.from_dict, controls)
-    for name, settings in controls["explainers"].items():
-        key = f"controls.explainers.{name}"
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(key, require_settings, name, own)
-        with_key(key, check_settings, own, "explainers", name)
-        entry = explainer_entry(name)
-        if entry.design and not entry.observed_only:
-            fault = "needs more Monte-Carlo ICP than that of the observed pair, which is all that a control runs"
-            raise InputError(f"config key {key}", fault, "leave it out")
 
 
 def check_strategies(config: dict) -> None:

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from baselines.registry import explainers
-from gpca.alignment.methods.registry import methods
 from gpca.config.leave_out import names_left_out
 from gpca.errors import require_names
 from gpca.experiments.registry import experiments
-from gpca.recovery.actions import ACTIONS
-from gpca.recovery.policies import ALWAYS, POLICIES
 from gpca.settings import load_schema
-from gpca.uncertainty.estimators.registry import estimators
 
 
 def check_left_out(config: dict) -> None:
@@ -21,7 +17,8 @@ def check_left_out(config: dict) -> None:
         require_names(key, sorted(names_left_out(config, key)), known, noun)
     for experiment in experiments():
         for key, names in {**experiment.leavable, **experiment.switches}.items():
-            require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
+            if names.known:
+                require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
 
 
 def _known() -> dict[str, tuple[str, Collection[str]]]:
@@ -29,12 +26,6 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
     return {
         "reductions": ("reduction", sections["reductions"]["properties"]),
         "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
-        "methods": ("registration method", methods()),
-        "estimators": ("estimator", estimators()),
-        "estimator_pairs.methods": ("registration method", methods()),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
-        "controls.explainers": ("explainer", explainers()),
-        "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
-        "recovery.actions": ("action", ACTIONS),
     }

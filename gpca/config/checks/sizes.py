@@ -4,29 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gpca.encoders.reduction import make_reduction, require_room
-from gpca.encoders.settings import OPTIONS, EncoderSettings, require_draws
-from gpca.errors import InputError, with_key
+from gpca.encoders.settings import require_draws
+from gpca.errors import InputError
 
 
 def check_sizes(config: dict) -> None:
-    """Check components, neighbors and draws against the samples and the points that there will be."""
-    _check_reductions(config)
+    """Check neighbors and draws against the samples and the points that there will be."""
     _check_neighbours(config)
     for key, encoder, points, points_key in _encoders(config):
         require_draws(key, encoder, points, points_key)
-
-
-def _check_reductions(config: dict) -> None:
-    """Check the reductions of depth frames' embeddings; how long these are, only the suite's own backbones tell."""
-    section = config["real_world"]
-    for name in section["reductions"]:
-        reduction = make_reduction(name, config["reductions"].get(name) or {})
-        for backbone in section["backbones"] if reduction else ():
-            encoder = EncoderSettings(**config["encoders"][backbone])
-            options = OPTIONS.get(encoder.backbone)
-            size = options(**encoder.options).embedding_size if options else None
-            with_key(f"reductions.{name}", require_room, name, reduction, section["train"], size)
 
 
 def _check_neighbours(config: dict) -> None:
@@ -56,4 +42,3 @@ def _encoders(config: dict) -> Iterator[tuple[str, dict, int, str]]:
     for key in ("shift.encoder", "new_concepts.encoder"):
         section, name = key.split(".")
         yield key, explained | config[section][name], *cloud_points
-    yield "diagnosis.encoder", config["diagnosis"]["encoder"], config["causes"]["points"][1], "causes.points"

@@ -29,13 +29,13 @@ from gpca.reporting.figures.style import (
     TARGET_COLOUR,
     TEXT_WIDTH_IN,
     blues,
-    save_figure,
     write_title,
 )
 from gpca.reporting.words import object_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 # Above stands a sample of the first of these of which a registration failed, below the first that was held out.
 ORDER = ("overlap", "pose", "noise")
@@ -53,10 +53,8 @@ def draw_pipeline(
     title: str,
     encoder: str,
     active_learning: Mapping,
-    pdf_path: str | Path,
-    png_path: str | Path,
     dataset: str = "",
-) -> None:
+) -> Figure:
     """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
 
     Args:
@@ -69,7 +67,6 @@ def draw_pipeline(
         title: The title of the source.
         encoder: The name that the figure gives the encoder.
         active_learning: The config's section; the figure repeats the first round of the run.
-        pdf_path, png_path: The two files to write.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
@@ -93,7 +90,7 @@ def draw_pipeline(
     write_title(canvas.figure, f"{title}: {object_in_words(stages.predictions['object'][row], dataset)}")
     canvas.dot(6.15, 3.4, TARGET_COLOUR, r"target $\mathcal{Q}$", gap_in=0.05)
     canvas.dot(6.63, 3.4, SOURCE_COLOUR, r"source $\mathcal{P}$", gap_in=0.05)
-    save_figure(canvas.figure, pdf_path, png_path)
+    return canvas.figure
 
 
 def _curves(files: list[str | Path]) -> tuple[str, dict[str, pd.DataFrame]]:

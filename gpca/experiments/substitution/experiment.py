@@ -21,19 +21,14 @@ class Section(ExchangeSettings):
 
 def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
     """Check the names; as under controls, an explainer's settings add to those that it has as an explainer."""
-    from baselines.registry import require_settings
     from gpca.errors import require_names, with_key
+    from gpca.experiments.explained import require_explained
     from gpca.experiments.substitution.asked import require_exchangeable
-    from gpca.settings import check_settings
 
     exchange = config["exchange"]
     for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
         require_names(f"exchange.{key}", exchange[key], config[key], noun, left_out(key))
-    for name, settings in exchange["explainers"].items():
-        key = f"exchange.explainers.{name}"
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(key, require_settings, name, own)
-        with_key(key, check_settings, own, "explainers", name)
+    for key, name in require_explained(config, "exchange.explainers"):
         with_key(key, require_exchangeable, name)
 
 

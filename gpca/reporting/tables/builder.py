@@ -12,7 +12,7 @@ from gpca.attribution.metrics import mean_interval
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
-from gpca.reporting.words import plural
+from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -183,12 +183,6 @@ def interval_over(seeds: int | str) -> str:
     if most < LEAST_SEEDS:
         return f"with fewer than {LEAST_SEEDS} there is no interval and no bold"
     return INTERVAL if fewest >= LEAST_SEEDS else f"{INTERVAL} (none for fewer than {LEAST_SEEDS})"
-
-
-def span(numbers: Iterable[float]) -> str:
-    """Return the least and the largest of some whole numbers, such as ``15 to 200``, or the one that all are."""
-    distinct = sorted({int(number) for number in numbers})
-    return str(distinct[0]) if len(distinct) == 1 else f"{distinct[0]} to {distinct[-1]}"
 
 
 def missing_packages(left_out: Mapping[str, str]) -> list[str]:
