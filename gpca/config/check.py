@@ -68,11 +68,11 @@ def check(config: dict) -> dict[str, dict]:
     check_explainers(whole, designs)
     check_strategies(whole)
     check_learners(whole)
-    for experiment in experiments():
-        experiment.check(whole, lambda key: names_left_out(config, key))
     check_tolerances(whole)
     check_frame_labels(whole)
     check_sizes(whole)
+    for experiment in experiments():
+        experiment.check(whole, lambda key: names_left_out(config, key))
     resolved = resolve_sources(whole)
     check_named_sources(whole, sources, encoders)
     return resolved

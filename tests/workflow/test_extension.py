@@ -88,10 +88,10 @@ def test_a_strategy_and_an_encoder_of_the_docs_are_planned(project):
 
 
 def test_a_table_of_the_docs_is_a_function_and_an_entry(finished):
-    (finished.folder / "gpca/reporting/tables/abstentions.py").write_text(block("gpca/reporting/tables/abstentions.py"))
+    folder = "gpca/experiments/concept_attribution"
+    (finished.folder / f"{folder}/abstentions.py").write_text(block(f"{folder}/abstentions.py"))
     assert not finished.dry_run("all", *SMOKE).jobs
-    entry = block("gpca/reporting/results.yaml")
-    finished.append("gpca/reporting/results.yaml", entry)
+    finished.append(f"{folder}/results.yaml", block(f"{folder}/results.yaml"))
     assert finished.dry_run("all", *SMOKE).jobs == {"abstentions": 1, "page": 1}
 
     finished.snakemake("-j1", "abstentions", *SMOKE)

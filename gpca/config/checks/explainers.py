@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Set
 
 from baselines.registry import explainer_entry, require_settings
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
@@ -56,10 +55,8 @@ def check_explainers(config: dict, left_out: Set[str]) -> None:
 
 
 def check_strategies(config: dict) -> None:
-    """Check the names of the strategies, and that what is asked about new concepts agrees."""
+    """Check that what is asked about new concepts agrees."""
     with_key("new_concepts", NewConceptSettings.from_dict, config["new_concepts"])
-    names = config["active_learning"]["strategies"]
-    require_names("active_learning.strategies", names, {**STRATEGIES, **STREAMS}, "strategy")
 
 
 def check_learners(config: dict) -> None:

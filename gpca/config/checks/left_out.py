@@ -6,7 +6,6 @@ from collections.abc import Collection
 from dataclasses import fields
 
 from baselines.registry import explainers
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.config.leave_out import names_left_out
 from gpca.config.schema import DESIGNS
 from gpca.config.sections import Reductions
@@ -30,5 +29,4 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "uncertainty": ("uncertainty", DESIGNS),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
-        "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
     }
