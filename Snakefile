@@ -36,8 +36,8 @@ pathvars:
 
 
 TOPICS = (
-    "common functions objects registrations methods causes estimators frames virtual_frames frame_causes encoders "
-    "uncertainty explainers active_learning diagnostics controls model recovery"
+    "common functions objects registrations methods causes frames virtual_frames encoders "
+    "uncertainty explainers active_learning diagnostics model"
 )
 RULES = Path(workflow.current_basedir, "workflow/rules")
 EXPERIMENTS = [

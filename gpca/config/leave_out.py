@@ -13,30 +13,20 @@ from baselines.registry import explainers
 from gpca.errors import InputError
 from gpca.experiments.experiment import EXPLAINERS, LeftOut
 from gpca.experiments.registry import experiments
-from gpca.recovery.policies import ALWAYS, POLICIES
 
 LEAVABLE_OF_EXPERIMENTS = {key: names for each in experiments() for key, names in each.leavable.items()}
 # Mappings of which any entry may be false.
 LEAVABLE = (
-    *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
-    *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
-    "readings.groups",
+    *("sources", "encoders", "reductions", "uncertainty", "explainers", "learners", "readings.groups"),
     *LEAVABLE_OF_EXPERIMENTS,
 )
 EXPLAINED = [key for key, names in LEAVABLE_OF_EXPERIMENTS.items() if names is EXPLAINERS]
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
-SWITCHES = (
-    "active_learning.strategies",
-    "recovery.policies",
-    *(key for each in experiments() for key in each.switches),
-)
+SWITCHES = [key for each in experiments() for key in each.switches]
 # Lists and mappings that lose the names of what is left out elsewhere: the key, and that of the other mapping.
 LISTED: dict[str, str | Callable[[LeftOut], Collection[str]]] = {
     "kernel_grid.sources": "sources",
     **{key: names for each in experiments() for key, names in each.lists.items()},
-    "real_world.backbones": "encoders",
-    "real_world.condition_backbones": "encoders",
-    "real_world.reductions": "reductions",
 }
 
 
@@ -60,14 +50,9 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
         _change(whole, key, partial(_without, gone=gone), (list, dict))
     if left_out["real_world.datasets"] and not _at(whole, "real_world.datasets"):
         _change(whole, "real_world.virtual", lambda _frames: None)  # no models are left to render
-    gone = left_out["encoders"]
-    _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    for key in ("explainers", "controls.explainers", *EXPLAINED):
+    for key in ("explainers", *EXPLAINED):
         _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
-    acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
-    reading = {name for name, entry in POLICIES.items() if entry.explainer in without}
-    _change(whole, "recovery.policies", lambda names: [n for n in names if n not in acting | reading], list)
     return whole
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from gpca.errors import InputError
+from gpca.errors import InputError, with_key
 from gpca.pairs.reading import Reading
 from gpca.settings import Bounds, Count, PositiveShare, Share
 
@@ -104,6 +105,18 @@ class PointNeXtOptions(PointNetOptions):
     width: Count = 32
     radius: PositiveShare = 0.075
     neighbours: Count = 32
+
+
+def require_draws(key: str, encoder: Mapping[str, Any], points: int, points_key: str) -> None:
+    """Check an encoder's settings at a key of the config: it draws no more points than clouds have at most.
+
+    Args:
+        points: of a cloud, which the config has at `points_key`.
+    """
+    settings = with_key(key, lambda: EncoderSettings(**encoder))
+    if settings.draw_points > points:
+        fault = f"draws {settings.draw_points} points of clouds that have at most {points}"
+        raise InputError(f"config key {key}", fault, f"lower draw_points, or raise {points_key}")
 
 
 # Of the backbones whose options the config checks; any other checks its own, when it is made.

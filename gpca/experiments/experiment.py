@@ -9,18 +9,26 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field
+
+Explained = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings by explainer, which checks them itself
 ByRun = Callable[[Mapping[str, Any], Mapping[str, Mapping]], dict[str, Any]]  # of the config, and of its sources
 LeftOut = Callable[[str], set[str]]  # key of a mapping of the config -> names that the config leaves out of it
 
 
 @dataclass(frozen=True)
 class Names:
-    """The names that a mapping of the config may have: what they are names of, and a function that returns them."""
+    """The names that a mapping of the config may have.
+
+    Attributes:
+        noun: for what has such a name.
+        known: returns all of them; None where any name may stand.
+    """
 
     noun: str
-    known: Callable[[], Collection[str]]
+    known: Callable[[], Collection[str]] | None = None
 
 
 def _explainers() -> Collection[str]:

@@ -7,9 +7,7 @@ from gpca.comparison.published import read_published
 from gpca.experiments.registry import experiments
 
 COLLECTED = [
-    *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
-    *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
-    *("registration_methods.csv", "estimators.csv", "controls.csv"),
+    *("diagnostics.csv", "kernels.csv", "runtime.csv"),
     *("readings.csv", "new_concepts.csv"),
     *(name for each in experiments() if each.is_run(NAMES) for name in each.tidy),
 ]

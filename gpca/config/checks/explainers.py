@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from baselines.registry import explainer_entry, require_settings
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.controls.settings import ControlSettings
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.settings import check_settings
 
 BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32
 LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the paper's protocol take a thousandth
@@ -42,13 +39,6 @@ def check_registrations(config: dict) -> None:
             raise InputError(f"config key {section}.train", fault, f"use fewer or lower {key}")
 
 
-def check_diagnosis(config: dict) -> None:
-    """Check the encoder and the explainers of causes."""
-    with_key("diagnosis.encoder.backbone", require_backbone, config["diagnosis"]["encoder"]["backbone"])
-    for name, settings in config["diagnosis"]["explainers"].items():
-        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
-
-
 def check_encoders(config: dict, left_out: Set[str]) -> None:
     """Check the backbones, and the encoder whose embeddings are explained."""
     for name, encoder in config["encoders"].items():
@@ -64,29 +54,9 @@ def check_explainers(config: dict, left_out: Set[str]) -> None:
             require_names(f"explainers.{name}", [design], config["uncertainty"], "uncertainty", left_out)
 
 
-def check_controls(config: dict) -> None:
-    """Check that the settings agree, and that every explainer takes its own and finds what it reads under a control.
-
-    As a learner's, its settings add to those that it has as an explainer.
-    """
-    controls = config["controls"]
-    with_key("controls", ControlSettings.from_dict, controls)
-    for name, settings in controls["explainers"].items():
-        key = f"controls.explainers.{name}"
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(key, require_settings, name, own)
-        with_key(key, check_settings, own, "explainers", name)
-        entry = explainer_entry(name)
-        if entry.design and not entry.observed_only:
-            fault = "needs more Monte-Carlo ICP than that of the observed pair, which is all that a control runs"
-            raise InputError(f"config key {key}", fault, "leave it out")
-
-
 def check_strategies(config: dict) -> None:
-    """Check the names of the strategies, and that what is asked about new concepts agrees."""
+    """Check that what is asked about new concepts agrees."""
     with_key("new_concepts", NewConceptSettings.from_dict, config["new_concepts"])
-    names = config["active_learning"]["strategies"]
-    require_names("active_learning.strategies", names, {**STRATEGIES, **STREAMS}, "strategy")
 
 
 def check_learners(config: dict) -> None:
@@ -94,7 +64,6 @@ def check_learners(config: dict) -> None:
     for name, settings in config["learners"].items():
         own = (config["explainers"].get(name) or {}) | (settings or {})
         with_key(f"learners.{name}", require_settings, name, own)
-        with_key(f"learners.{name}", check_settings, own, "explainers", name)
         if explainer_entry(name).reads != "embeddings":
             raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
 

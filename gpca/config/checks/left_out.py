@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import fields
 
 from baselines.registry import explainers
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
-from gpca.alignment.methods.registry import methods
 from gpca.config.leave_out import names_left_out
+from gpca.config.schema import DESIGNS
+from gpca.config.sections import Reductions
 from gpca.errors import require_names
 from gpca.experiments.registry import experiments
-from gpca.recovery.actions import ACTIONS
-from gpca.recovery.policies import ALWAYS, POLICIES
-from gpca.settings import load_schema
-from gpca.uncertainty.estimators.registry import estimators
 
 
 def check_left_out(config: dict) -> None:
@@ -22,21 +19,14 @@ def check_left_out(config: dict) -> None:
         require_names(key, sorted(names_left_out(config, key)), known, noun)
     for experiment in experiments():
         for key, names in {**experiment.leavable, **experiment.switches}.items():
-            require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
+            if names.known:
+                require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
 
 
 def _known() -> dict[str, tuple[str, Collection[str]]]:
-    sections = load_schema()["properties"]
     return {
-        "reductions": ("reduction", sections["reductions"]["properties"]),
-        "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
-        "methods": ("registration method", methods()),
-        "estimators": ("estimator", estimators()),
-        "estimator_pairs.methods": ("registration method", methods()),
+        "reductions": ("reduction", [field.name for field in fields(Reductions)]),
+        "uncertainty": ("uncertainty", DESIGNS),
         "explainers": ("explainer", explainers()),
         "learners": ("learner", explainers()),
-        "controls.explainers": ("explainer", explainers()),
-        "active_learning.strategies": ("strategy", (*STRATEGIES, *STREAMS)),
-        "recovery.policies": ("policy", (*POLICIES, *(ALWAYS + action for action in ACTIONS))),
-        "recovery.actions": ("action", ACTIONS),
     }

@@ -4,32 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gpca.encoders.reduction import make_reduction, require_room
-from gpca.encoders.settings import OPTIONS, EncoderSettings
-from gpca.errors import InputError, with_key
+from gpca.encoders.settings import require_draws
+from gpca.errors import InputError
 
 
 def check_sizes(config: dict) -> None:
-    """Check components, neighbors and draws against the samples and the points that there will be."""
-    _check_reductions(config)
+    """Check neighbors and draws against the samples and the points that there will be."""
     _check_neighbours(config)
-    for key, encoder, points_key, points in _encoders(config):
-        settings = with_key(key, lambda encoder=encoder: EncoderSettings(**encoder))
-        if settings.draw_points > points:
-            fault = f"draws {settings.draw_points} points of clouds that have at most {points}"
-            raise InputError(f"config key {key}", fault, f"lower draw_points, or raise {points_key}")
-
-
-def _check_reductions(config: dict) -> None:
-    """Check the reductions of depth frames' embeddings; how long these are, only the suite's own backbones tell."""
-    section = config["real_world"]
-    for name in section["reductions"]:
-        reduction = make_reduction(name, config["reductions"].get(name) or {})
-        for backbone in section["backbones"] if reduction else ():
-            encoder = EncoderSettings(**config["encoders"][backbone])
-            options = OPTIONS.get(encoder.backbone)
-            size = options(**encoder.options).embedding_size if options else None
-            with_key(f"reductions.{name}", require_room, name, reduction, section["train"], size)
+    for key, encoder, points, points_key in _encoders(config):
+        require_draws(key, encoder, points, points_key)
 
 
 def _check_neighbours(config: dict) -> None:
@@ -46,17 +29,16 @@ def _check_neighbours(config: dict) -> None:
                 raise InputError(f"config key {key}.neighbours", fault, f"lower it, or raise {remedy}")
 
 
-def _encoders(config: dict) -> Iterator[tuple[str, dict, str, int]]:
-    """Yield each encoder's key and settings, and the key and number of the points of the clouds that it sees.
+def _encoders(config: dict) -> Iterator[tuple[str, dict, int, str]]:
+    """Yield each encoder's key and settings, and the number of points of the clouds that it sees, with its key.
 
     How many points a depth frame has of an object is not known here, and clouds of fewer points than a draw repeat
     some; so those of frames are left out.
     """
-    cloud_points = "registrations.cloud_points", config["registrations"]["cloud_points"]
+    cloud_points = config["registrations"]["cloud_points"], "registrations.cloud_points"
     for name, encoder in config["encoders"].items():
         yield f"encoders.{name}", encoder, *cloud_points
     explained = config["encoders"][config["embedding"]["encoder"]]
-    for key in ("active_learning.without", "shift.encoder", "new_concepts.encoder"):
+    for key in ("shift.encoder", "new_concepts.encoder"):
         section, name = key.split(".")
         yield key, explained | config[section][name], *cloud_points
-    yield "diagnosis.encoder", config["diagnosis"]["encoder"], "causes.points", config["causes"]["points"][1]

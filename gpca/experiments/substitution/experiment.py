@@ -6,34 +6,31 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import EXPLAINERS, Experiment
+from gpca.experiments.experiment import EXPLAINERS, Experiment, Explained
 from gpca.experiments.substitution.settings import ExchangeSettings
+from gpca.settings import Distinct
 
 # What these functions import inside loads numba, and this module is loaded by every command.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section(ExchangeSettings):
-    """The settings, and the sources whose registrations are explained."""
+    """The settings, the sources whose registrations are explained, and the explainers."""
 
-    sources: tuple[str, ...]
+    sources: Distinct[str]
+    explainers: Explained
 
 
 def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
     """Check the names; as under controls, an explainer's settings add to those that it has as an explainer."""
-    from baselines.registry import require_settings
     from gpca.errors import require_names, with_key
+    from gpca.experiments.explained import require_explained
     from gpca.experiments.substitution.asked import require_exchangeable
-    from gpca.settings import check_settings
 
     exchange = config["exchange"]
     for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
         require_names(f"exchange.{key}", exchange[key], config[key], noun, left_out(key))
-    for name, settings in exchange["explainers"].items():
-        key = f"exchange.explainers.{name}"
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(key, require_settings, name, own)
-        with_key(key, check_settings, own, "explainers", name)
+    for key, name in require_explained(config, "exchange.explainers"):
         with_key(key, require_exchangeable, name)
 
 

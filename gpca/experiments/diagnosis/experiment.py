@@ -1,0 +1,41 @@
+"""What made a registration fail: explainers of causes against their measured shares in the error (Table IX)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from baselines.registry import CAUSES, explainer_entry, explainers, require_settings
+from gpca.encoders.registry import require_backbone
+from gpca.encoders.settings import require_draws
+from gpca.errors import with_key
+from gpca.experiments.experiment import Experiment, LeftOut, Names
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check the explainers, and the encoder, for whose draws the clouds need points enough."""
+    encoder = config["diagnosis"]["encoder"]
+    with_key("diagnosis.encoder.backbone", require_backbone, encoder["backbone"])
+    require_draws("diagnosis.encoder", encoder, config["causes"]["points"][1], "causes.points")
+    for name, settings in config["diagnosis"]["explainers"].items():
+        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the explainers of causes."""
+    return {"cause_explainer": list(config["diagnosis"]["explainers"])}
+
+
+def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the titles of the explainers."""
+    titles = {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]}
+    return {"cause_explainers": titles}
+
+
+EXPERIMENT = Experiment(
+    name="diagnosis",
+    names=names,
+    shown=shown,
+    check=check,
+    leavable={"diagnosis.explainers": Names("explainer", lambda: explainers(CAUSES))},
+)
