@@ -20,9 +20,10 @@ from gpca.config.checks.sources import check_named_sources, resolve_sources
 from gpca.config.command_line import with_types
 from gpca.config.layers import with_defaults
 from gpca.config.leave_out import names_left_out, without_false
+from gpca.config.schema import whole_config
 from gpca.experiments.registry import experiments
 from gpca.io.structured_text import require_plain
-from gpca.settings import load_schema, require_valid
+from gpca.settings import read_settings
 
 
 def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:
@@ -58,7 +59,7 @@ def check(config: dict) -> dict[str, dict]:
     """
     require_plain(config, "config key")
     whole = without_false(config)
-    require_valid(whole, load_schema(), "config key")
+    read_settings(whole_config(), whole, "config key")
     encoders, designs, sources = (names_left_out(config, key) for key in ("encoders", "uncertainty", "sources"))
     check_left_out(config)
     check_places(whole)
@@ -67,11 +68,11 @@ def check(config: dict) -> dict[str, dict]:
     check_explainers(whole, designs)
     check_strategies(whole)
     check_learners(whole)
-    for experiment in experiments():
-        experiment.check(whole, lambda key: names_left_out(config, key))
     check_tolerances(whole)
     check_frame_labels(whole)
     check_sizes(whole)
+    for experiment in experiments():
+        experiment.check(whole, lambda key: names_left_out(config, key))
     resolved = resolve_sources(whole)
     check_named_sources(whole, sources, encoders)
     return resolved

@@ -22,10 +22,7 @@ LEAVABLE = (
 )
 EXPLAINED = [key for key, names in LEAVABLE_OF_EXPERIMENTS.items() if names is EXPLAINERS]
 # Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
-SWITCHES = (
-    "active_learning.strategies",
-    *(key for each in experiments() for key in each.switches),
-)
+SWITCHES = [key for each in experiments() for key in each.switches]
 # Lists and mappings that lose the names of what is left out elsewhere: the key, and that of the other mapping.
 LISTED: dict[str, str | Callable[[LeftOut], Collection[str]]] = {
     "kernel_grid.sources": "sources",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from pydantic import Field
+
 from gpca.causes.frame_settings import FrameCauseSettings
-from gpca.config.explainer_section import EXPLAINERS
-from gpca.config.json_schema import Keys, Named
-from gpca.config.sections import SurfacePoints
-from gpca.config.source_section import NAME, Checksums, Place, Unit, Urls
+from gpca.config.sections import EncoderChanges, SurfacePoints
+from gpca.config.source_section import Checksums, Name, Place, Text, Unit, Urls
 from gpca.encoders.settings import EncoderSettings
 from gpca.frames.camera import Camera
 from gpca.frames.initial_pose import InitialPoseSettings
@@ -17,12 +17,13 @@ from gpca.frames.rgbd_scene import SceneSettings
 from gpca.pairs.perturbation import CONCEPTS, Hidden
 from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.settings import LoopSettings
-from gpca.settings import Bounds, Count, NotNegative, OpenShare, Share
+from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, OpenShare, Share, changes_of, part_of
 
-Pretraining = Annotated[EncoderSettings, Keys(without=("backbone", "options", "reading", "draws"))]
+Pretraining = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draws"))]
 # The encoder then embeds draws of the size that it was last trained on.
-Training = Annotated[EncoderSettings, Keys(without=("backbone", "options", "reading", "draw_points", "draws"))]
-Conditions = Annotated[dict[str, InitialPoseSettings], Bounds(propertyNames=NAME)]
+Training = Annotated[
+    dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draw_points", "draws"))
+]
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,9 @@ class FrameDataset:
     urls: Urls = field(default_factory=list)
     sha256: Checksums = None
     unit: Unit = "mm"
-    split: Annotated[str, Bounds(minLength=1)] = "test"
+    split: Text = "test"
     optional: bool = False
-    results: Place | list[Place] | None = None
+    results: Place | Annotated[list[Place], Field(min_length=1)] | None = None
     errors: Place | None = None
     most_frames: Count = 1
 
@@ -53,22 +54,22 @@ class VirtualFrames:
 class RealWorld:
     """Registrations of depth frames, every backbone with every reduction."""
 
-    title: Annotated[str, Bounds(minLength=1)]
+    title: Text
     scenes: SceneSettings
-    datasets: Annotated[dict[str, FrameDataset], Bounds(propertyNames=NAME)] | None
+    datasets: dict[Name, FrameDataset] | None
     initial_pose: InitialPoseSettings
-    conditions: Conditions | None
-    condition_backbones: Annotated[list[str], Bounds(minItems=0)]
+    conditions: dict[Name, InitialPoseSettings] | None
+    condition_backbones: list[str]
     train: TrainSamples
     test: TestSamples
     test_share: OpenShare
     occluders: Share
-    backbones: tuple[str, ...]
-    reductions: tuple[Literal["none", "pca", "umap", "autoencoder"], ...]
+    backbones: Distinct[str]
+    reductions: Distinct[Literal["none", "pca", "umap", "autoencoder"]]
     pretraining: Pretraining | None
     virtual: VirtualFrames | None
     training: dict[str, Training] | None
-    explainers: Annotated[dict[str, dict | None], Named(EXPLAINERS)]
+    explainers: dict[str, dict | None] | None
     one_encoder: bool
     causes: FrameCauseSettings
 
@@ -95,14 +96,14 @@ class Recovery:
     """What is done about a failed registration, in a closed loop on tables of the virtual camera."""
 
     objects: str
-    policies: tuple[str, ...]
-    treatments: Annotated[dict[str, str], Named(dict.fromkeys(CONCEPTS, str), closed=True)]
-    actions: Annotated[dict[str, dict | None], Bounds(minProperties=1)]  # an action checks its settings itself
+    policies: Distinct[str]
+    treatments: Annotated[dict, Keys(dict.fromkeys(CONCEPTS, str), required=CONCEPTS)]
+    actions: Annotated[dict[str, dict | None], Field(min_length=1)]  # an action checks its settings itself
     costs: dict[str, Share]
     needless: Share
     thresholds: DeclaredThresholds
     rehearsals: Count
-    loop: Annotated[LoopSettings, Keys(required=("failures", "tries", "budget"), without=("cloud_points", "icp"))]
+    loop: Annotated[dict, part_of(LoopSettings, without=("cloud_points", "icp"))]
     train: TrainSamples
     calibration: TestSamples
     remedied: TestSamples
@@ -110,6 +111,6 @@ class Recovery:
     camera: Camera
     noise_scale: tuple[NotNegative, NotNegative]
     hidden: tuple[Hidden, Hidden]
-    estimator: Annotated[Estimator, Keys(without=("rotation_deg", "translation"))]
+    estimator: Annotated[dict, changes_of(Estimator, without=("rotation_deg", "translation"))]
     model_points: SurfacePoints
-    encoder: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]
+    encoder: EncoderChanges

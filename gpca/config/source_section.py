@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from gpca.settings import Bounds, Count
+from pydantic import Field
 
-NAME = {"pattern": "^[a-z][a-z0-9_]*$", "maxLength": 100}  # of what gets files of its own
-Place = Annotated[str, Bounds(minLength=1)]
-Pattern = Annotated[str, Bounds(minLength=1)]
+from gpca.errors import InputError
+from gpca.settings import Bounds, Count, Distinct
+
+Name = Annotated[str, Field(pattern="^[a-z][a-z0-9_]*$", max_length=100)]  # of what gets files of its own
+Text = Annotated[str, Field(min_length=1)]
+Place = Text
 Unit = Literal["m", "cm", "mm"]
-Url = Annotated[str, Bounds(pattern=r"^https?://\S+$")]
-Urls = list[Url]
-Sha256 = Annotated[str, Bounds(pattern="^[0-9a-f]{64}$")]
-ManySha256 = Annotated[list[Sha256 | None], Bounds(minItems=0)]
-Checksums = Sha256 | ManySha256 | None
-# A source within a source: its schema stands once, under $defs.
-Local = Annotated[dict, Bounds(**{"$ref": "#/$defs/source"})]
+Url = Annotated[str, Field(pattern=r"^https?://\S+$")]
+Urls = Annotated[list[Url], Field(min_length=1)]
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Checksums = Sha256 | list[Sha256 | None] | None
 
 
 @dataclass(frozen=True)
@@ -37,16 +37,28 @@ class Source:
         local: keys that override the others where its own data is found below `data_dir`.
     """
 
-    title: Annotated[str, Bounds(minLength=1)] = ""
+    title: Text = ""
     kind: str = ""
     family: str = ""
     location: Place | None = None
-    files: list[Pattern] = field(default_factory=list)
-    objects: Annotated[list[Annotated[int, Bounds(minimum=0)]], Bounds(uniqueItems=True)] = field(default_factory=list)
-    unit: Unit = "m"
+    files: Annotated[list[Text], Field(min_length=1)] = field(default_factory=list)
+    objects: Distinct[Annotated[int, Bounds(minimum=0)]] = ()
+    unit: Unit | None = None
     url: Url = ""
     urls: Urls = field(default_factory=list)
     sha256: Checksums = None
     views_per_instance: Count = 1
     stand_in: bool = False
-    local: Local = field(default_factory=dict)
+    local: Source | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedSource(Source):
+    """A source of the config, which says what it is."""
+
+    title: Text = field()
+    kind: str = field()
+
+    def __post_init__(self) -> None:
+        if self.kind == "mesh_folder" and not self.unit:
+            raise InputError("unit", "is missing", "say what the lengths in its files are in: m, cm or mm")

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from baselines.registry import explainer_entry
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.experiments.kernel_grid.tables import PRINTED
 from gpca.experiments.real_world.tables import encoder_title
@@ -28,7 +27,6 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         sources: name -> its resolved entry.
     """
     kernels = config["kernel_grid"]
-    strategies = list(config["active_learning"]["strategies"])
     return {
         "source": list(sources),
         "seed": list(config["seeds"]),
@@ -36,12 +34,10 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
         "explainer": list(config["explainers"]),
         "gpca": next((name for name in reversed(GPCA_FORMS) if name in config["explainers"]), ""),
         "learner": list(config["learners"]),
-        "strategy": strategies,
         "new_concept_strategy": list(NEW_CONCEPT_STRATEGIES),
         "erring": list(config["new_concepts"]["erring"]),
         "new_concept_seed": new_concept_seeds(config),
         "frame_label_seed": list(config["seeds"])[: config["frame_labels"]["seeds"]],
-        "pool_strategy": [name for name in strategies if name in STRATEGIES],
         "embedding": f"{config['embedding']['encoder']}/{config['embedding']['reduction']}",
         "shown_source": config["figures"]["source"],
         "reading_group": reading_groups(config),
@@ -64,13 +60,10 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     entries = {name: explainer_entry(name) for name in config["explainers"]}
     explainers = {name: entry.title for name, entry in entries.items()}
     learners = {name: explainer_entry(name).title.removesuffix(" on the embedding") for name in config["learners"]}
-    strategies = {
-        name: STRATEGIES[name].title if name in STRATEGIES else STREAMS[name] for name in learning["strategies"]
-    }
     return {
         "sources": shown,
         "compared_sources": {**shown, REAL_WORLD: of_frames, ONE_ENCODER: of_frames, "model": of_model},
-        "compared_titles": learners | strategies | explainers,
+        "compared_titles": learners | of_experiments["strategies"] | explainers,
         "source_titles": {name: title_of(entry) for name, entry in shown.items()},
         "shown_title": title_of(shown[config["figures"]["source"]]),
         "source_datasets": datasets,
@@ -81,8 +74,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "explainer_titles": explainers,
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "learners": learners,
-        "strategies": strategies,
-        "active_learning": {**learning, **{name: config["registrations"][name] for name in ("train", "test")}},
         "reading_groups": {name: GROUPS[name].title for name in reading_groups(config)},
         "new_concepts": {
             **learning,
@@ -92,7 +83,6 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
             "of_causes": config["causes"],
         },
         "frame_labels": {**learning, **config["frame_labels"], "train": frames["train"], "test": frames["test"]},
-        "target": learning["target"],
         "test_samples": config["registrations"]["test"],
         "kernel_sources": of_grid,
         "kernel_source_titles": {name: title_of(entry) for name, entry in of_grid.items()},

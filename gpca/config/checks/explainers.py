@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Set
 
 from baselines.registry import explainer_entry, require_settings
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError, require_names, with_key
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.settings import check_settings
 
 BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32
 LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the paper's protocol take a thousandth
@@ -57,10 +55,8 @@ def check_explainers(config: dict, left_out: Set[str]) -> None:
 
 
 def check_strategies(config: dict) -> None:
-    """Check the names of the strategies, and that what is asked about new concepts agrees."""
+    """Check that what is asked about new concepts agrees."""
     with_key("new_concepts", NewConceptSettings.from_dict, config["new_concepts"])
-    names = config["active_learning"]["strategies"]
-    require_names("active_learning.strategies", names, {**STRATEGIES, **STREAMS}, "strategy")
 
 
 def check_learners(config: dict) -> None:
@@ -68,7 +64,6 @@ def check_learners(config: dict) -> None:
     for name, settings in config["learners"].items():
         own = (config["explainers"].get(name) or {}) | (settings or {})
         with_key(f"learners.{name}", require_settings, name, own)
-        with_key(f"learners.{name}", check_settings, own, "explainers", name)
         if explainer_entry(name).reads != "embeddings":
             raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
 

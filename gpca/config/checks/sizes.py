@@ -39,6 +39,6 @@ def _encoders(config: dict) -> Iterator[tuple[str, dict, int, str]]:
     for name, encoder in config["encoders"].items():
         yield f"encoders.{name}", encoder, *cloud_points
     explained = config["encoders"][config["embedding"]["encoder"]]
-    for key in ("active_learning.without", "shift.encoder", "new_concepts.encoder"):
+    for key in ("shift.encoder", "new_concepts.encoder"):
         section, name = key.split(".")
         yield key, explained | config[section][name], *cloud_points
