@@ -27,5 +27,4 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "reductions": ("reduction", sections["reductions"]["properties"]),
         "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
         "explainers": ("explainer", explainers()),
-        "learners": ("learner", explainers()),
     }
