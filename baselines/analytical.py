@@ -8,13 +8,16 @@ overlap away, which no sensor does. Hence two rows: `analytical_gpc` with the pa
 from __future__ import annotations
 
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 
+from gpca.classifier.settings import GPCArguments
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
+from gpca.settings import Bounds, Count
 
 
 class AnalyticalGPC(GPCA):
@@ -35,9 +38,9 @@ class AnalyticalGPC(GPCA):
         seed: int,
         *,
         point_count: bool = True,
-        shape_points: int = 256,
-        neighbours: int = 16,
-        **settings,
+        shape_points: Count = 256,
+        neighbours: Annotated[int, Bounds(minimum=4)] = 16,
+        **settings: GPCArguments,
     ) -> None:
         super().__init__(source, seed, **settings)
         self._axes = (source, seed, "analytical")

@@ -14,6 +14,7 @@ from baselines.concept_classifier import known_concepts
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
+from gpca.settings import Positive
 
 
 class ConceptVectors(ScoringExplainer):
@@ -28,7 +29,7 @@ class ConceptVectors(ScoringExplainer):
         inverse_regularisation: scikit-learn's C, of the L2 penalty of the probes.
     """
 
-    def __init__(self, source: str, seed: int, inverse_regularisation: float = 1.0) -> None:
+    def __init__(self, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> None:
         self._inverse_regularisation = inverse_regularisation
 
     def fit(self, registrations: Registrations) -> None:

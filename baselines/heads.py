@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from time import perf_counter
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
-from gpca.settings import Bounds
+from gpca.settings import ArgumentsOf, Bounds, Count
 
 BATCH_SIZE = 64
 DropoutRate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
@@ -115,10 +115,13 @@ class Heads:
         return hidden @ weight + bias
 
 
+HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # of a function that hands them on
+
+
 class HeadLearner:
     """What such learners share: heads, and draws of the logits from them. Training takes `training`'s settings."""
 
-    def __init__(self, source: str, seed: int, **training) -> None:
+    def __init__(self, source: str, seed: int, **training: HeadArguments) -> None:
         self._axes = (source, seed, type(self).__name__)
         self._heads = Heads(*self._axes, **training)
 
@@ -147,7 +150,7 @@ class HeadLearner:
 class Ensemble(HeadLearner):
     """A deep ensemble of heads: each is a draw."""
 
-    def __init__(self, source: str, seed: int, members: int = 5, **training) -> None:
+    def __init__(self, source: str, seed: int, members: Count = 5, **training: HeadArguments) -> None:
         super().__init__(source, seed, heads=members, **training)
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
@@ -157,7 +160,9 @@ class Ensemble(HeadLearner):
 class Dropout(HeadLearner):
     """Monte-Carlo dropout: every pass is a draw, its mask shared by all samples, as one network is."""
 
-    def __init__(self, source: str, seed: int, rate: DropoutRate = 0.5, passes: int = 100, **training) -> None:
+    def __init__(
+        self, source: str, seed: int, rate: DropoutRate = 0.5, passes: Count = 100, **training: HeadArguments
+    ) -> None:
         super().__init__(source, seed, rate=rate, **training)
         self._rate = rate
         self._passes = passes

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.heads import HeadLearner
+from baselines.heads import HeadArguments, HeadLearner
 from gpca.attribution.diagnostics import negative_log_likelihood
 from gpca.attribution.scores import summarise_draws
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
+from gpca.settings import Count
 
 
 class LastLayerLaplace(HeadLearner):
@@ -23,7 +24,7 @@ class LastLayerLaplace(HeadLearner):
 
     PRECISIONS = tuple(10.0 ** (exponent / 2) for exponent in range(6, -5, -1))
 
-    def __init__(self, source: str, seed: int, draws: int = 1000, **training) -> None:
+    def __init__(self, source: str, seed: int, draws: Count = 1000, **training: HeadArguments) -> None:
         super().__init__(source, seed, **training)
         self._draws = draws
 

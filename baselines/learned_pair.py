@@ -9,9 +9,12 @@ from functools import partial
 import numpy as np
 
 from baselines.pair import PairDescription
+from gpca.classifier.settings import GPCArguments
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry
+from gpca.features.settings import DescribedPoints
 from gpca.pairs.dataset import Registrations
+from gpca.settings import Count, PositiveShare
 
 
 class LearnedPairGPCA(PairDescription, GPCA):
@@ -30,11 +33,11 @@ class LearnedPairGPCA(PairDescription, GPCA):
         encoder: str,
         source: str,
         seed: int,
-        points: int = 512,
-        draw_points: int = 96,
-        epochs: int = 6,
-        encoder_learning_rate: float = 4e-3,
-        **settings,
+        points: DescribedPoints = 512,
+        draw_points: DescribedPoints = 96,
+        epochs: Count = 6,
+        encoder_learning_rate: PositiveShare = 4e-3,
+        **settings: GPCArguments,
     ) -> None:
         PairDescription.__init__(self, source, seed, "relations", points)
         GPCA.__init__(self, source, seed, **settings)

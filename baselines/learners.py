@@ -13,6 +13,7 @@ from baselines.concept_classifier import ClassifierExplainer, ConceptClassifier,
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
+from gpca.settings import Count, Positive
 
 PAPERS_RANDOM_STATE = 42
 
@@ -25,7 +26,7 @@ class Learner(ClassifierExplainer):
         return attached(registrations, "embedding", None)
 
 
-def forest(source: str, seed: int, trees: int = 50) -> Learner:
+def forest(source: str, seed: int, trees: Count = 50) -> Learner:
     """Make a random forest."""
     from sklearn.ensemble import RandomForestClassifier
 
@@ -78,17 +79,17 @@ def rbf_svm(source: str, seed: int) -> Learner:
     return ProbableSVM("rbf")
 
 
-def logistic(source: str, seed: int, inverse_regularisation: float = 1.0) -> Learner:
+def logistic(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> Learner:
     """Make a multinomial logistic regression."""
     return Learner(standardised_regression(inverse_regularisation))
 
 
-def nearest(source: str, seed: int, neighbours: int = 5) -> Learner:
+def nearest(source: str, seed: int, neighbours: Count = 5) -> Learner:
     """Make a k-nearest-neighbour classifier; a probability is a share of the neighbours."""
     return Nearest(neighbours)
 
 
-def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:
+def laplace_gpc(source: str, seed: int, lengthscale: Positive = 1.0) -> Learner:
     """Make scikit-learn's Gaussian process classifier: one against the rest, Laplace's approximation, RBF kernel.
 
     Args:

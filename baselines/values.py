@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from time import perf_counter
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -19,10 +20,8 @@ from gpca.explainers.interface import ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
-WORTHS = (
-    "uncertainty",
-    "residual",
-)  # a condition's worth: KL in nats, or log distance from the target to the source
+Worth = Literal["uncertainty", "residual"]  # of a condition: KL in nats, or log distance from target to source
+WORTHS: tuple[str, ...] = get_args(Worth)
 
 
 class ChargedValues(ScoringExplainer):

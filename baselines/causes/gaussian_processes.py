@@ -13,6 +13,7 @@ from baselines.causes.described import joined
 from baselines.concept_classifier import known_concepts
 from gpca.causes.labels import LABELS
 from gpca.causes.truth import NOMINAL
+from gpca.classifier.settings import GPCArguments
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.features.groups import GROUPS
@@ -25,7 +26,7 @@ class CausePairGPCA(DescriptorGPCA):
 
     labels = LABELS
 
-    def __init__(self, source: str, seed: int, **settings) -> None:
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
         super().__init__((source, seed, "causes"), source, seed, **settings)
 
     def features(self, registrations: Registrations) -> np.ndarray:
@@ -41,7 +42,7 @@ class MultiLabelGPCA(ScoringExplainer):
 
     labels = LABELS
 
-    def __init__(self, source: str, seed: int, **settings) -> None:
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.classifier.settings import GPCSettings
         from gpca.explainers.pair_classifier import PairClassifier
 

@@ -17,9 +17,10 @@ from gpca.config.checks.sources import check_named_sources, resolve_sources
 from gpca.config.command_line import with_types
 from gpca.config.layers import with_defaults
 from gpca.config.leave_out import names_left_out, without_false
+from gpca.config.schema import whole_config
 from gpca.experiments.registry import experiments
 from gpca.io.structured_text import require_plain
-from gpca.settings import load_schema, require_valid
+from gpca.settings import read_settings
 
 
 def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:
@@ -55,7 +56,7 @@ def check(config: dict) -> dict[str, dict]:
     """
     require_plain(config, "config key")
     whole = without_false(config)
-    require_valid(whole, load_schema(), "config key")
+    read_settings(whole_config(), whole, "config key")
     encoders, designs, sources = (names_left_out(config, key) for key in ("encoders", "uncertainty", "sources"))
     check_left_out(config)
     check_places(whole)

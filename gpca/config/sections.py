@@ -8,16 +8,24 @@ from typing import Annotated, Literal
 from gpca.active_learning.settings import ActiveLearningSettings, NewConceptSettings, StreamSettings
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.settings import GPCSettings
-from gpca.config.json_schema import COMPLETE, Keys
 from gpca.encoders.reduction import PCA, UMAP, Autoencoder
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.settings import EncoderChanges
 from gpca.experiments.kernel_grid.grid import KernelGrid
 from gpca.experiments.out_of_distribution.settings import ShiftSettings
+from gpca.objects.entry import SurfacePoints
 from gpca.pairs.perturbation import Concept, Severities
-from gpca.settings import Bounds, Count, NotNegative, OpenShare, PositiveShare
+from gpca.settings import (
+    Bounds,
+    Count,
+    Distinct,
+    Keys,
+    OpenShare,
+    PositiveShare,
+    changes_of,
+)
 from gpca.uncertainty.settings import UncertaintySettings
 
-SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]
+CauseChanges = Annotated[dict, changes_of(CauseSettings, without=("icp", "icp_points"))]
 
 
 @dataclass(frozen=True)
@@ -61,35 +69,32 @@ class Design(UncertaintySettings):
 class ActiveLearning(ActiveLearningSettings):
     """The experiments with a concept that the classifier has never seen."""
 
-    held_out: tuple[Concept, ...]
+    held_out: Distinct[Concept]
     target: PositiveShare
     rare_share: OpenShare | None = None
     rare_labels: Count = 1
-    without: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]
+    without: EncoderChanges
     stream: StreamSettings
-    strategies: tuple[str, ...]
+    strategies: Distinct[str]
 
 
 @dataclass(frozen=True, kw_only=True)
 class NewConcepts(NewConceptSettings):
     """The same where no encoder has seen the samples or the concept, and the encoder that learns without labels."""
 
-    encoder: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]
+    encoder: EncoderChanges
 
 
 @dataclass(frozen=True, kw_only=True)
 class Grid(KernelGrid):
     """Table IV, and the sources that it is made of."""
 
-    sources: tuple[str, ...]
+    sources: Distinct[str]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shift(ShiftSettings):
-    """Samples unlike those of the training; an encoder of another width would not fit beside the others."""
-
-    encoder: Annotated[EncoderSettings, Keys(without=("backbone", "options"))]
-    severities: Annotated[Severities, COMPLETE]
+_SHIFT = changes_of(ShiftSettings, without=("beyond",)).kinds
+# An encoder of another width would not fit beside the others.
+Shift = Annotated[dict, Keys(_SHIFT | {"encoder": EncoderChanges, "severities": Severities}, required=_SHIFT)]
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,7 @@ class ExplainedModel:
 
     source: str
     encoder: str
-    causes: Annotated[CauseSettings, Keys(required=(), without=("icp", "icp_points"))]
+    causes: CauseChanges
     classifier: GPCSettings
     false_alarms: OpenShare
 
@@ -115,26 +120,3 @@ class Figures:
     """The source that the figures of one registration show."""
 
     source: str
-
-
-@dataclass(frozen=True)
-class ReferenceTolerances:
-    """What a mean over the seeds may differ by, by kind of quantity."""
-
-    share: NotNegative
-    percent: NotNegative
-    correlation: NotNegative
-    nats: NotNegative
-    degrees: NotNegative
-    count: NotNegative
-
-
-@dataclass(frozen=True)
-class Reference:
-    """How a run is compared with a reference run."""
-
-    half_widths: NotNegative
-    flipped: Annotated[float, Bounds(minimum=0, maximum=1)]
-    deviations: NotNegative
-    ratio: Annotated[float, Bounds(minimum=0, maximum=1)]
-    tolerances: ReferenceTolerances

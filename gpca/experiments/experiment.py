@@ -9,8 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field
+
+ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own
 ByRun = Callable[[Mapping[str, Any], Mapping[str, Mapping]], dict[str, Any]]  # of the config, and of its sources
 LeftOut = Callable[[str], set[str]]  # key of a mapping of the config -> names that the config leaves out of it
 

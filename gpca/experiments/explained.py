@@ -7,7 +7,6 @@ from typing import Any
 
 from baselines.registry import explainer_entry, require_settings
 from gpca.errors import with_key
-from gpca.settings import check_settings
 
 
 def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str, str]]:
@@ -26,7 +25,6 @@ def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str
         key_of_name = f"{key}.{name}"
         own = (config["explainers"].get(name) or {}) | (settings or {})
         with_key(key_of_name, require_settings, name, own)
-        with_key(key_of_name, check_settings, own, "explainers", name)
         yield key_of_name, name
 
 

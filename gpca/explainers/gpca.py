@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from gpca.attribution.scores import Attribution
+from gpca.classifier.settings import GPCArguments
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -21,7 +22,7 @@ class GPCA:
 
     labels: tuple[str, ...] = CONCEPTS
 
-    def __init__(self, source: str, seed: int, **settings) -> None:
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.classifier.gpc import (  # here, because the workflow imports this file only to know its entries
             GPC,
             GPCSettings,
@@ -59,7 +60,7 @@ class DescriptorGPCA(GPCA):
         source, seed, settings: as for GP-CA.
     """
 
-    def __init__(self, axes: tuple, source: str, seed: int, **settings) -> None:
+    def __init__(self, axes: tuple, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.explainers.pair_classifier import NormalisedDescriptors
 
         super().__init__(source, seed, **settings)

@@ -20,7 +20,7 @@ from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
 from gpca.process.progress import progress
 from gpca.seeds import generator
-from gpca.settings import Bounds, Count
+from gpca.settings import Bounds, Count, Distinct
 
 DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
 Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in metres
@@ -45,7 +45,7 @@ class SceneSettings:
         noise: of depth.
     """
 
-    families: tuple[str, ...] = ("ycb",)
+    families: Distinct[str] = ("ycb",)
     count: Annotated[int, Bounds(minimum=2)] = 12
     views: Count = 4
     objects: tuple[Count, Count] = (4, 8)

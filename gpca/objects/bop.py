@@ -24,7 +24,7 @@ DIAMETER_TOLERANCE = 0.05
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     """Surfaces of a configured source: keys `objects` (ids, default all) and `unit` (default mm)."""
-    return surfaces(folder, entry.get("unit", "mm"), entry.get("objects"))
+    return surfaces(folder, entry.get("unit") or "mm", entry.get("objects"))
 
 
 def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None = None) -> Iterator[Surface]:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import fields
 
 from baselines.registry import explainers
 from gpca.config.leave_out import names_left_out
+from gpca.config.schema import DESIGNS
+from gpca.config.sections import Reductions
 from gpca.errors import require_names
 from gpca.experiments.registry import experiments
-from gpca.settings import load_schema
 
 
 def check_left_out(config: dict) -> None:
@@ -22,9 +24,8 @@ def check_left_out(config: dict) -> None:
 
 
 def _known() -> dict[str, tuple[str, Collection[str]]]:
-    sections = load_schema()["properties"]
     return {
-        "reductions": ("reduction", sections["reductions"]["properties"]),
-        "uncertainty": ("uncertainty", sections["uncertainty"]["propertyNames"]["enum"]),
+        "reductions": ("reduction", [field.name for field in fields(Reductions)]),
+        "uncertainty": ("uncertainty", DESIGNS),
         "explainers": ("explainer", explainers()),
     }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, PositiveShare
+from gpca.settings import Bounds, Count, Different, Distinct, PositiveShare
 
 PAPER = "paper"  # the protocol itself, which every control is compared with
 Control = Literal[
@@ -47,8 +47,8 @@ class ControlSettings:
         bins: of each severity, equally wide.
     """
 
-    controls: tuple[Control, ...] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
-    encoders: Annotated[tuple[Training, ...], Bounds(minItems=0)] = ()
+    controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
+    encoders: Annotated[tuple[Training, ...], Different(fewest=0)] = ()
     encoder_seeds: Count = 1
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)

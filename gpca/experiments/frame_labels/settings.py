@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from gpca.pairs.perturbation import Concept
-from gpca.settings import Bounds, Count, PositiveShare
+from gpca.settings import Bounds, Count, Distinct, PositiveShare
 
 PAIR = "pair"  # the embedding that is measurements of the pair, beside those by the backbones
 
@@ -25,10 +25,10 @@ class FrameLabelSettings:
     """
 
     seeds: Count = 1
-    held_out: tuple[Concept, ...] = ("overlap",)
+    held_out: Distinct[Concept] = ("overlap",)
     initial: Annotated[int, Bounds(minimum=2)] = 60
     labels: Count = 80
-    targets: tuple[PositiveShare, ...] = (0.65, 0.7, 0.75)
+    targets: Distinct[PositiveShare] = (0.65, 0.7, 0.75)
     points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
 
 

@@ -64,13 +64,9 @@ def draw_pipeline(
         limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
             :func:`gpca.experiments.active_learning.figure.draw_learning_curves`.
-        title: The title of the source.
         encoder: The name that the figure gives the encoder.
         active_learning: The config's section; the figure repeats the first round of the run.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
-
-    Raises:
-        InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])

@@ -6,17 +6,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import EXPLAINERS, Experiment
+from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment
 from gpca.experiments.substitution.settings import ExchangeSettings
+from gpca.settings import Distinct
 
 # What these functions import inside loads numba, and this module is loaded by every command.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section(ExchangeSettings):
-    """The settings, and the sources whose registrations are explained."""
+    """The settings, the sources whose registrations are explained, and the explainers."""
 
-    sources: tuple[str, ...]
+    sources: Distinct[str]
+    explainers: ByName
 
 
 def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
