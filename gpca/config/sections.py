@@ -9,9 +9,10 @@ from gpca.active_learning.settings import ActiveLearningSettings, NewConceptSett
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.reduction import PCA, UMAP, Autoencoder
-from gpca.encoders.settings import OPTIONS, EncoderSettings
+from gpca.encoders.settings import EncoderChanges
 from gpca.experiments.kernel_grid.grid import KernelGrid
 from gpca.experiments.out_of_distribution.settings import ShiftSettings
+from gpca.objects.entry import SurfacePoints
 from gpca.pairs.perturbation import Concept, Severities
 from gpca.settings import (
     Bounds,
@@ -21,12 +22,9 @@ from gpca.settings import (
     OpenShare,
     PositiveShare,
     changes_of,
-    read_settings,
 )
 from gpca.uncertainty.settings import UncertaintySettings
 
-SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]
-EncoderChanges = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options"))]
 CauseChanges = Annotated[dict, changes_of(CauseSettings, without=("icp", "icp_points"))]
 
 
@@ -35,18 +33,6 @@ class Objects:
     """How many points are sampled on each mesh."""
 
     surface_points: SurfacePoints
-
-
-@dataclass(frozen=True, kw_only=True)
-class Encoder(EncoderSettings):
-    """An encoder, whose backbone is named; one without a class of options checks them itself, when it is made."""
-
-    backbone: str = field()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.backbone in OPTIONS:
-            read_settings(OPTIONS[self.backbone], self.options, "option")
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def test_a_file_of_another_source_or_seed_is_refused(folder, capsys, step, optio
         ("train", "registrations.npz", "array 'source' is missing; regenerate it with"),
         ("reduce", "embeddings.npz", "array 'source' is missing; regenerate it with 'python -m gpca embed'"),
         ("describe", "causes.npz", "array 'source' is missing"),
-        ("embed", "weights.pt", "does not say of which source and seed it is.*; regenerate them with"),
+        ("embed", "weights.pt", "or damaged; regenerate them with"),
     ],
 )
 def test_a_file_of_ours_that_does_not_say_of_what_it_is_has_to_be_made_anew(folder, capsys, step, name, fault):
