@@ -7,12 +7,9 @@ from collections.abc import Mapping
 from gpca.config.checks.explainers import (
     check_encoders,
     check_explainers,
-    check_learners,
     check_registrations,
-    check_strategies,
     check_tolerances,
 )
-from gpca.config.checks.frames import check_frame_labels
 from gpca.config.checks.left_out import check_left_out
 from gpca.config.checks.places import check_places
 from gpca.config.checks.sizes import check_sizes
@@ -66,10 +63,7 @@ def check(config: dict) -> dict[str, dict]:
     check_registrations(whole)
     check_encoders(whole, encoders)
     check_explainers(whole, designs)
-    check_strategies(whole)
-    check_learners(whole)
     check_tolerances(whole)
-    check_frame_labels(whole)
     check_sizes(whole)
     for experiment in experiments():
         experiment.check(whole, lambda key: names_left_out(config, key))

@@ -17,7 +17,7 @@ from gpca.experiments.registry import experiments
 LEAVABLE_OF_EXPERIMENTS = {key: names for each in experiments() for key, names in each.leavable.items()}
 # Mappings of which any entry may be false.
 LEAVABLE = (
-    *("sources", "encoders", "reductions", "uncertainty", "explainers", "learners", "readings.groups"),
+    *("sources", "encoders", "reductions", "uncertainty", "explainers"),
     *LEAVABLE_OF_EXPERIMENTS,
 )
 EXPLAINED = [key for key, names in LEAVABLE_OF_EXPERIMENTS.items() if names is EXPLAINERS]
@@ -25,7 +25,6 @@ EXPLAINED = [key for key, names in LEAVABLE_OF_EXPERIMENTS.items() if names is E
 SWITCHES = [key for each in experiments() for key in each.switches]
 # Lists and mappings that lose the names of what is left out elsewhere: the key, and that of the other mapping.
 LISTED: dict[str, str | Callable[[LeftOut], Collection[str]]] = {
-    "kernel_grid.sources": "sources",
     **{key: names for each in experiments() for key, names in each.lists.items()},
 }
 

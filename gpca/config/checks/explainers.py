@@ -1,11 +1,10 @@
-"""Checks of what is learned and compared: encoders, explainers, learners, strategies, tolerances."""
+"""Checks of what is learned and compared: encoders, explainers, tolerances."""
 
 from __future__ import annotations
 
 from collections.abc import Set
 
 from baselines.registry import explainer_entry, require_settings
-from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
 from gpca.encoders.registry import require_backbone
@@ -23,7 +22,6 @@ def check_registrations(config: dict) -> None:
         remedy = "use point_to_point; exchange.methods puts other methods beneath the explainers"
         raise InputError("config key registrations.icp.method", fault, remedy)
     with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
-    with_key("shift.severities", RegistrationSettings.from_dict, {"severities": config["shift"]["severities"]})
     for key, causes in {"causes": {}, "model.causes": config["model"]["causes"]}.items():
         with_key(key, CauseSettings.from_dict, config["causes"] | causes, config["registrations"]["icp"])
     cloud_points = "registrations.cloud_points", config["registrations"]["cloud_points"]
@@ -52,20 +50,6 @@ def check_explainers(config: dict, left_out: Set[str]) -> None:
         with_key(f"explainers.{name}", require_settings, name, settings or {})
         if design := explainer_entry(name).design:
             require_names(f"explainers.{name}", [design], config["uncertainty"], "uncertainty", left_out)
-
-
-def check_strategies(config: dict) -> None:
-    """Check that what is asked about new concepts agrees."""
-    with_key("new_concepts", NewConceptSettings.from_dict, config["new_concepts"])
-
-
-def check_learners(config: dict) -> None:
-    """Check that every learner reads embeddings and takes its settings, which add to those it has as an explainer."""
-    for name, settings in config["learners"].items():
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(f"learners.{name}", require_settings, name, own)
-        if explainer_entry(name).reads != "embeddings":
-            raise InputError(f"config key learners.{name}", "does not read embeddings", "choose another")
 
 
 def check_tolerances(config: dict) -> None:

@@ -28,5 +28,4 @@ def _known() -> dict[str, tuple[str, Collection[str]]]:
         "reductions": ("reduction", [field.name for field in fields(Reductions)]),
         "uncertainty": ("uncertainty", DESIGNS),
         "explainers": ("explainer", explainers()),
-        "learners": ("learner", explainers()),
     }

@@ -19,10 +19,9 @@ def resolve_sources(config: dict) -> dict[str, dict]:
 
 
 def check_named_sources(config: dict, sources_left_out: Set[str], encoders_left_out: Set[str]) -> None:
-    """Check what figures, kernels and the model are made of."""
+    """Check what figures and the model are made of."""
     sources = config["sources"]
     require_names("figures.source", [config["figures"]["source"]], sources, "source", sources_left_out)
-    require_names("kernel_grid.sources", config["kernel_grid"]["sources"], sources, "source", sources_left_out)
     model = config["model"]
     require_names("model.source", [model["source"]], (*sources, REAL_WORLD), "source", sources_left_out)
     require_names("model.encoder", [model["encoder"]], config["encoders"], "encoder", encoders_left_out)

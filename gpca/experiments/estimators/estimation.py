@@ -21,8 +21,8 @@ from gpca.causes.dataset import Causes
 from gpca.errors import InputError
 from gpca.experiments.estimators.covariances import JUDGED, REFERENCE, ReferenceSamples, covariance_columns
 from gpca.experiments.estimators.examples import Moved, describe, example, true_twist
+from gpca.experiments.estimators.settings import EstimatorPairSettings
 from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.settings import EstimatorPairSettings
 from gpca.features.pair import observed_pair
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
