@@ -7,7 +7,7 @@ from typing import Any
 
 from gpca.errors import InputError
 from gpca.experiments.experiment import Experiment, LeftOut
-from gpca.experiments.frame_labels.settings import in_percent
+from gpca.experiments.frame_labels.settings import FrameLabelSettings, in_percent
 from gpca.pairs.perturbation import CONCEPTS
 
 
@@ -37,4 +37,6 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     return {"frame_labels": {**config["active_learning"], **config["frame_labels"], **samples}}
 
 
-EXPERIMENT = Experiment(name="frame_labels", names=names, shown=shown, check=check)
+EXPERIMENT = Experiment(
+    name="frame_labels", sections={"frame_labels": FrameLabelSettings}, names=names, shown=shown, check=check
+)

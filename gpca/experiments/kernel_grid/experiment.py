@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from gpca.errors import require_names
 from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.kernel_grid.grid import KernelGrid
 from gpca.experiments.kernel_grid.tables import PRINTED
 from gpca.objects.title import title_of
+from gpca.settings import Distinct
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(KernelGrid):
+    """The grid, and the sources whose embeddings it is fitted to."""
+
+    sources: Distinct[str]
 
 
 def check(config: dict, left_out: LeftOut) -> None:
@@ -44,6 +54,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="kernel_grid",
+    sections={"kernel_grid": Section},
     tidy=("kernels.csv",),
     names=names,
     shown=shown,

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, NewConceptSettings
-from gpca.encoders.settings import require_draws
-from gpca.errors import with_key
+from gpca.encoders.settings import EncoderChanges, require_draws
 from gpca.experiments.experiment import Experiment, LeftOut
 
 
+@dataclass(frozen=True, kw_only=True)
+class Section(NewConceptSettings):
+    """What is learned from, and the encoder that learns without labels."""
+
+    encoder: EncoderChanges
+
+
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that the settings agree, and that the encoder that learns without labels has points enough."""
-    section = config["new_concepts"]
-    with_key("new_concepts", NewConceptSettings.from_dict, section)
-    encoder = config["encoders"][config["embedding"]["encoder"]] | section["encoder"]
+    """Check that the encoder that learns without labels has points enough."""
+    encoder = config["encoders"][config["embedding"]["encoder"]] | config["new_concepts"]["encoder"]
     points = config["registrations"]["cloud_points"]
     require_draws("new_concepts.encoder", encoder, points, "registrations.cloud_points")
 
@@ -42,4 +47,11 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
     return {"new_concepts": conditions}
 
 
-EXPERIMENT = Experiment(name="new_concepts", tidy=("new_concepts.csv",), names=names, shown=shown, check=check)
+EXPERIMENT = Experiment(
+    name="new_concepts",
+    sections={"new_concepts": Section},
+    tidy=("new_concepts.csv",),
+    names=names,
+    shown=shown,
+    check=check,
+)

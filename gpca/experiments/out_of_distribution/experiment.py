@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 from baselines.registry import explainer_entry, explainers
-from gpca.encoders.settings import require_draws
+from gpca.encoders.settings import EncoderChanges, require_draws
 from gpca.errors import InputError, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
 from gpca.experiments.explained import require_explained
+from gpca.experiments.out_of_distribution.settings import ShiftSettings
+from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings
+from gpca.settings import Keys, changes_of
+
+_SHIFT = changes_of(ShiftSettings, without=("beyond",)).kinds
+# An encoder of another width would not fit beside the others.
+Shift = Annotated[dict, Keys(_SHIFT | {"encoder": EncoderChanges, "severities": Severities}, required=_SHIFT)]
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -42,6 +49,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 EXPERIMENT = Experiment(
     name="out_of_distribution",
+    sections={"learners": ByName, "shift": Shift},
     tidy=("diagnostics.csv",),
     names=names,
     shown=shown,

@@ -2,6 +2,18 @@
 
 from __future__ import annotations
 
-from gpca.experiments.experiment import Experiment
+from dataclasses import dataclass
+from typing import Annotated
 
-EXPERIMENT = Experiment(name="runtime", tidy=("runtime.csv",))
+from gpca.experiments.experiment import Experiment
+from gpca.settings import Bounds
+
+
+@dataclass(frozen=True)
+class RuntimeSettings:
+    """How often every stage is timed."""
+
+    repeats: Annotated[int, Bounds(minimum=2)] = 100
+
+
+EXPERIMENT = Experiment(name="runtime", sections={"runtime": RuntimeSettings}, tidy=("runtime.csv",))

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from gpca.experiments.experiment import Experiment, Names
 from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
+from gpca.experiments.specification_curve.settings import ReadingSizes
+from gpca.settings import Bounds, Keys
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ReadingSizes):
+    """What the paper leaves unstated, by group, and how much of the data the readings see.
+
+    Attributes:
+        frame_seeds: the first so many of the run's, for which encoders of depth frames that see other clouds are
+            trained.
+    """
+
+    frame_seeds: Annotated[int, Bounds(minimum=0)]
+    groups: Annotated[dict, Keys({name: group.choices for name, group in GROUPS.items()})]
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -24,6 +40,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="specification_curve",
+    sections={"readings": Section},
     tidy=("readings.csv",),
     names=names,
     shown=shown,
