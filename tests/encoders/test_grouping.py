@@ -22,8 +22,8 @@ def farthest_by_a_loop(points_N_3, n_centres):
     return chosen
 
 
-def in_ball_by_a_loop(points_N_3, centre_3, radius, k):
-    found = [i for i, p in enumerate(points_N_3) if np.linalg.norm(p - centre_3) <= radius][:k]
+def in_ball_by_a_loop(points_N_3, center_3, radius, k):
+    found = [i for i, p in enumerate(points_N_3) if np.linalg.norm(p - center_3) <= radius][:k]
     return found + found[:1] * (k - len(found)), len(found)
 
 
