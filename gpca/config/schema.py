@@ -15,10 +15,7 @@ from gpca.comparison.verdicts import Tolerance
 from gpca.config import sections
 from gpca.encoders.settings import NamedEncoder
 from gpca.experiments.experiment import ByName
-from gpca.experiments.frame_labels.settings import FrameLabelSettings
 from gpca.experiments.registry import experiments
-from gpca.experiments.specification_curve.registry import GROUPS
-from gpca.experiments.specification_curve.settings import ReadingSizes
 from gpca.objects.entry import Name, NamedSource, Place
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import Bounds, Distinct, Keys, changes_of, part_of
@@ -32,19 +29,6 @@ class Comparison:
     """Verdicts on the numbers that the paper prints, by unit."""
 
     tolerances: Annotated[dict, Keys(dict.fromkeys(UNITS, Tolerance), required=UNITS)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Readings(ReadingSizes):
-    """What the paper leaves unstated, by group, and how much of the data the readings see.
-
-    Attributes:
-        frame_seeds: the first so many of the run's, for which encoders of depth frames that see other clouds are
-            trained.
-    """
-
-    frame_seeds: Annotated[int, Bounds(minimum=0)]
-    groups: Annotated[dict, Keys({name: group.choices for name, group in GROUPS.items()})]
 
 
 @dataclass(frozen=True)
@@ -63,15 +47,7 @@ class Sections:
     uncertainty: Annotated[dict, Keys(dict.fromkeys(DESIGNS, Design), required=("causal",))]
     causes: Annotated[dict, part_of(CauseSettings, without=("icp", "icp_points"))]
     explainers: ByName
-    active_learning: sections.ActiveLearning
-    new_concepts: sections.NewConcepts
-    kernel_grid: sections.Grid
-    learners: ByName
-    shift: sections.Shift
-    readings: Readings
-    frame_labels: FrameLabelSettings
     model: sections.ExplainedModel
-    runtime: sections.Runtime
     comparison: Comparison
     reference: Allowance
     figures: sections.Figures

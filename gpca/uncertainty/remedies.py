@@ -16,7 +16,7 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import transform
 from gpca.uncertainty.conditions import Remedies
 from gpca.uncertainty.settings import UncertaintySettings
-from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarize_runs
+from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_runs
 
 NEIGHBORS = 24  # so many span the plane that a point is moved to
 OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbor distance
@@ -52,7 +52,7 @@ class RemedyRuns:
         self._source = source[random.permutation(len(source))]
         self._target = target
 
-    def __call__(self, remedies: Remedies) -> Outcome:
+    def __call__(self, remedies: Remedies) -> Spread:
         """Evaluate one combination; what several share is worked out, and charged, once."""
         started = perf_counter()
         tree, points = self._denoised if remedies.denoise else self._observed

@@ -72,7 +72,7 @@ def run_from_starts(icp: BatchedICP, source: np.ndarray, T_target_source_init: n
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Spread:
     """What is kept of one condition, e.g. one setting of the knobs.
 
     Attributes:
@@ -97,7 +97,7 @@ def summarize_runs(
     T_ref: np.ndarray,
     settings: UncertaintySettings,
     started: float,
-) -> Outcome:
+) -> Spread:
     """Summarize the runs of one condition.
 
     Args:
@@ -106,7 +106,7 @@ def summarize_runs(
         started: the ``perf_counter`` at which the condition's work began.
     """
     best = runs.T_target_source_n[runs.cost_n(settings.icp.correspondence_distance).argmin()]
-    return Outcome(
+    return Spread(
         covariance=runs.covariance(T_ref),
         residual=log_residual(transform(inverse(best), target), source_tree),
         degenerate=runs.degenerate(settings.floor),

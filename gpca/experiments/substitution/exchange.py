@@ -12,7 +12,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.experiments.controls.rivals import Embed, Rival, described_for
 from gpca.experiments.judge import Judges
-from gpca.experiments.substitution.estimated import OBSERVED, Estimates, Registrar
+from gpca.experiments.substitution.estimated import OBSERVED, Estimates, KnobbedRegistrar
 from gpca.experiments.substitution.registered import registered_by
 from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
 from gpca.io.names import SPLITS
@@ -100,9 +100,11 @@ class Exchange:
         test = first(registrations, "test", settings.estimated_test)
         described = described_for(rivals, registrations.subset(np.concatenate([learned[:half], test])))
         rows_of = {split: described.rows(split) for split in SPLITS}
-        examples = Registrar(registrations, self.source, self.seed, self.uncertainty).examples(learned[half:], judges)
+        examples = KnobbedRegistrar(registrations, self.source, self.seed, self.uncertainty).examples(
+            learned[half:], judges
+        )
         estimators = {name: make_estimator(name, given, examples) for name, given in self.estimators.items()}
-        registrar = Registrar(described.without_labels(), self.source, self.seed, self.uncertainty)
+        registrar = KnobbedRegistrar(described.without_labels(), self.source, self.seed, self.uncertainty)
         lessons = rows_of["train"] if any(rival.observed_only for rival in rivals.values()) else np.arange(0)
         taught = registrar.estimates(lessons, estimators, OBSERVED)
         asked = registrar.estimates(rows_of["test"], estimators)
