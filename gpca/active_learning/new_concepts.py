@@ -59,18 +59,18 @@ def setting_of(embedding: str, errors: float) -> str:
 
 
 def run_trial(
-    experiment: NewConceptTrial, strategies: Iterable[str], settings: ActiveLearningSettings, *axes: object
+    trial: NewConceptTrial, strategies: Iterable[str], settings: ActiveLearningSettings, *axes: object
 ) -> Iterator[tuple[str, str, list[dict[str, float]]]]:
     """Yield setting, strategy and learning curve (:func:`gpca.active_learning.rounds.run_rounds`).
 
     Start, pool and the strategies' draws are the same for all oracles. All labels are those of the one that never errs.
     """
-    held_out, classes = experiment.held_out, experiment.classes
-    task = make_task(experiment.samples, held_out, settings, *axes, classes=classes)
-    axes = (*axes, experiment.embedding)
+    held_out, classes = trial.held_out, trial.classes
+    task = make_task(trial.samples, held_out, settings, *axes, classes=classes)
+    axes = (*axes, trial.embedding)
     gpc = initial_gpc(task, settings, *axes, classes=classes)
     projected = task.project(gpc)
-    for errors in (0.0, *experiment.errors):
+    for errors in (0.0, *trial.errors):
         answers_N = answers(task.pool.concept_N, classes, errors, *axes, held_out)
         for strategy in strategies:
             if strategy != ALL_LABELS:
@@ -79,7 +79,7 @@ def run_trial(
                 curve = [step_of(projected, gpc, [], epochs=0), _with_all_labels(task, classes, settings, *axes)]
             else:
                 continue
-            yield setting_of(experiment.embedding, errors), strategy, curve
+            yield setting_of(trial.embedding, errors), strategy, curve
 
 
 def _with_all_labels(
