@@ -152,7 +152,7 @@ InSection = TypeVar("InSection", bound=HasSection)
 def read_results(path: Path) -> list[tuple[str, list[Result]]]:
     """Return the sections of a file of the registry, each with its results."""
     return [
-        (section["section"], [_result(section["section"], entry) for entry in section["results"]])
+        (section["section"], [_result(section["section"], entry) for entry in section.get("results", ())])
         for section in load_own_yaml(path)
     ]
 
