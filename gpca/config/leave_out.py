@@ -9,10 +9,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from baselines.registry import explainers
 from gpca.errors import InputError
 from gpca.experiments.experiment import EXPLAINERS, LeftOut
 from gpca.experiments.registry import experiments
+from gpca.explainers.registry import explainers
 
 LEAVABLE_OF_EXPERIMENTS = {key: names for each in experiments() for key, names in each.leavable.items()}
 # Mappings of which any entry may be false.

@@ -32,7 +32,7 @@ class Names:
 
 
 def _explainers() -> Collection[str]:
-    from baselines.registry import explainers  # loads numba
+    from gpca.explainers.registry import explainers  # loads numba
 
     return explainers()
 

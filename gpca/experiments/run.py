@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import explainer_entry
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES
 from gpca.experiments.kernel_grid.tables import PRINTED
 from gpca.experiments.real_world.tables import encoder_title
 from gpca.experiments.registry import experiments
 from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
 from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.objects.title import dataset_of, title_of
 

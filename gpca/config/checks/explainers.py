@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Set
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.active_learning.settings import NewConceptSettings
 from gpca.causes.settings import CauseSettings
 from gpca.comparison.verdicts import Tolerance
 from gpca.encoders.registry import require_backbone
 from gpca.errors import InputError, require_names, with_key
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.pairs.synthesis import RegistrationSettings
 
 BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import fields
 
-from baselines.registry import explainers
 from gpca.config.leave_out import names_left_out
 from gpca.config.schema import DESIGNS
 from gpca.config.sections import Reductions
 from gpca.errors import require_names
 from gpca.experiments.registry import experiments
+from gpca.explainers.registry import explainers
 
 
 def check_left_out(config: dict) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.encoders.registry import require_backbone
 from gpca.encoders.settings import require_draws
 from gpca.errors import with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 
 
 def check(config: dict, _left_out: LeftOut) -> None:

@@ -36,8 +36,8 @@ def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the sources and seeds, the methods, and the explainers whose estimator or whose method is exchanged."""
-    from baselines.registry import explainer_entry
     from gpca.alignment.methods.registry import installed
+    from gpca.explainers.registry import explainer_entry
 
     exchange = config["exchange"]
     return {
@@ -51,8 +51,8 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of what stands in the tables, and the methods whose package is missing here."""
-    from baselines.registry import explainer_entry
     from gpca.alignment.methods.registry import installed, left_out, method_entry
+    from gpca.explainers.registry import explainer_entry
     from gpca.uncertainty.estimators.registry import estimator_entry
 
     exchange = config["exchange"]

@@ -106,7 +106,7 @@ def test_clouds_are_thinned_and_have_normals(registrations):
             "'gicp': needs an initial pose; choose one of fgr, ",
         ),
         ({"icp": {}, "fgr": {}}, {}, "'icp': unknown"),
-        ({"fgr": {"radius": 1}}, {}, "unexpected keyword argument 'radius'"),
+        ({"fgr": {"radius": 1}}, {}, "setting radius: unknown"),
     ],
 )
 def test_methods_that_cannot_run_are_refused(registrations, objects, methods, changes, message):
