@@ -14,9 +14,9 @@ import pytest
 import yaml
 
 from gpca.__main__ import STEPS
-from gpca.config.source_section import Source
 from gpca.experiments.controls.settings import CONTROLS
 from gpca.experiments.results import registered
+from gpca.objects.entry import Source
 
 from .documents import PAGES, ROOT, anchor_of, commands, our_files, relative
 

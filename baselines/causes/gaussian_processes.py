@@ -56,7 +56,7 @@ class MultiLabelGPCA(ScoringExplainer):
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Return the probabilities: of no failure, and of each cause and a failure."""
-        judged = self._classifier.judge(self._classifier.normalised(joined(registrations, GROUPS)))
+        judged = self._classifier.judge(self._classifier.normalized(joined(registrations, GROUPS)))
         return np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
 
 

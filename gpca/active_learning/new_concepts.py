@@ -65,7 +65,7 @@ def run_experiment(
 def _with_all_labels(
     task: Task[np.ndarray], classes: tuple[str, ...], settings: ActiveLearningSettings, *axes: object
 ) -> dict[str, float]:
-    """Return the step after the whole pool is labelled: of a classifier that is fitted anew, as labels alone allow."""
+    """Return the step after the whole pool is labeled: of a classifier that is fitted anew, as labels alone allow."""
     h_L_d = np.concatenate([task.initial.h, task.pool.h])
     labels_L = np.concatenate([task.initial.concept_N, task.pool.concept_N])
     gpc = GPC(classes, settings.gpc, *axes, ALL_LABELS, task.held_out).fit(h_L_d, labels_L)

@@ -39,7 +39,7 @@ class Samples(Generic[Inputs]):
 
 @dataclass(frozen=True)
 class Task(Generic[Inputs]):
-    """What one experiment starts from: the concept held out, labelled samples of the others, pool and test samples."""
+    """What one experiment starts from: the concept held out, labeled samples of the others, pool and test samples."""
 
     held_out: str
     initial: Samples
@@ -60,11 +60,11 @@ def make_task(
     classes: tuple[str, ...] = CONCEPTS,
     new_share: float | None = None,
 ) -> Task[np.ndarray]:
-    """Split the training samples into those labelled at the start and the pool, which holds all the rest.
+    """Split the training samples into those labeled at the start and the pool, which holds all the rest.
 
     Args:
         samples: they carry their embeddings.
-        held_out: the concept of which no sample is labelled at the start.
+        held_out: the concept of which no sample is labeled at the start.
         axes: names of the draw (source, seed).
         classes: all concepts; the start has equally many samples of each known one.
         new_share: share, below 1, of the pool that is of that concept, or as much of it as there is; by default all of
@@ -99,8 +99,8 @@ def initial_gpc(
 ) -> GPC:
     """Fit the GPC that knows all of its concepts but one.
 
-    Scaling, inducing inputs and lengthscale are initialised on the unlabelled pool too: it lies open, and inducing
-    inputs at the labelled samples alone would leave none where the new concept is.
+    Scaling, inducing inputs and lengthscale are initialized on the unlabeled pool too: it lies open, and inducing
+    inputs at the labeled samples alone would leave none where the new concept is.
     """
     gpc = GPC(classes, settings.gpc, *axes, "active_learning", task.held_out)
     around = np.concatenate([task.initial.h, task.pool.h])
@@ -141,7 +141,7 @@ def rounds(
     *axes: object,
     answers_N: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, float], list[int]]]:
-    """Yield each step of :func:`run_rounds` as it is made, and the rows of the pool that were labelled so far."""
+    """Yield each step of :func:`run_rounds` as it is made, and the rows of the pool that were labeled so far."""
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc = copy(gpc)
     answers_N = task.pool.concept_N if answers_N is None else answers_N
@@ -165,8 +165,8 @@ def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[in
     else:
         scores_N_C = np.empty((len(left), 0))
         bald_N = np.empty(len(left))
-    labelled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])
-    return Pool(h.inputs_N_d, scores_N_C, bald_N, labelled, task.pool.concept_N[left])
+    labeled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])
+    return Pool(h.inputs_N_d, scores_N_C, bald_N, labeled, task.pool.concept_N[left])
 
 
 def step_of(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from gpca.process.environment import require_open3d
 
 RADIUS = 0.25  # diameters: five times the spacing of some 500 points on an object
-MOST_NEIGHBOURS = 100
+MOST_NEIGHBORS = 100
 
 
 def cloud_with_normals(points_N_3: np.ndarray, normals_N_3: np.ndarray) -> Any:
@@ -30,7 +30,7 @@ def fpfh_of_pair(pair: Any, radius: float = RADIUS) -> tuple[list[Any], list[Any
 def fpfh(cloud: Any, radius: float = RADIUS) -> Any:
     """Return Open3D's features of a cloud with normals; `.data` is (33, N)."""
     o3d = require_open3d()
-    neighbours = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBOURS)
+    neighbours = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBORS)
     return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbours)
 
 

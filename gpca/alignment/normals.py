@@ -6,13 +6,13 @@ import numpy as np
 
 from gpca.process.environment import require_open3d
 
-NEIGHBOURS = 20  # as Open3D takes for the covariances of generalized ICP
+NEIGHBORS = 20  # as Open3D takes for the covariances of generalized ICP
 
 
-def estimate_normals(points_N_3: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
-    """Return unit normals (N, 3) that point away from the centre of the cloud.
+def estimate_normals(points_N_3: np.ndarray, neighbours: int = NEIGHBORS) -> np.ndarray:
+    """Return unit normals (N, 3) that point away from the center of the cloud.
 
-    The neighbours leave the sign open. Away from the centre is outward on a convex object, and elsewhere at least the
+    The neighbors leave the sign open. Away from the center is outward on a convex object, and elsewhere at least the
     same side in two clouds of one object.
     """
     o3d = require_open3d()

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.active_learning.labelling import SKIPPED, LabelFile, Question, Session, require_name
+from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Session, require_name
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings

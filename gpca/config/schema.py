@@ -13,22 +13,15 @@ from gpca.comparison.published import UNITS
 from gpca.comparison.reference import Allowance
 from gpca.comparison.verdicts import Tolerance
 from gpca.config import sections
-from gpca.config.robot_sections import RealWorld, Recovery
-from gpca.config.source_section import Name, NamedSource, Place
-from gpca.experiments.controls.settings import ControlSettings
-from gpca.experiments.experiment import Explained
-from gpca.experiments.frame_labels.settings import FrameLabelSettings
-from gpca.experiments.registration_methods.settings import EstimatorPairSettings, PairSettings
+from gpca.encoders.settings import NamedEncoder
+from gpca.experiments.experiment import ByName
 from gpca.experiments.registry import experiments
-from gpca.experiments.specification_curve.registry import GROUPS
-from gpca.experiments.specification_curve.settings import ReadingSizes
-from gpca.features.settings import DescriptorSettings
+from gpca.objects.entry import Name, NamedSource, Place
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import Bounds, Distinct, Keys, changes_of, part_of
 
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
 Design = Annotated[dict, changes_of(sections.Design, without=("icp",))]
-ByName = Annotated[dict[Name, dict | None], Field(min_length=1)]  # of what checks its settings itself
 
 
 @dataclass(frozen=True)
@@ -36,35 +29,6 @@ class Comparison:
     """Verdicts on the numbers that the paper prints, by unit."""
 
     tolerances: Annotated[dict, Keys(dict.fromkeys(UNITS, Tolerance), required=UNITS)]
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """What says why the registrations of ``causes`` failed."""
-
-    descriptors: Annotated[dict, part_of(DescriptorSettings)]
-    encoder: sections.Encoder
-    explainers: Explained
-
-
-@dataclass(frozen=True, kw_only=True)
-class Controls(ControlSettings):
-    """The controls, and the explainers under them, with settings beyond those that they have elsewhere."""
-
-    explainers: Explained
-
-
-@dataclass(frozen=True, kw_only=True)
-class Readings(ReadingSizes):
-    """What the paper leaves unstated, by group, and how much of the data the readings see.
-
-    Attributes:
-        frame_seeds: the first so many of the run's, for which encoders of depth frames that see other clouds are
-            trained.
-    """
-
-    frame_seeds: Annotated[int, Bounds(minimum=0)]
-    groups: Annotated[dict, Keys({name: group.choices for name, group in GROUPS.items()})]
 
 
 @dataclass(frozen=True)
@@ -77,29 +41,13 @@ class Sections:
     seeds: Distinct[Annotated[int, Bounds(minimum=0, maximum=2**32 - 1)]]
     objects: sections.Objects
     registrations: Annotated[dict, part_of(RegistrationSettings)]
-    encoders: Annotated[dict[Name, sections.Encoder], Field(min_length=1)]
+    encoders: Annotated[dict[Name, NamedEncoder], Field(min_length=1)]
     reductions: sections.Reductions
     embedding: sections.Embedding
     uncertainty: Annotated[dict, Keys(dict.fromkeys(DESIGNS, Design), required=("causal",))]
-    method_pairs: Annotated[dict, part_of(PairSettings)]
-    methods: ByName
-    estimators: ByName
-    estimator_pairs: Annotated[dict, part_of(EstimatorPairSettings)]
     causes: Annotated[dict, part_of(CauseSettings, without=("icp", "icp_points"))]
-    diagnosis: Diagnosis
-    explainers: Explained
-    active_learning: sections.ActiveLearning
-    new_concepts: sections.NewConcepts
-    kernel_grid: sections.Grid
-    learners: Explained
-    controls: Controls
-    shift: sections.Shift
-    readings: Readings
-    real_world: RealWorld
-    frame_labels: FrameLabelSettings
+    explainers: ByName
     model: sections.ExplainedModel
-    runtime: sections.Runtime
-    recovery: Recovery
     comparison: Comparison
     reference: Allowance
     figures: sections.Figures

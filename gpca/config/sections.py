@@ -5,28 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from gpca.active_learning.settings import ActiveLearningSettings, NewConceptSettings, StreamSettings
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.reduction import PCA, UMAP, Autoencoder
-from gpca.encoders.settings import OPTIONS, EncoderSettings
-from gpca.experiments.kernel_grid.grid import KernelGrid
-from gpca.experiments.out_of_distribution.settings import ShiftSettings
-from gpca.pairs.perturbation import Concept, Severities
-from gpca.settings import (
-    Bounds,
-    Count,
-    Distinct,
-    Keys,
-    OpenShare,
-    PositiveShare,
-    changes_of,
-    read_settings,
-)
+from gpca.objects.entry import SurfacePoints
+from gpca.settings import Bounds, OpenShare, changes_of
 from gpca.uncertainty.settings import UncertaintySettings
 
-SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]
-EncoderChanges = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options"))]
 CauseChanges = Annotated[dict, changes_of(CauseSettings, without=("icp", "icp_points"))]
 
 
@@ -35,18 +20,6 @@ class Objects:
     """How many points are sampled on each mesh."""
 
     surface_points: SurfacePoints
-
-
-@dataclass(frozen=True, kw_only=True)
-class Encoder(EncoderSettings):
-    """An encoder, whose backbone is named; one without a class of options checks them itself, when it is made."""
-
-    backbone: str = field()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.backbone in OPTIONS:
-            read_settings(OPTIONS[self.backbone], self.options, "option")
 
 
 @dataclass(frozen=True)
@@ -79,38 +52,6 @@ class Design(UncertaintySettings):
     samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 3
 
 
-@dataclass(frozen=True, kw_only=True)
-class ActiveLearning(ActiveLearningSettings):
-    """The experiments with a concept that the classifier has never seen."""
-
-    held_out: Distinct[Concept]
-    target: PositiveShare
-    rare_share: OpenShare | None = None
-    rare_labels: Count = 1
-    without: EncoderChanges
-    stream: StreamSettings
-    strategies: Distinct[str]
-
-
-@dataclass(frozen=True, kw_only=True)
-class NewConcepts(NewConceptSettings):
-    """The same where no encoder has seen the samples or the concept, and the encoder that learns without labels."""
-
-    encoder: EncoderChanges
-
-
-@dataclass(frozen=True, kw_only=True)
-class Grid(KernelGrid):
-    """Table IV, and the sources that it is made of."""
-
-    sources: Distinct[str]
-
-
-_SHIFT = changes_of(ShiftSettings, without=("beyond",)).kinds
-# An encoder of another width would not fit beside the others.
-Shift = Annotated[dict, Keys(_SHIFT | {"encoder": EncoderChanges, "severities": Severities}, required=_SHIFT)]
-
-
 @dataclass(frozen=True)
 class ExplainedModel:
     """What the model of ``python -m gpca explain`` learns from."""
@@ -120,13 +61,6 @@ class ExplainedModel:
     causes: CauseChanges
     classifier: GPCSettings
     false_alarms: OpenShare
-
-
-@dataclass(frozen=True)
-class Runtime:
-    """Of Table VII."""
-
-    repeats: Annotated[int, Bounds(minimum=2)] = 100
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-Explained = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings by explainer, which checks them itself
+ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own
 ByRun = Callable[[Mapping[str, Any], Mapping[str, Mapping]], dict[str, Any]]  # of the config, and of its sources
 LeftOut = Callable[[str], set[str]]  # key of a mapping of the config -> names that the config leaves out of it
 

@@ -46,7 +46,7 @@ def learn_pair_encoder(
     """Train an encoder with a head over the concepts, drop the head, and return what embeds registrations, (N, d).
 
     Args:
-        registrations: labelled, with the arrays of `draw` attached.
+        registrations: labeled, with the arrays of `draw` attached.
         settings: how it is trained; the backbone is one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
         draw: what it sees.
         source, seed: name what is random.

@@ -58,7 +58,7 @@ class GlobalRegistration:
     also what should be seen. Needs no truth; a stand-in for a pose estimator.
 
     Args:
-        model: canonical points (Q, 3) of the object and their normals, in metres.
+        model: canonical points (Q, 3) of the object and their normals, in meters.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):

@@ -19,16 +19,16 @@ MADE_BY = "python -m gpca instances"
 
 @dataclass(frozen=True)
 class Instances:
-    """I objects in frames. The object frame is that of the canonical cloud, centred on its bounding box.
+    """I objects in frames. The object frame is that of the canonical cloud, centered on its bounding box.
 
     Attributes:
         dataset, scene, image: (I,) where the instance was seen.
         object_index: (I,) of the objects npz beside this file.
         symmetric: (I,) a rotation exists that changes nothing about the object's shape.
-        T_camera_object_true, T_camera_object_init: (I, 4, 4), metres.
+        T_camera_object_true, T_camera_object_init: (I, 4, 4), meters.
         init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
         camera_3_3: (I, 3, 3) K in pixels.
-        colour: (I,) path of the colour image.
+        colour: (I,) path of the color image.
         points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
             ``points_m[offsets[i]:offsets[i + 1]]``.
         pixels: (ΣP, 2) int32, where each was seen, (u, v).

@@ -33,7 +33,7 @@ MOST_ENCODED_POINTS = 10**6  # in all draws of the encoder together
 MOST_CLOUD_POINTS = 10**6
 MOST_ITERATIONS = 10**5  # of ICP
 MOST_RUNS = 10**4  # of ICP, to describe a pair
-MOST_NEIGHBOURS = 10**4  # or whatever else a backbone's options count
+MOST_NEIGHBORS = 10**4  # or whatever else a backbone's options count
 ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
@@ -55,8 +55,8 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     }
     _require_counts(counts)
     for name, value in settings.options.items():  # a backbone of a user's own has options of its own
-        if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBOURS:
-            raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBOURS}")
+        if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBORS:
+            raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBORS}")
     if not isinstance(content["title"], str) or not content["title"].isprintable():
         raise ValueError("its title is not a line of text")
     _require_treatments(content["treatments"])

@@ -14,7 +14,6 @@ from gpca.errors import InputError
 from gpca.io.files import whole_file
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
-from gpca.page.markdown_table import read_markdown_table
 from gpca.page.samples import POINTS, RULE, page_samples
 from gpca.process.provenance import sha256_of_settings
 from gpca.reporting.registry import SUFFIXES, by_section
@@ -179,7 +178,7 @@ def _content(folder: Path, result: Shown) -> dict:
     """Return one table or figure as the template takes it."""
     common = {"name": result.name, "title": result.title, "caption": rendered_caption(result.name, result.caption)}
     if result.kind == "tables":
-        return common | {"table": read_markdown_table(folder / f"tables/{result.name}.md")}
+        return common | {"table": json.loads((folder / f"tables/{result.name}.json").read_text(encoding="utf-8"))}
     width, height = _size(folder / f"figures/{result.name}.png")
     return common | {"table": None, "width": round(width * _CSS_PIXELS), "height": round(height * _CSS_PIXELS)}
 

@@ -103,7 +103,7 @@ def weigh_chances(means: Means) -> Decide:
 
 
 def weigh_alarmed(means: Means) -> Decide:
-    """Do the same as if told that the pose is wrong, so that actions are compared apart from recognising failures."""
+    """Do the same as if told that the pose is wrong, so that actions are compared apart from recognizing failures."""
     return _weigh(means, alarmed=True)
 
 

@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar
 from gpca.io.structured_text import load_own_yaml
 from gpca.registry import load
 
-SUFFIXES = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}  # the files of each kind
+SUFFIXES = {"tables": ("md", "csv", "tex", "json"), "figures": ("png", "pdf")}  # the files of each kind
 Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values
 
 
@@ -152,7 +152,7 @@ InSection = TypeVar("InSection", bound=HasSection)
 def read_results(path: Path) -> list[tuple[str, list[Result]]]:
     """Return the sections of a file of the registry, each with its results."""
     return [
-        (section["section"], [_result(section["section"], entry) for entry in section["results"]])
+        (section["section"], [_result(section["section"], entry) for entry in section.get("results", ())])
         for section in load_own_yaml(path)
     ]
 

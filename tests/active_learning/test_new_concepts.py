@@ -19,9 +19,9 @@ def samples():
     random = np.random.default_rng(0)
     counts = [12, 12, 12, 12, 6]
     concept_S = np.repeat(CLASSES, counts)
-    centres = 4 * np.repeat(np.eye(5, 8), counts, axis=0)
+    centers = 4 * np.repeat(np.eye(5, 8), counts, axis=0)
     splits = np.concatenate([np.where(np.arange(count) % 3 == 0, "test", "train") for count in counts])
-    return Embedded(centres + random.normal(scale=0.5, size=(54, 8)), concept_S, splits)
+    return Embedded(centers + random.normal(scale=0.5, size=(54, 8)), concept_S, splits)
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +42,13 @@ def test_all_start_from_the_same_samples_and_know_nothing_of_the_new_concept(cur
     assert {(curve[0]["accuracy"], curve[0]["accuracy_new"]) for curve in curves.values()} == {(16 / 18, 0)}
 
 
-def test_the_new_concept_is_learnt_with_all_labels_at_once(curves):
+def test_the_new_concept_is_learned_with_all_labels_at_once(curves):
     labels = [step["labels"] for step in curves["pair", "all_labels"]]
     assert labels == [0, 36 - 16]
     assert curves["pair", "all_labels"][-1]["accuracy_new"] == 1
 
 
-def test_wrong_answers_are_learnt_and_counted_by_what_is_true(samples, curves):
+def test_wrong_answers_are_learned_and_counted_by_what_is_true(samples, curves):
     experiment = Experiment("pair", samples, "geometry", CLASSES, errors=(0.9,))
     [*_, (setting, _, wrong)] = run_experiment(experiment, ["random"], SETTINGS, "tiny", 0)
     assert setting == "pair_errors_90"

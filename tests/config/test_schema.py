@@ -22,7 +22,7 @@ def test_names_in_the_schema_are_those_that_there_are():
     own = {"observed"}  # of the controls, which run it themselves
     assert set(DESIGNS) == set(designs.DESIGNS) - own
     assert [field.name for field in fields(Reductions)] == list(REDUCTIONS)
-    assert SCHEMA["$defs"]["RealWorld"]["properties"]["reductions"]["items"]["enum"] == list(REDUCTIONS)
+    assert SCHEMA["$defs"]["RealWorldSettings"]["properties"]["reductions"]["items"]["enum"] == list(REDUCTIONS)
     assert set(get_args(Kernel)) == set(COVARIANCES)
     assert set(OPTIONS) == set(ENCODERS)
 

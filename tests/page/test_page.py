@@ -154,7 +154,6 @@ def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
 @pytest.mark.parametrize(
     ("damaged", "text", "fault"),
     [
-        ("tiny/tables/table4_mine.md", "no table", "is not a caption with a table below it"),
         ("tiny/figures/reliability.png", "no image", "is not a readable image"),
         ("tiny/comparison.csv", "", "is empty"),
         ("tiny/registrations/bricks/seed0.npz", "PK", "is not a readable npz archive"),

@@ -71,7 +71,7 @@ def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
     assert "| GP-CA | **50.0 (31.4 to 68.6)** |" in text
     for told in ("as if all failures were independent", "fixed by design", "a repaired pose is worth 1"):
         assert told in text
-    with pytest.raises(InputError, match="have no recovery"):
+    with pytest.raises(InputError, match="has nothing to show"):
         table8_recovery(metrics, {}, TITLE, {"absent": "Absent"}, 3)
 
 

@@ -63,7 +63,7 @@ def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
 
 
 def test_the_files_of_a_result_are_those_of_its_kind():
-    assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "tex")]
+    assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "tex", "json")]
     assert result(kind="figures", name="fig").all_files == ["figures/fig.png", "figures/fig.pdf"]
     assert result().main_file == "tables/table9_mine.md"
 

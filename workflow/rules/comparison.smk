@@ -7,9 +7,7 @@ from gpca.comparison.published import read_published
 from gpca.experiments.registry import experiments
 
 COLLECTED = [
-    *("diagnostics.csv", "kernels.csv", "runtime.csv"),
-    *("readings.csv", "new_concepts.csv"),
-    *(name for each in experiments() if each.is_run(NAMES) for name in each.tidy),
+    name for each in experiments() if each.is_run(NAMES) for name in each.tidy
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

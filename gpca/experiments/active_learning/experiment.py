@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
-from gpca.encoders.settings import require_draws
+from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.encoders.settings import EncoderChanges, require_draws
 from gpca.errors import require_names
 from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.pairs.perturbation import Concept
+from gpca.settings import Count, Distinct, OpenShare, PositiveShare
 
 TITLES = {name: strategy.title for name, strategy in STRATEGIES.items()} | STREAMS
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ActiveLearningSettings):
+    """The rounds, the concepts that the classifier has never seen, and the encoder that has not either."""
+
+    held_out: Distinct[Concept]
+    target: PositiveShare
+    rare_share: OpenShare | None = None
+    rare_labels: Count = 1
+    without: EncoderChanges
+    stream: StreamSettings
+    strategies: Distinct[str]
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -40,6 +57,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 EXPERIMENT = Experiment(
     name="active_learning",
+    sections={"active_learning": Section},
     tidy=("active_learning.csv",),
     names=names,
     shown=shown,

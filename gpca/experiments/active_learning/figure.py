@@ -50,13 +50,9 @@ def draw_learning_curves(
 
     Args:
         curve_files: Files named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
-        sources, strategies: The title of each name, in order; those without curves are left out.
         target: The accuracy that counts as reached, which a dashed line marks.
         rows: The settings that are shown, and what stands beside their panels.
         held_out: The concepts over which the mean is; all by default.
-
-    Raises:
-        InputError: an unusable file, or no curve of these.
     """
     means = mean_curves(curve_files, held_out)
     curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in means.items()}
@@ -87,9 +83,6 @@ def draw_curves(
         sources, rows, lines: The title of each name, in order; those without curves are left out.
         styles: Colour, dashes and width of a line; an interval is drawn where the width is above 1.
         target: The accuracy that a dashed line marks.
-
-    Raises:
-        InputError: no curve of these.
     """
     shown = {key for key in curves if key[0] in sources and key[1] in rows and key[2] in lines}
     columns, down, across = ([name for name in part if any(key[i] == name for key in shown)]

@@ -44,7 +44,6 @@ def draw_confusions_figure(
 
     Args:
         metrics_csv: The file that :func:`gpca.attribution.metrics.collect` makes.
-        sources, explainers: The title of each name, in order; those without metrics are left out.
 
     Raises:
         InputError: an unusable file, or one without metrics of these explainers and sources.

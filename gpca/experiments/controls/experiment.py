@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from gpca.errors import InputError, with_key
 from gpca.experiments.controls.settings import TRANSFER, UNSEEN, ControlSettings
-from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut
+from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.experiments.explained import require_explained, titles
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.explainers.registry import explainer_entry
 from gpca.objects.title import stand_in_clause
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ControlSettings):
+    """The controls, and the explainers under them, with settings beyond those that they have elsewhere."""
+
+    explainers: ByName
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -53,6 +61,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="controls",
+    sections={"controls": Section},
     tidy=("controls.csv",),
     names=names,
     shown=shown,

@@ -44,11 +44,6 @@ def draw_severity_curves(severities: pd.DataFrame, explainers: Mapping[str, str]
 
     Args:
         severities: What :func:`gpca.experiments.controls.severity.collect` returned.
-        explainers: The title of each name, in order; those without numbers are left out.
-        title: What stands above.
-
-    Raises:
-        InputError: the severities hold none of these.
     """
     shown = [name for name in explainers if (severities["method"] == name).any()]
     if not shown:
@@ -69,7 +64,8 @@ def draw_severity_curves(severities: pd.DataFrame, explainers: Mapping[str, str]
         limits = (100 * of_concept["low"].min(), 100 * of_concept["high"].max())
         panel.set(xlabel=label, title=concept, ylim=(lowest, 101), xlim=limits if len(of_concept) else None)
     curves[0].set_ylabel("accuracy, success (%)")
-    legend_below(upper, *curves[0].get_legend_handles_labels(), 3)
+    handles, labels = curves[0].get_legend_handles_labels()
+    legend_below(upper, handles, labels, 3)
     of_pose = drawn[drawn["concept"] == "pose"]
     palest = _below(of_pose["value"])
     axes = lower.subplots(lines, WIDEST, sharex=True, sharey=True, squeeze=False)

@@ -11,7 +11,7 @@ from gpca.errors import InputError
 from gpca.experiments.controls.settings import PAPER, TRANSFER
 from gpca.reporting.figures.panels import draw_percentages, in_lines, label_outer, panels_in_lines
 from gpca.reporting.figures.style import SMALL_PT, write_title
-from gpca.reporting.tables.builder import rows_where
+from gpca.reporting.tables.cells import rows_where
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,10 +23,6 @@ def draw_transfer(intervals: pd.DataFrame, sources: Mapping[str, str], explainer
 
     Args:
         intervals: What :func:`gpca.experiments.controls.intervals.collect` returned.
-        sources, explainers: The title of each name, in order; explainers without numbers are left out.
-
-    Raises:
-        InputError: the intervals hold no transfer of these.
     """
     accuracy = rows_where(intervals, metric="accuracy")
     moved = rows_where(accuracy, control=TRANSFER)

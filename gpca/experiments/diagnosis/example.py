@@ -55,7 +55,6 @@ def draw_causes_example(
         objects_npz, causes_npz: Of the shown source and seed, which their paths name.
         predictions_csv: One file per explainer, of the same source and seed.
         settings: The config's section ``causes`` with ``icp``.
-        explainers: The title of each name, in order; those that name no cause are left out.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from gpca.encoders.registry import require_backbone
-from gpca.encoders.settings import require_draws
+from gpca.encoders.settings import NamedEncoder, require_draws
 from gpca.errors import with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
+from gpca.features.settings import DescriptorSettings
+from gpca.settings import part_of
+
+
+@dataclass(frozen=True)
+class Section:
+    """How the explainers of causes describe, encode and explain a pair."""
+
+    descriptors: Annotated[dict, part_of(DescriptorSettings)]
+    encoder: NamedEncoder
+    explainers: ByName
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -34,6 +46,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 EXPERIMENT = Experiment(
     name="diagnosis",
+    sections={"diagnosis": Section},
     names=names,
     shown=shown,
     check=check,

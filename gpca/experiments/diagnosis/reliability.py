@@ -28,11 +28,6 @@ def draw_nominal_reliability(
 
     Args:
         judged: what :func:`gpca.experiments.diagnosis.judged.read_judged` returns; borderline samples are left out.
-        sources: the title of each source, in order.
-        explainers: the title of each explainer, in order; those without predictions are left out.
-
-    Raises:
-        InputError: no predictions of these sources and explainers.
     """
     parts = {
         name: [of_seed for (source, own, _), of_seed in judged.items() if own == name and source in sources]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 from gpca.alignment.methods.registry import method_entry, methods, require_local
 from gpca.errors import InputError, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.estimators.settings import EstimatorPairSettings
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.settings import part_of
 from gpca.uncertainty.estimators.registry import estimator_entry, estimators, require_estimator_settings
 
 
@@ -37,6 +39,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 EXPERIMENT = Experiment(
     name="estimators",
+    sections={"estimators": ByName, "estimator_pairs": Annotated[dict, part_of(EstimatorPairSettings)]},
     tidy=("estimators.csv",),
     names=names,
     shown=shown,

@@ -38,7 +38,6 @@ def draw_estimators(
     Args:
         estimates: rows by source, estimator and seed; the reference is among the estimators.
         samples_npz: the reference's samples of the shown source and seed, which its path names.
-        estimators, methods: the title of each name, in order.
 
     Raises:
         InputError: an unusable file, or files that do not belong together.

@@ -19,7 +19,7 @@ from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes
 from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.frames import chosen_instances, measure_frames
-from gpca.causes.labels import LABELS, labelled
+from gpca.causes.labels import LABELS, labeled
 from gpca.causes.settings import CauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
@@ -134,7 +134,7 @@ class _Asked:
     def __init__(
         self, causes: Causes, described: Descriptors, encoder: EncoderSettings, axes: tuple[str, int], lessons: list
     ) -> None:
-        self._registrations = observed_only(labelled(causes))
+        self._registrations = observed_only(labeled(causes))
         self._described = described
         self._encoder = encoder
         self._axes = axes
@@ -162,7 +162,7 @@ class _Asked:
             entry = explainer_entry("gpca_pair", CAUSES)
             parts = []
             for causes, descriptors, _, _ in self._lessons:
-                registrations = with_what_it_reads(labelled(Causes.load(causes)), entry, descriptors)
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, descriptors)
                 parts.append(registrations.subset(training_rows(registrations, causes)))
             asked = self._with(self._described.groups)
             self._of_descriptors = [(_joined(parts), asked)]
@@ -175,7 +175,7 @@ class _Asked:
 
             entry = explainer_entry("gpca", CAUSES)
             for causes, _, weights, embeddings in self._lessons:
-                registrations = with_what_it_reads(labelled(Causes.load(causes)), entry, embeddings)
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, embeddings)
                 model = load_model(weights, self._encoder, LABELS, registrations.axes, step="train_on_causes")
                 h_S_d, logits_S_C = embed(model, self._registrations, *self._axes, self._encoder)
                 lessons = registrations.subset(training_rows(registrations, causes))

@@ -80,5 +80,5 @@ def _embedded(options: Namespace, points: int) -> Iterator[tuple[str, Embedded]]
     yield from zip(options.backbones, map(samples, of_backbones), strict=True)
     axes = (options.source, options.seed)
     measured_S_F = describe_registrations(registrations, *axes, points=points)["relations"]
-    normalised = NormalisedDescriptors(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
-    yield PAIR, samples(normalised(measured_S_F))
+    normalized = NormalisedDescriptors(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
+    yield PAIR, samples(normalized(measured_S_F))

@@ -29,7 +29,6 @@ def draw_saliency(registrations_npz: str | Path, maps_npz: str | Path, deletions
 
     Args:
         registrations_npz, maps_npz, deletions_csv: Of one source and seed.
-        title: Of the source.
 
     Raises:
         InputError: an unusable file, or files that do not belong together.

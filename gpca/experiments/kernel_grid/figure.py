@@ -29,11 +29,6 @@ def draw_kernel_curves(grid: pd.DataFrame, sources: Mapping[str, str], numbers: 
 
     Args:
         grid: The frame that :func:`gpca.experiments.kernel_grid.grid.read_grids` returns.
-        sources: The title of each name, in order; those without a grid are left out.
-        numbers: What the paper prints.
-
-    Raises:
-        InputError: The grid holds none of these sources.
     """
     shown = [name for name in sources if (grid["source"] == name).any()]
     if not shown:

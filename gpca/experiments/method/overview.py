@@ -55,7 +55,6 @@ def draw_overview(
             sample of the concept `CONCEPT` that :meth:`gpca.experiments.method.shown_sample.Stages.choose` returns.
         uncertainty_csv: The uncertainties of the design ``causal``.
         limits: Those of the errors that states are told apart by, from the config.
-        title: The title of the source.
         encoder: The name that the figure gives the encoder.
         treatments: The action of recovery for each concept.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.

@@ -64,13 +64,9 @@ def draw_pipeline(
         limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
             :func:`gpca.experiments.active_learning.figure.draw_learning_curves`.
-        title: The title of the source.
         encoder: The name that the figure gives the encoder.
         active_learning: The config's section; the figure repeats the first round of the run.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
-
-    Raises:
-        InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])
@@ -164,7 +160,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     bald_N = asked.bald_N
     points_N_2 = asked.map_S_2[asked.rows_N]
     order = np.argsort(bald_N, kind="stable")
-    panel.scatter(*asked.map_S_2[asked.labelled].T, s=5, marker="x", color=GREY, linewidths=0.5)
+    panel.scatter(*asked.map_S_2[asked.labeled].T, s=5, marker="x", color=GREY, linewidths=0.5)
     panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GREY, linewidths=0.3)
     panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
     panel.set_axis_off()

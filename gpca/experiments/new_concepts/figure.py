@@ -32,11 +32,7 @@ def draw_new_concepts(curve_files: Iterable[str | Path], sources: Mapping[str, s
 
     Args:
         curve_files: Files named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
-        sources: The title of each name, in order; those without curves are left out.
         target: The accuracy that a dashed line marks.
-
-    Raises:
-        InputError: an unusable file, or no curve of these.
     """
     curve_files = list(curve_files)
     curves = {

@@ -21,7 +21,7 @@ def self_supervised(
 
     Args:
         registrations: S of them; their concepts are not read.
-        measured_S_F: of each pair, normalised.
+        measured_S_F: of each pair, normalized.
         source, seed: name what is random.
         settings: of the encoder.
     """

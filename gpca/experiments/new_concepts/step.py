@@ -135,7 +135,7 @@ class _Work:
     def _embeddings(self, registrations: Registrations) -> Iterator[tuple[str, np.ndarray]]:
         """Yield each embedding's name and the samples (S, d) in it."""
         measured_S_F = describe_registrations(registrations, *self._axes, points=self._own.points)["relations"]
-        pair_S_F = _normalised(measured_S_F, registrations.split == "train", *self._axes)
+        pair_S_F = _normalized(measured_S_F, registrations.split == "train", *self._axes)
         for name in self._own.embeddings:
             if name == "pair":
                 yield name, pair_S_F
@@ -153,14 +153,14 @@ class _Work:
         known = tuple(label for label in LABELS if label in seen["encoder"].concept)
         if NOMINAL in self._own.causes:
             yield Experiment("pretrained", seen["encoder"], NOMINAL, known)
-            yield Experiment("pair", self._normalised(seen["pair"]), NOMINAL, known)
+            yield Experiment("pair", self._normalized(seen["pair"]), NOMINAL, known)
         if GEOMETRY in self._own.causes and (drawn := self._geometry()) is not None:
             h_G_d = embed(self._cause_model, drawn.registrations, *self._axes, self._cause_encoder)[0]
             icp, descriptors = ICPSettings(**self._given["icp"]), DescriptorSettings(**self._given["descriptors"])
             new = _seen(drawn, h_G_d, describe_all(drawn, *self._axes, descriptors, icp)[0], GEOMETRY)
             both = {name: seen[name].followed_by(new[name]) for name in new}
             yield Experiment("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
-            yield Experiment("pair", self._normalised(both["pair"]), GEOMETRY, (*known, GEOMETRY))
+            yield Experiment("pair", self._normalized(both["pair"]), GEOMETRY, (*known, GEOMETRY))
 
     def _geometry(self) -> Causes | None:
         drawn = draw_geometry(
@@ -175,11 +175,11 @@ class _Work:
             _leave_out(self._options.source, GEOMETRY, why)
         return drawn
 
-    def _normalised(self, samples: Embedded) -> Embedded:
-        return replace(samples, embedding=_normalised(samples.embedding, samples.split == "train", *self._axes))
+    def _normalized(self, samples: Embedded) -> Embedded:
+        return replace(samples, embedding=_normalized(samples.embedding, samples.split == "train", *self._axes))
 
 
-def _normalised(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) -> np.ndarray:
+def _normalized(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) -> np.ndarray:
     return NormalisedDescriptors(*axes, "new_concepts").fit(measured_S_F[train_S])(measured_S_F)
 
 

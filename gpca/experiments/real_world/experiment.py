@@ -10,6 +10,7 @@ from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names
 from gpca.experiments.explained import titles
+from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
 from gpca.explainers.registry import require_settings
 from gpca.frames.rgbd_scene import SceneSettings
@@ -131,6 +132,7 @@ def _pretrained_on(frames: Mapping) -> str:
 
 EXPERIMENT = Experiment(
     name="real_world",
+    sections={"real_world": RealWorldSettings},
     tidy=("real_world.csv",),
     names=names,
     shown=shown,

@@ -23,11 +23,6 @@ def draw_frame_reliability(prediction_files: Iterable[str | Path], methods: Mapp
 
     Args:
         prediction_files: named ``…/{source}/{method}/seed{seed}.csv``, of one source.
-        methods: the title of each method, in order; those without predictions are left out.
-        title: of the frames.
-
-    Raises:
-        InputError: no predictions of these methods, what the reader of predictions refuses.
     """
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for path in prediction_files:

@@ -7,6 +7,7 @@ from typing import Any
 
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.recovery.settings import RecoverySettings
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.situations import SituationSettings
 from gpca.objects.title import dataset_of, title_of
@@ -84,6 +85,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="recovery",
+    sections={"recovery": RecoverySettings},
     tidy=("recovery.csv",),
     names=names,
     shown=shown,

@@ -70,11 +70,11 @@ def learn_explainers(
         if entry.reads == "embeddings":
             model = model or train_encoder(registrations, source, seed, encoder)[0]
             attach = _embedding(model, source, seed, encoder)
-            learnt = train
+            learned = train
         else:
             attach = _remedies(source, seed, uncertainty)
-            learnt = train.subset(np.arange(len(train))[:most_remedied])
-        explainer.fit(attach(learnt))
+            learned = train.subset(np.arange(len(train))[:most_remedied])
+        explainer.fit(attach(learned))
         fitted[name], attached[name] = explainer, attach
     explain = {name: _timed(explainer, attached[name]) for name, explainer in fitted.items()}
     calibration = {name: of_name(held_out.without_labels()) for name, of_name in explain.items()}

@@ -21,8 +21,6 @@ def draw_queued_labels(queues: pd.DataFrame, title: str, policies: Mapping[str, 
 
     Args:
         queues: What :func:`gpca.experiments.recovery.queue_file.read_queues` returns.
-        title: Where the failures are from.
-        policies: The title of each name, in order.
     """
     shown = [name for name in policies if (queues["policy"] == name).any()]
     highest = 100 * queues[queues["policy"].isin(shown)]["high"].max()

@@ -26,7 +26,7 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
-BATCH = 4  # cases that are labelled before anything is learned from them
+BATCH = 4  # cases that are labeled before anything is learned from them
 DRAWS = 5  # random orders
 
 
@@ -85,10 +85,10 @@ class ChancesLearner:
         self, trials: Sequence[Sequence[Trial]], judged_N_F: Sequence[np.ndarray], costs: Mapping[str, float]
     ) -> None:
         self._trials, self._judged_N_F, self._costs = trials, judged_N_F, costs
-        self._learnt: list[int] = []
+        self._learned: list[int] = []
 
     def _utility(self) -> ExpectedUtility:
-        return learn_utility([self._trials[row] for row in self._learnt], self._costs, tuple(self._costs))
+        return learn_utility([self._trials[row] for row in self._learned], self._costs, tuple(self._costs))
 
     def doubts(self) -> np.ndarray:
         """Return the probability that the best action does not help."""
@@ -97,7 +97,7 @@ class ChancesLearner:
 
     def learn(self, rows: np.ndarray) -> None:
         """Learn what helped."""
-        self._learnt += rows.tolist()
+        self._learned += rows.tolist()
 
     def choose(self) -> list[str]:
         """Return the actions of the largest gains."""

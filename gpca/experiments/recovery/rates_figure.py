@@ -28,12 +28,8 @@ def draw_recovery_rates(metrics: pd.DataFrame, title: str, policies: Mapping[str
 
     Args:
         metrics: The tidy metrics that :func:`gpca.experiments.recovery.metrics.collect_recovery` makes.
-        title: Where the failures are from.
         policies: The title of each name, from top to bottom; those without numbers are left out.
         budget: The number of actions that a policy may take.
-
-    Raises:
-        InputError: the metrics hold none of these.
     """
     shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1") is not None]
     if not shown:

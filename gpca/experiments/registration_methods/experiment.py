@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 from gpca.alignment.methods.registry import (
     installed,
@@ -14,7 +14,9 @@ from gpca.alignment.methods.registry import (
     require_settings,
 )
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.registration_methods.settings import PairSettings
+from gpca.settings import part_of
 
 
 def check(config: dict, names_left_out: LeftOut) -> None:
@@ -46,6 +48,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 EXPERIMENT = Experiment(
     name="registration_methods",
+    sections={"method_pairs": Annotated[dict, part_of(PairSettings)], "methods": ByName},
     tidy=("registration_methods.csv",),
     names=names,
     shown=shown,

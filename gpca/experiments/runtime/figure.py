@@ -32,11 +32,6 @@ def draw_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number]) -
 
     Args:
         runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.
-        title: The title of the objects that were registered.
-        numbers: The numbers that the paper prints.
-
-    Raises:
-        InputError: A stage was not measured.
     """
     series = _stages(runtime, numbers)
     rows = [*(COMPONENTS[component] for component in OF_ONE_EXPLANATION), ALL_STAGES]

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.active_learning.rounds import Task, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings
-from gpca.experiments.runtime.stage_times import CloudPair, time_explanations, time_labelling, time_stages
+from gpca.experiments.runtime.stage_times import CloudPair, time_explanations, time_labeling, time_stages
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.runtime_file import COMPONENTS, RUNTIME_COLUMNS
@@ -65,7 +65,7 @@ def measure(
         small = (_drawn(source, random), _drawn(target, random))
         times = chain(
             time_stages(explainers, model, (source, target), random),
-            time_labelling(projected, gpc, settings, random),
+            time_labeling(projected, gpc, settings, random),
             time_explanations(explainers, {"explanation": (source, target), "explanation_512": small}),
         )
         for key, elapsed in times:

@@ -32,11 +32,6 @@ def draw_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: Mapp
 
     Args:
         judged: what :func:`gpca.comparison.readings.read_judged` returned.
-        groups: The title of each group, in order; those without such a number are left out.
-        sources: source -> title and whether it is a stand-in.
-
-    Raises:
-        InputError: there is no number to draw.
     """
     missed = asked_about(judged)
     shown = [name for name in groups if (missed["group"] == name).any()]

@@ -60,7 +60,7 @@ def pool(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Ite
 def until(
     accuracy: float, task: Task[np.ndarray], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
 ) -> tuple[list[dict[str, float]], list[int]]:
-    """Return the rounds to the first of that accuracy, or all of them, and the rows of the pool that they labelled."""
+    """Return the rounds to the first of that accuracy, or all of them, and the rows of the pool that they labeled."""
     done = []
     for step_and_rows in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
         done.append(step_and_rows)
@@ -88,10 +88,10 @@ def passes(
     task: Task[np.ndarray], queried: list[int], settings: GPCSettings, target: float, *axes: object
 ) -> dict[str, float]:
     """Return the epochs after which a new classifier on the labels reaches the target, and whether it does."""
-    labelled_L_d = np.concatenate([task.initial.h, task.pool.h[queried]])
+    labeled_L_d = np.concatenate([task.initial.h, task.pool.h[queried]])
     concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[queried]])
     gpc = GPC(CONCEPTS, settings, *axes, "epochs")
-    for done in gpc.fit_up_to(range(EVERY, MOST + 1, EVERY), labelled_L_d, concept_L):
+    for done in gpc.fit_up_to(range(EVERY, MOST + 1, EVERY), labeled_L_d, concept_L):
         named_N = np.array(CONCEPTS)[gpc.attribute(task.test.h)[0].argmax(axis=1)]
         if np.mean(named_N == task.test.concept_N) >= target:
             return {"epochs_to_target": float(done), "reached": 1.0}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import EXPLAINERS, Experiment, Explained
+from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment
 from gpca.experiments.substitution.settings import ExchangeSettings
 from gpca.settings import Distinct
 
@@ -18,7 +18,7 @@ class Section(ExchangeSettings):
     """The settings, the sources whose registrations are explained, and the explainers."""
 
     sources: Distinct[str]
-    explainers: Explained
+    explainers: ByName
 
 
 def check(config: dict, left_out: Callable[[str], set[str]]) -> None:

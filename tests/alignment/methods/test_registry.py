@@ -182,7 +182,7 @@ def test_an_unknown_name_lists_the_known():
             {"metric": "point_to_line"},
             "metric: 'point_to_line' should be 'point_to_point' or",
         ),
-        ("tukey", {"kernel": "Tukey"}, "kernel: unknown; choose one of scale"),
+        ("tukey", {"kernel": "Tukey"}, "kernel: 'Tukey' should be 'HuberLoss', 'CauchyLoss', 'GMLoss' or 'TukeyLoss'"),
     ],
 )
 def test_settings_that_a_method_does_not_take_are_refused(name, settings, words):

@@ -112,20 +112,13 @@ def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
         ("a", "gpca_pair", "learning_seconds", 100): 2.5,
         ("a", "gpca_pair", "seconds", 100): 0.01,
     }
-    write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [-1], "seconds": [0.01]}))
-    with pytest.raises(InputError, match="'learning_seconds' contains numbers below 0"):
-        collect_costs([path])
 
 
 def test_views_of_one_instance_are_one_object(files):
     assert set(read_controls(files)["instance"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
 
 
-def test_an_unknown_control_is_refused(tmp_path):
-    path = tmp_path / "controls" / "a" / "seed100.csv"
-    write_csv(path, said("a", "a", "gravity", "gpca", 3))
-    with pytest.raises(InputError, match="unknown control 'gravity'; expected one of density"):
-        read_controls([path])
+def test_no_files_are_refused():
     with pytest.raises(InputError, match="no files were given"):
         read_controls([])
 
@@ -163,7 +156,6 @@ def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
     ("changed", "words"),
     [
         ({"crop": 0.9}, r"'crop' contains 0.9, outside its bins from 0.2 to 0.6"),
-        ({"sample": 7}, "contains a sample twice"),
         ({"sample": np.arange(30) + 1}, "lack test samples"),
     ],
 )

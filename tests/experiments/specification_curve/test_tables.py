@@ -35,7 +35,7 @@ def test_a_row_says_where_the_number_lies_and_which_reading_is_nearest():
 def test_numbers_on_stand_ins_are_shown_as_such_and_reproduced_ones_are_not():
     stand_in = {"ycb": {"title": "YCB", "stand_in": True}}
     assert "procedural stand-in" in table13_readings(rows("not comparable"), GROUPS, stand_in).markdown()
-    with pytest.raises(InputError, match="no missed number"):
+    with pytest.raises(InputError, match="has nothing to show"):
         table13_readings(rows("reproduced"), GROUPS, REAL)
 
 

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment import icp_target
-from gpca.alignment.icp_neighbours import nearest
+from gpca.alignment.icp_neighbors import nearest
 from gpca.alignment.icp_target import LISTED, make_target
 
 RANDOM = np.random.default_rng(0)

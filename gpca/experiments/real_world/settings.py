@@ -1,4 +1,4 @@
-"""Sections of the config about what a robot sees and does: frames of real scenes, and recovery."""
+"""The section ``real_world`` of the config: depth frames, and what is learned and explained on them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,12 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from gpca.causes.frame_settings import FrameCauseSettings
-from gpca.config.sections import EncoderChanges, SurfacePoints
-from gpca.config.source_section import Checksums, Name, Place, Text, Unit, Urls
 from gpca.encoders.settings import EncoderSettings
-from gpca.frames.camera import Camera
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import SceneSettings
-from gpca.pairs.perturbation import CONCEPTS, Hidden
+from gpca.objects.entry import Checksums, Name, Place, Text, Unit, Urls
 from gpca.pairs.synthesis import TestSamples, TrainSamples
-from gpca.recovery.settings import LoopSettings
-from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, OpenShare, Share, changes_of, part_of
+from gpca.settings import Bounds, Count, Distinct, OpenShare, Share, changes_of
 
 Pretraining = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draws"))]
 # The encoder then embeds draws of the size that it was last trained on.
@@ -51,7 +47,7 @@ class VirtualFrames:
 
 
 @dataclass(frozen=True)
-class RealWorld:
+class RealWorldSettings:
     """Registrations of depth frames, every backbone with every reduction."""
 
     title: Text
@@ -72,45 +68,3 @@ class RealWorld:
     explainers: dict[str, dict | None] | None
     one_encoder: bool
     causes: FrameCauseSettings
-
-
-@dataclass(frozen=True)
-class DeclaredThresholds:
-    """When a policy takes which branch; without `uncertain` the calibration samples set it, by `queued_share`."""
-
-    uncertain: NotNegative | None
-    queued_share: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
-    dominant: Share
-    improvement: Share
-
-
-@dataclass(frozen=True)
-class Estimator(InitialPoseSettings):
-    """How the robot estimates a pose."""
-
-    form: Literal["global_registration"] = "global_registration"
-
-
-@dataclass(frozen=True)
-class Recovery:
-    """What is done about a failed registration, in a closed loop on tables of the virtual camera."""
-
-    objects: str
-    policies: Distinct[str]
-    treatments: Annotated[dict, Keys(dict.fromkeys(CONCEPTS, str), required=CONCEPTS)]
-    actions: Annotated[dict[str, dict | None], Field(min_length=1)]  # an action checks its settings itself
-    costs: dict[str, Share]
-    needless: Share
-    thresholds: DeclaredThresholds
-    rehearsals: Count
-    loop: Annotated[dict, part_of(LoopSettings, without=("cloud_points", "icp"))]
-    train: TrainSamples
-    calibration: TestSamples
-    remedied: TestSamples
-    tables: Count
-    camera: Camera
-    noise_scale: tuple[NotNegative, NotNegative]
-    hidden: tuple[Hidden, Hidden]
-    estimator: Annotated[dict, changes_of(Estimator, without=("rotation_deg", "translation"))]
-    model_points: SurfacePoints
-    encoder: EncoderChanges

@@ -45,9 +45,9 @@ def nearest(
     ):
         return -1, 0.0
     i, j, k = int(i_voxel), int(j_voxel), int(k_voxel)
-    centre_x = low[0] - distance + (i + 0.5) * voxel
-    centre_y = low[1] - distance + (j + 0.5) * voxel
-    centre_z = low[2] - distance + (k + 0.5) * voxel
+    center_x = low[0] - distance + (i + 0.5) * voxel
+    center_y = low[1] - distance + (j + 0.5) * voxel
+    center_z = low[2] - distance + (k + 0.5) * voxel
     flat = (i * voxels[1] + j) * voxels[2] + k
     row = list_of_voxel[flat]
     if row < 0 and used[0] < len(listed):
@@ -61,15 +61,15 @@ def nearest(
             cell,
             cells,
             distance + voxel,
-            centre_x,
-            centre_y,
-            centre_z,
+            center_x,
+            center_y,
+            center_z,
             listed[row],
             offsets[row],
             room,
         )
     if row >= 0:
-        dx, dy, dz = x - centre_x, y - centre_y, z - centre_z
+        dx, dy, dz = x - center_x, y - center_y, z - center_z
         chosen, first_square, second_square = _two_closest(offsets, row, dx, dy, dz)
         complete = reach[row] - np.sqrt(dx * dx + dy * dy + dz * dz)
         # What is not listed may be the second nearest. The radius leaves room for rounding.
@@ -96,7 +96,7 @@ def _two_closest(offsets, row, dx, dy, dz):
 
 @njit(**INNER_LOOP)
 def _list_nearest(points, starts, low, cell, cells, radius, x, y, z, listed, offsets, squares):
-    """List the points nearest to a voxel's centre; return how far the list is complete."""
+    """List the points nearest to a voxel's center; return how far the list is complete."""
     window = 1
     while True:
         squares[:] = radius * radius

@@ -4,7 +4,7 @@ import pytest
 
 from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import tidy
-from gpca.reporting.tables.shares import share_cell, share_over_sources
+from gpca.reporting.tables.cells import share_cell, share_over_sources
 from gpca.reporting.tables.table import Column
 
 

@@ -1,4 +1,4 @@
-"""The section ``sources`` of the config: where objects come from (docs/adding.md)."""
+"""A source's entry in the config: where its objects come from (docs/adding.md)."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ Url = Annotated[str, Field(pattern=r"^https?://\S+$")]
 Urls = Annotated[list[Url], Field(min_length=1)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Checksums = Sha256 | list[Sha256 | None] | None
+SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]  # sampled on each mesh
 
 
 @dataclass(frozen=True)
