@@ -10,8 +10,7 @@ from dataclasses import fields
 from functools import partial
 from typing import Any
 
-from gpca.config.schema import DESIGNS
-from gpca.config.sections import Reductions
+from gpca.config.schema import DESIGNS, Reductions
 from gpca.errors import InputError, require_names
 from gpca.experiments.experiment import EXPLAINERS, Names
 from gpca.experiments.registry import experiments

@@ -1,7 +1,7 @@
 """What an experiment says of itself, so that the config, the workflow and the page need not know it.
 
-It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}/experiment.py``, which imports nothing heavy. Beside it are the
-steps that run it; ``results.yaml``, its part of the registry of tables and figures; and what makes these.
+It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}/experiment.py``, which imports nothing heavy. Beside it
+are the steps that run it; ``results.yaml``, its part of the registry of tables and figures; and what makes these.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
+
+from gpca.explainers.registry import explainers
 
 ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own
 ByRun = Callable[[Mapping[str, Any], Mapping[str, Mapping]], dict[str, Any]]  # of the config, and of its sources
@@ -31,13 +33,7 @@ class Names:
     known: Callable[[], Collection[str]] | None = None
 
 
-def _explainers() -> Collection[str]:
-    from gpca.explainers.registry import explainers  # loads numba
-
-    return explainers()
-
-
-EXPLAINERS = Names("explainer", _explainers)
+EXPLAINERS = Names("explainer", explainers)
 
 
 @dataclass(frozen=True, kw_only=True)
