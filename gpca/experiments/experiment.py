@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from baselines.registry import explainers
+from gpca.explainers.registry import explainers
 
 ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own
 ByRun = Callable[[Mapping[str, Any], Mapping[str, Mapping]], dict[str, Any]]  # of the config, and of its sources
