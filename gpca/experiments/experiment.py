@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from baselines.registry import explainers
+from gpca.explainers.registry import explainers
 from gpca.reporting.registry import expand
 
 ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own

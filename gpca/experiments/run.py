@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import explainer_entry
 from gpca.experiments.real_world.tables import encoder_title
 from gpca.experiments.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.objects.title import dataset_of, title_of
 

@@ -188,7 +188,7 @@ def input_name(argument: str, keyword: str) -> str:
 
 
 def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
-    """Return the files of all combinations of the names that patterns list in braces; a path where nothing is listed."""
+    """Return the files of all combinations of the names in braces; a path where none of these is listed."""
     files = []
     listed = [name for name in _braced(patterns) if not isinstance(names[name], str)]
     for pattern in patterns:

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.registry import explainer_entry
 from gpca.errors import InputError, with_key
 from gpca.experiments.controls.settings import TRANSFER, UNSEEN, ControlSettings
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Tidy
 from gpca.experiments.explained import require_explained, titles
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
+from gpca.explainers.registry import explainer_entry
 from gpca.objects.title import stand_in_clause
 
 

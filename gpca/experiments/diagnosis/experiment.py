@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from baselines.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.encoders.registry import require_backbone
 from gpca.encoders.settings import NamedEncoder, require_draws
 from gpca.errors import with_key
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
+from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.features.settings import DescriptorSettings
 from gpca.settings import part_of
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import require_settings
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
@@ -13,6 +12,7 @@ from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
+from gpca.explainers.registry import require_settings
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural

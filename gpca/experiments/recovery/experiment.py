@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.recovery.settings import RecoverySettings
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.situations import SituationSettings
 from gpca.objects.title import dataset_of, title_of
 from gpca.recovery.actions import ACTIONS, action_of

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.registry import explainer_entry
 from gpca.alignment.methods.registry import installed, left_out, method_entry
 from gpca.errors import require_names, with_key
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Tidy
 from gpca.experiments.explained import require_explained, titles
 from gpca.experiments.substitution.asked import require_exchangeable
 from gpca.experiments.substitution.settings import ExchangeSettings
+from gpca.explainers.registry import explainer_entry
 from gpca.settings import Distinct
 from gpca.uncertainty.estimators.registry import estimator_entry
 
