@@ -46,11 +46,11 @@ class AnalyticalGPC(GPCA):
         self._axes = (source, seed, "analytical")
         self._point_count = point_count
         self._shape_points = shape_points
-        self._neighbours = neighbours
+        self._neighbors = neighbours
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the features, the point-count ratio last, unless they are attached already."""
-        measure = partial(analytical_features, shape_points=self._shape_points, neighbours=self._neighbours)
+        measure = partial(analytical_features, shape_points=self._shape_points, neighbours=self._neighbors)
         return measured(registrations, self._prefix, lambda: {"features": measure(registrations, *self._axes)})
 
     def features(self, registrations: Registrations) -> np.ndarray:
@@ -60,7 +60,7 @@ class AnalyticalGPC(GPCA):
 
     @property
     def _prefix(self) -> str:
-        return "_".join(map(str, (*self._axes, self._shape_points, self._neighbours, "")))
+        return "_".join(map(str, (*self._axes, self._shape_points, self._neighbors, "")))
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
         return self.features(registrations)

@@ -47,7 +47,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         self._embed: Callable[[Registrations], Registrations] | None = None
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
-        """Train the encoder on the labelled pairs, and return what attaches its embeddings."""
+        """Train the encoder on the labeled pairs, and return what attaches its embeddings."""
         from gpca.encoders.settings import EncoderSettings
         from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
         from gpca.features.registered import MOTION
@@ -70,7 +70,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         return embed
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit the GPC to the labelled pairs, after the encoder, unless its embeddings are attached."""
+        """Fit the GPC to the labeled pairs, after the encoder, unless its embeddings are attached."""
         if self._embedding not in registrations.attached:
             self._embed = self.learn_encoder(registrations)
         super().fit(registrations)

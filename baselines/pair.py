@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.concept_classifier import ClassifierExplainer, standardised_regression
 from gpca.classifier.settings import GPCArguments
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.features.settings import DescribedPoints
@@ -85,7 +85,7 @@ def density(
     source: str, seed: int, inverse_regularisation: Positive = 1.0, points: DescribedPoints = 512
 ) -> PairLearner:
     """Make the logistic regression that knows spacing and extent of the observed cloud, and nothing else."""
-    return PairLearner(standardised_regression(inverse_regularisation), source, seed, "densities", points)
+    return PairLearner(standardized_regression(inverse_regularisation), source, seed, "densities", points)
 
 
 EXPLAINERS = {

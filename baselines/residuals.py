@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer, standardised_regression
 from gpca.attribution.scores import Attribution
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
@@ -94,7 +94,7 @@ def residuals_logistic(
     source: str, seed: int, inverse_regularisation: Positive = 1.0, floor: Positive = FLOOR
 ) -> Residuals:
     """Make the rival with logistic regression."""
-    return Residuals(standardised_regression(inverse_regularisation), floor)
+    return Residuals(standardized_regression(inverse_regularisation), floor)
 
 
 def residuals_forest(source: str, seed: int, trees: Count = 200, floor: Positive = FLOOR) -> Residuals:

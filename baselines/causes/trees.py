@@ -14,8 +14,8 @@ from gpca.seeds import seed_of
 from gpca.settings import Count
 
 
-def randomised_trees(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2):
-    """Return an unfitted forest of extremely randomised trees (Geurts et al. 2006)."""
+def randomized_trees(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2):
+    """Return an unfitted forest of extremely randomized trees (Geurts et al. 2006)."""
     from sklearn.ensemble import ExtraTreesClassifier
 
     return ExtraTreesClassifier(
@@ -43,7 +43,7 @@ def boosted_trees(source: str, seed: int, iterations: int = 150, learning_rate: 
 
 def pair_forest(source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2) -> DescriptorClassifier:
     """Make the forest."""
-    return DescriptorClassifier(randomised_trees(source, seed, trees, smallest_leaf), ("distances", "motion"))
+    return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), ("distances", "motion"))
 
 
 def pair_boosting(

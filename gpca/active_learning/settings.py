@@ -15,7 +15,7 @@ class ActiveLearningSettings:
     """How the rounds go; the same for every strategy.
 
     Attributes:
-        initial: labelled samples of the known concepts before the first query, balanced.
+        initial: labeled samples of the known concepts before the first query, balanced.
         labels: L, the budget of queries.
         batch: B, labels per round.
         iterations, tolerance: the most passes over the labels in a retraining, and when it ends before.

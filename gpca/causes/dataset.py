@@ -29,7 +29,7 @@ class Causes:
         symmetric: (S,) the error is ADD-S.
         severity_outliers: (S,) share of the points, 0 where noise was not applied.
         candidate: (S,) number of the candidate within its split.
-        T_target_source_runs: (S, n, 4, 4) what ICP found from n starts around the initial pose, in metres; the first is
+        T_target_source_runs: (S, n, 4, 4) what ICP found from n starts around the initial pose, in meters; the first is
             the initial pose itself. They are for explainers, and not the runs that the truth was measured by.
         fitness_runs, inlier_rmse_runs: (S, n) of these.
         truth: of all S.

@@ -4,19 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gpca.config.checks.explainers import (
-    check_encoders,
-    check_explainers,
-    check_registrations,
-    check_tolerances,
-)
-from gpca.config.checks.left_out import check_left_out
-from gpca.config.checks.places import check_places
-from gpca.config.checks.sizes import check_sizes
-from gpca.config.checks.sources import check_named_sources, resolve_sources
+from gpca.config.checks import check_shared, resolve_sources
 from gpca.config.command_line import with_types
 from gpca.config.layers import with_defaults
-from gpca.config.leave_out import names_left_out, without_false
+from gpca.config.leave_out import check_left_out, names_left_out, without_false
 from gpca.config.schema import whole_config
 from gpca.experiments.registry import experiments
 from gpca.io.structured_text import require_plain
@@ -57,16 +48,12 @@ def check(config: dict) -> dict[str, dict]:
     require_plain(config, "config key")
     whole = without_false(config)
     read_settings(whole_config(), whole, "config key")
-    encoders, designs, sources = (names_left_out(config, key) for key in ("encoders", "uncertainty", "sources"))
     check_left_out(config)
-    check_places(whole)
-    check_registrations(whole)
-    check_encoders(whole, encoders)
-    check_explainers(whole, designs)
-    check_tolerances(whole)
-    check_sizes(whole)
+
+    def left_out(key: str) -> set[str]:
+        return names_left_out(config, key)
+
+    check_shared(whole, left_out)
     for experiment in experiments():
-        experiment.check(whole, lambda key: names_left_out(config, key))
-    resolved = resolve_sources(whole)
-    check_named_sources(whole, sources, encoders)
-    return resolved
+        experiment.check(whole, left_out)
+    return resolve_sources(whole)

@@ -5,28 +5,30 @@ A config that is laid over another can add to its mappings but take nothing away
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import fields
 from functools import partial
 from typing import Any
 
-from baselines.registry import explainers
-from gpca.errors import InputError
-from gpca.experiments.experiment import EXPLAINERS, LeftOut
+from gpca.config.schema import DESIGNS, Reductions
+from gpca.errors import InputError, require_names
+from gpca.experiments.experiment import EXPLAINERS, Names
 from gpca.experiments.registry import experiments
+from gpca.explainers.registry import explainers
 
-LEAVABLE_OF_EXPERIMENTS = {key: names for each in experiments() for key, names in each.leavable.items()}
-# Mappings of which any entry may be false.
-LEAVABLE = (
-    *("sources", "encoders", "reductions", "uncertainty", "explainers"),
-    *LEAVABLE_OF_EXPERIMENTS,
-)
-EXPLAINED = [key for key, names in LEAVABLE_OF_EXPERIMENTS.items() if names is EXPLAINERS]
-# Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
-SWITCHES = [key for each in experiments() for key in each.switches]
-# Lists and mappings that lose the names of what is left out elsewhere: the key, and that of the other mapping.
-LISTED: dict[str, str | Callable[[LeftOut], Collection[str]]] = {
-    **{key: names for each in experiments() for key, names in each.lists.items()},
+# Mappings of which any entry may be false -> the names that they have.
+LEAVABLE: dict[str, Names] = {
+    "sources": Names("source"),
+    "encoders": Names("encoder"),
+    "reductions": Names("reduction", lambda: [field.name for field in fields(Reductions)]),
+    "uncertainty": Names("uncertainty", lambda: DESIGNS),
+    "explainers": EXPLAINERS,
+    **{key: names for each in experiments() for key, names in each.leavable.items()},
 }
+# Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
+SWITCHES = {key: names for each in experiments() for key, names in each.switches.items()}
+# Lists and mappings that lose the names of what is left out elsewhere: the key, and that of the other mapping.
+LISTED = {key: names for each in experiments() for key, names in each.lists.items()}
 
 
 def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -41,7 +43,7 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     left_out = {key: set(_false_names(_at(config, key))) for key in LEAVABLE}
     whole = dict(config)
     for key, names in left_out.items():
-        _change(whole, key, lambda mapping, gone=names: {n: entry for n, entry in mapping.items() if n not in gone})
+        _change(whole, key, partial(_without, gone=names))
     for key in SWITCHES:
         _change(whole, key, lambda switches, key=key: list(_names_switched_on(key, switches)))
     for key, of in LISTED.items():
@@ -50,9 +52,16 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     if left_out["real_world.datasets"] and not _at(whole, "real_world.datasets"):
         _change(whole, "real_world.virtual", lambda _frames: None)  # no models are left to render
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    for key in ("explainers", *EXPLAINED):
-        _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
+    for key in (key for key, names in LEAVABLE.items() if names is EXPLAINERS):
+        _change(whole, key, partial(_without, gone=without))
     return whole
+
+
+def check_left_out(config: Mapping[str, Any]) -> None:
+    """Check the names that are false: one that nothing has would be left out in vain, and nobody would notice."""
+    for key, names in {**LEAVABLE, **SWITCHES}.items():
+        if names.known:
+            require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
 
 
 def names_left_out(config: Mapping[str, Any], key: str) -> set[str]:

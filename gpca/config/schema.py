@@ -4,24 +4,84 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, make_dataclass
 from functools import cache
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from gpca.causes.settings import CauseSettings
+from gpca.classifier.settings import GPCSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.reference import Allowance
 from gpca.comparison.verdicts import Tolerance
-from gpca.config import sections
+from gpca.encoders.reduction import PCA, UMAP, Autoencoder
 from gpca.encoders.settings import NamedEncoder
 from gpca.experiments.experiment import ByName
 from gpca.experiments.registry import experiments
-from gpca.objects.entry import Name, NamedSource, Place
+from gpca.objects.entry import Name, NamedSource, Place, SurfacePoints
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.settings import Bounds, Distinct, Keys, changes_of, part_of
+from gpca.settings import Bounds, Distinct, Keys, OpenShare, changes_of, part_of
+from gpca.uncertainty.settings import UncertaintySettings
 
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
-Design = Annotated[dict, changes_of(sections.Design, without=("icp",))]
+NOT_OF_CAUSES = ("icp", "icp_points")  # the section registrations has them
+
+
+@dataclass(frozen=True)
+class Objects:
+    """How many points are sampled on each mesh."""
+
+    surface_points: SurfacePoints
+
+
+@dataclass(frozen=True)
+class NoReduction:
+    """The reduction ``none`` has no settings."""
+
+
+@dataclass(frozen=True)
+class Reductions:
+    """Of embeddings, by name."""
+
+    none: NoReduction = field(default_factory=NoReduction)
+    pca: PCA = field(default_factory=PCA)
+    umap: UMAP = field(default_factory=UMAP)
+    autoencoder: Autoencoder = field(default_factory=Autoencoder)
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """What the explainers on embeddings read."""
+
+    encoder: str
+    reduction: Literal["none"]
+
+
+@dataclass(frozen=True)
+class UncertaintyDesign(UncertaintySettings):
+    """A design of Monte-Carlo ICP, on some test samples of each source and seed or on all."""
+
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 3
+
+
+Design = Annotated[dict, changes_of(UncertaintyDesign, without=("icp",))]
+
+
+@dataclass(frozen=True)
+class ExplainedModel:
+    """What the model of ``python -m gpca explain`` learns from."""
+
+    source: str
+    encoder: str
+    causes: Annotated[dict, changes_of(CauseSettings, without=NOT_OF_CAUSES)]
+    classifier: GPCSettings
+    false_alarms: OpenShare
+
+
+@dataclass(frozen=True)
+class Figures:
+    """The source that the figures of one registration show."""
+
+    source: str
 
 
 @dataclass(frozen=True)
@@ -32,25 +92,25 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Sections:
+class SharedSections:
     """The sections that are no experiment's own."""
 
     run: Annotated[str, Field(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
     data_dir: Place | None
     downloads: Place
     seeds: Distinct[Annotated[int, Bounds(minimum=0, maximum=2**32 - 1)]]
-    objects: sections.Objects
+    objects: Objects
     registrations: Annotated[dict, part_of(RegistrationSettings)]
     encoders: Annotated[dict[Name, NamedEncoder], Field(min_length=1)]
-    reductions: sections.Reductions
-    embedding: sections.Embedding
+    reductions: Reductions
+    embedding: Embedding
     uncertainty: Annotated[dict, Keys(dict.fromkeys(DESIGNS, Design), required=("causal",))]
-    causes: Annotated[dict, part_of(CauseSettings, without=("icp", "icp_points"))]
+    causes: Annotated[dict, part_of(CauseSettings, without=NOT_OF_CAUSES)]
     explainers: ByName
-    model: sections.ExplainedModel
+    model: ExplainedModel
     comparison: Comparison
     reference: Allowance
-    figures: sections.Figures
+    figures: Figures
     sources: Annotated[dict[Name, NamedSource], Field(min_length=1)]
 
 
@@ -58,4 +118,4 @@ class Sections:
 def whole_config() -> type:
     """Return the settings class of a config."""
     own = [(name, kind, field()) for experiment in experiments() for name, kind in experiment.sections.items()]
-    return make_dataclass("Config", own, bases=(Sections,), frozen=True, kw_only=True)
+    return make_dataclass("Config", own, bases=(SharedSections,), frozen=True, kw_only=True)

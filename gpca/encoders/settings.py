@@ -66,7 +66,7 @@ class EncoderSettings:
 
 @dataclass(frozen=True)
 class DGCNNOptions:
-    """Options of the backbone ``dgcnn``: neighbours of a point, and width of its features before the pooling."""
+    """Options of the backbone ``dgcnn``: neighbors of a point, and width of its features before the pooling."""
 
     k: Annotated[int, Bounds(minimum=2)] = 20
     point_features: Count = 256

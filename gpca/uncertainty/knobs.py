@@ -19,7 +19,7 @@ from gpca.alignment.rigid import random_direction
 from gpca.errors import InputError
 from gpca.pairs.perturbation import within_half_space
 from gpca.uncertainty.settings import UncertaintySettings
-from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarise_runs
+from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_runs
 
 
 class Knobs(NamedTuple):
@@ -112,7 +112,7 @@ class KnobRuns:
     def _evaluate(self, knobs: Knobs) -> Spread:
         started = perf_counter()
         runs, source = self.runs(knobs)
-        return summarise_runs(runs, cKDTree(source), self._target, self._T_ref, self._settings, started)
+        return summarize_runs(runs, cKDTree(source), self._target, self._T_ref, self._settings, started)
 
     def runs(self, knobs: Knobs) -> tuple[Runs, np.ndarray]:
         """Run ICP from all starts under one setting, seen before or not; return the runs and the source (N, 3).

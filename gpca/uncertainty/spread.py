@@ -90,7 +90,7 @@ class Spread:
     seconds: float
 
 
-def summarise_runs(
+def summarize_runs(
     runs: Runs,
     source_tree: cKDTree,
     target: np.ndarray,
@@ -98,7 +98,7 @@ def summarise_runs(
     settings: UncertaintySettings,
     started: float,
 ) -> Spread:
-    """Summarise the runs of one condition.
+    """Summarize the runs of one condition.
 
     Args:
         source_tree: of the source's points, in its own frame. target: (Q, 3) points whose residual counts.

@@ -8,8 +8,7 @@ from pydantic import TypeAdapter
 
 from gpca.classifier.covariances import COVARIANCES
 from gpca.classifier.settings import Kernel
-from gpca.config.schema import DESIGNS, whole_config
-from gpca.config.sections import Reductions
+from gpca.config.schema import DESIGNS, Reductions, whole_config
 from gpca.encoders.reduction import REDUCTIONS
 from gpca.encoders.registry import ENCODERS
 from gpca.encoders.settings import OPTIONS

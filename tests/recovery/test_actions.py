@@ -60,7 +60,7 @@ def test_the_pose_that_explains_the_shots_is_started_from(start):
 
 @pytest.mark.parametrize(
     ("name", "given", "fault"),
-    [("pray", {}, "unknown; choose one of reinitialize"), ("denoise", {"framse": 3}, "unexpected keyword argument")],
+    [("pray", {}, "unknown; choose one of reinitialize"), ("denoise", {"framse": 3}, "did you mean frames")],
 )
 def test_unknown_actions_and_settings_are_refused(name, given, fault):
     with pytest.raises(InputError, match=fault):

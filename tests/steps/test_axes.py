@@ -33,7 +33,7 @@ def given_files():
                 yield step, option, name
 
 
-def relabelled(path, source, seed):
+def relabeled(path, source, seed):
     """Say in a file that it is of another source and seed."""
     if path.suffix == ".pt":
         return write_tensors(path, torch.load(path, weights_only=True) | {"source": source, "seed": seed})
@@ -53,7 +53,7 @@ def unlabelled(path):
 def test_a_file_of_another_source_or_seed_is_refused(folder, capsys, step, option, name):
     own = "another" + name  # under a name of its own, so that the step's other options still give the right file
     (folder / own).write_bytes((folder / name).read_bytes())
-    relabelled(folder / own, *ELSEWHERE)
+    relabeled(folder / own, *ELSEWHERE)
     changes = {own: [], option: None} if option == name else {option: own}
     # Of two files that do not fit together, the step may name the other one.
     files = "|".join(re.escape(each) for each in (own, *map(str, STEP_OPTIONS[step].values())) if "." in each)

@@ -27,7 +27,7 @@ RETRAINED = ("density", UNSEEN)  # need an encoder of their own
 Training = Literal["random_draws", "two_layer_head"]
 TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
 WRONG_LABELS = {f"label_noise_{percent}": percent / 100 for percent in (5, 10, 20, 30)}  # share of the training labels
-RELABELLED = (*WRONG_LABELS, "shuffled")
+RELABELED = (*WRONG_LABELS, "shuffled")
 TRANSFER = "transfer"
 Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
 

@@ -13,18 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes
-from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.frames import chosen_instances, measure_frames
-from gpca.causes.labels import LABELS, labelled
-from gpca.causes.settings import CauseSettings
+from gpca.causes.labels import LABELS, labeled
+from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
+from gpca.explainers.registry import CAUSES, explainer_entry, require_settings
 from gpca.features.dataset import Descriptors, describe_all
 from gpca.features.settings import DescriptorSettings
 from gpca.frames.instances import Instances
@@ -134,7 +133,7 @@ class _Asked:
     def __init__(
         self, causes: Causes, described: Descriptors, encoder: EncoderSettings, axes: tuple[str, int], lessons: list
     ) -> None:
-        self._registrations = observed_only(labelled(causes))
+        self._registrations = observed_only(labeled(causes))
         self._described = described
         self._encoder = encoder
         self._axes = axes
@@ -162,7 +161,7 @@ class _Asked:
             entry = explainer_entry("gpca_pair", CAUSES)
             parts = []
             for causes, descriptors, _, _ in self._lessons:
-                registrations = with_what_it_reads(labelled(Causes.load(causes)), entry, descriptors)
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, descriptors)
                 parts.append(registrations.subset(training_rows(registrations, causes)))
             asked = self._with(self._described.groups)
             self._of_descriptors = [(_joined(parts), asked)]
@@ -175,7 +174,7 @@ class _Asked:
 
             entry = explainer_entry("gpca", CAUSES)
             for causes, _, weights, embeddings in self._lessons:
-                registrations = with_what_it_reads(labelled(Causes.load(causes)), entry, embeddings)
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, embeddings)
                 model = load_model(weights, self._encoder, LABELS, registrations.axes, step="train_on_causes")
                 h_S_d, logits_S_C = embed(model, self._registrations, *self._axes, self._encoder)
                 lessons = registrations.subset(training_rows(registrations, causes))

@@ -18,7 +18,7 @@ class FrameLabelSettings:
     Attributes:
         seeds: the first so many of the run's.
         held_out: the new concepts, in turn.
-        initial: labelled samples of the known concepts before the first query, balanced.
+        initial: labeled samples of the known concepts before the first query, balanced.
         labels: L, the budget of queries.
         targets: accuracies on the test samples to which labels are counted.
         points: drawn from each cloud to describe a pair.

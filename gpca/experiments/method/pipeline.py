@@ -160,7 +160,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     bald_N = asked.bald_N
     points_N_2 = asked.map_S_2[asked.rows_N]
     order = np.argsort(bald_N, kind="stable")
-    panel.scatter(*asked.map_S_2[asked.labelled].T, s=5, marker="x", color=GREY, linewidths=0.5)
+    panel.scatter(*asked.map_S_2[asked.labeled].T, s=5, marker="x", color=GREY, linewidths=0.5)
     panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GREY, linewidths=0.3)
     panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
     panel.set_axis_off()

@@ -12,7 +12,7 @@ from gpca.io.csv_file import read_numbers
 if TYPE_CHECKING:
     import pandas as pd
 
-DOUBTED, DRAWN = "queued", "random"  # which cases are labelled next: those in doubt, or any
+DOUBTED, DRAWN = "queued", "random"  # which cases are labeled next: those in doubt, or any
 QUEUE_COLUMNS = ("policy", "order", "draw", "labels", "failures", "unsolved")
 
 

@@ -111,7 +111,7 @@ class Diagnostics:
 
 @dataclass(frozen=True)
 class LabelPool:
-    """What there is to be labelled."""
+    """What there is to be labeled."""
 
     new_share: Distinct[OpenShare]
     batch: Distinct[Count]

@@ -43,8 +43,8 @@ def asked(stage_files):
 def test_the_round_is_the_first_of_the_run_and_its_pool_the_trainings(asked, stage_files):
     stages, settings = Stages.load(*stage_files), ActiveLearningSettings.from_dict(LEARNING)
     of = stages.registrations
-    assert sorted([*asked.rows_N, *asked.labelled]) == of.rows("train").tolist()
-    assert set(of.concept[asked.labelled]) == {"noise", "pose"}
+    assert sorted([*asked.rows_N, *asked.labeled]) == of.rows("train").tolist()
+    assert set(of.concept[asked.labeled]) == {"noise", "pose"}
     task = make_task(replace(of, attached={"embedding": stages.h_S_d}), "overlap", settings, "solids", 0)
     gpc = initial_gpc(task, settings, "solids", 0, "pretrained")
     steps = rounds(task.project(gpc), gpc, "bald_kmeans", settings, "solids", 0, "pretrained")

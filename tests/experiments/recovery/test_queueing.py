@@ -25,7 +25,7 @@ def rows():
     return error_by_labels(learners, [{"denoise": False, "new_view": True}] * 4, rehearsal, ("tiny", 0))
 
 
-def test_the_error_falls_with_the_labels_that_are_learnt(rows):
+def test_the_error_falls_with_the_labels_that_are_learned(rows):
     assert set(rows["order"]) == {DOUBTED, DRAWN}
     for _, curve in rows.groupby(["order", "draw"]):
         assert curve["labels"].tolist() == list(range(0, 13, BATCH))

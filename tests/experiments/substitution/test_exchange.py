@@ -152,7 +152,7 @@ def test_registrations_by_another_method_are_the_same_pairs_at_its_poses(registr
     assert np.abs(poses[0] - poses[1]).max() > 1e-4
 
 
-def test_each_method_is_learnt_from_and_asked_about_and_a_failed_registration_counts(
+def test_each_method_is_learned_from_and_asked_about_and_a_failed_registration_counts(
     registrations, judges, monkeypatch
 ):
     def fails(pair):

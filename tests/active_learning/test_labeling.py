@@ -3,7 +3,7 @@ import csv
 import numpy as np
 import pytest
 
-from gpca.active_learning.labelling import LabelFile, Session, require_name
+from gpca.active_learning.labeling import LabelFile, Session, require_name
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 

@@ -23,7 +23,7 @@ SKIPPED = ""  # stands in the file for a sample that the person did not want to 
 
 
 class LabelFile:
-    """Labels in a CSV that is appended to, answer by answer, so that nothing is lost when labelling is stopped.
+    """Labels in a CSV that is appended to, answer by answer, so that nothing is lost when labeling is stopped.
 
     Args:
         path: the file; it need not exist yet.
@@ -99,7 +99,7 @@ class Session:
         strategy: which one of :mod:`gpca.active_learning.acquisition` asks.
 
     Raises:
-        InputError: fewer than two concepts are labelled.
+        InputError: fewer than two concepts are labeled.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class Session:
         self.gpc.fit(h_S_d[rows], np.array(list(start.values())), h_S_d)
         self.gpc.refine()
         self.h_S_d = h_S_d
-        self._learnt: set[Key] = set()
+        self._learned: set[Key] = set()
         self.retrain()
 
     @property
@@ -136,13 +136,13 @@ class Session:
 
     def retrain(self) -> int:
         """Learn the answers since the last time, new concepts included; return how many they were."""
-        fresh = {key: concept for key, concept in self.answered.items() if key not in self._learnt}
+        fresh = {key: concept for key, concept in self.answered.items() if key not in self._learned}
         for concept in dict.fromkeys(fresh.values()):
             if concept not in self.gpc.classes:
                 self.gpc.grow(concept)
         if fresh:
             self.gpc.update(self.h_S_d[[self._rows[key] for key in fresh]], np.array(list(fresh.values())))
-        self._learnt |= set(fresh)
+        self._learned |= set(fresh)
         return len(fresh)
 
     def ask(self, batch: int) -> list[Question]:
@@ -153,8 +153,8 @@ class Session:
             return []
         projection = self.gpc.project(self.h_S_d[left])
         scores_N_C, variances_N_C, bald_N = self.gpc.attribute(projection)
-        labelled = self.h_S_d[[self._rows[key] for key in (*self._start, *self.answered)]]
-        inputs_L_d = self.gpc.project(labelled).inputs_N_d
+        labeled = self.h_S_d[[self._rows[key] for key in (*self._start, *self.answered)]]
+        inputs_L_d = self.gpc.project(labeled).inputs_N_d
         pool = Pool(projection.inputs_N_d, scores_N_C, bald_N, inputs_L_d, np.full(len(left), ""))
         chosen = select(self._strategy, pool, batch, self._random)
         return [Question(left[i], scores_N_C[i], variances_N_C[i], float(bald_N[i])) for i in chosen]

@@ -9,6 +9,8 @@ from gpca.explainers.interface import ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
+PAPERS_RANDOM_STATE = 42  # of the forest and of the linear SVM in Table V
+
 
 class ConceptClassifier:
     """A classifier whose score columns are always the same labels, whichever of them its training rows hold.
@@ -23,7 +25,7 @@ class ConceptClassifier:
         self._labels = labels
 
     def fit(self, features_N_F: np.ndarray, concept_N: np.ndarray) -> ConceptClassifier:
-        """Learn from labelled features; fewer than two concepts among the labels raise an InputError."""
+        """Learn from labeled features; fewer than two concepts among the labels raise an InputError."""
         known_concepts(concept_N, self._labels)
         self._classifier.fit(features_N_F, concept_N)
         return self
@@ -43,7 +45,7 @@ class ClassifierExplainer(ScoringExplainer):
         self._classifier = ConceptClassifier(classifier, self.labels)
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit the classifier to the labelled registrations."""
+        """Fit the classifier to the labeled registrations."""
         self._classifier.fit(self.features(registrations), registrations.concept)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
@@ -63,8 +65,8 @@ def known_concepts(concept_N: np.ndarray, labels: tuple[str, ...] = CONCEPTS) ->
     return known
 
 
-def standardised_regression(inverse_regularisation: float):
-    """Return an unfitted multinomial logistic regression on standardised features (L2, scikit-learn's C)."""
+def standardized_regression(inverse_regularisation: float):
+    """Return an unfitted multinomial logistic regression on standardized features (L2, scikit-learn's C)."""
     from sklearn.linear_model import LogisticRegression
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
