@@ -1,5 +1,6 @@
 # GP-CA Bench. `snakemake -j2 all` makes all that the config names; each table, figure and stage is a target: `table2`.
 import sys
+from pathlib import Path
 
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
@@ -35,18 +36,15 @@ pathvars:
 
 
 TOPICS = (
-    "common functions objects registrations methods causes estimators frames virtual_frames frame_causes encoders "
-    "uncertainty explainers active_learning diagnostics controls model recovery"
+    "common functions objects registrations methods causes frames virtual_frames encoders "
+    "uncertainty explainers active_learning diagnostics model"
 )
-EXPERIMENTS = [experiment.name for experiment in experiments()]
-for topic in [
-    *TOPICS.split(),
-    *EXPERIMENTS,
-    "results",
-    "readings",
-    "comparison",
-    "targets",
-]:
+RULES = Path(workflow.current_basedir, "workflow/rules")
+EXPERIMENTS = [
+    each.name for each in experiments() if (RULES / f"{each.name}.smk").is_file()
+]
+ENDING = ["results", "readings", "comparison", "targets"]
+for topic in dict.fromkeys([*TOPICS.split(), *EXPERIMENTS, *ENDING]):
 
     include: f"workflow/rules/{topic}.smk"
 

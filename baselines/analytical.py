@@ -8,13 +8,16 @@ overlap away, which no sensor does. Hence two rows: `analytical_gpc` with the pa
 from __future__ import annotations
 
 from functools import partial
+from typing import Annotated
 
 import numpy as np
 
+from gpca.classifier.settings import GPCArguments
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
+from gpca.settings import Bounds, Count
 
 
 class AnalyticalGPC(GPCA):
@@ -35,19 +38,19 @@ class AnalyticalGPC(GPCA):
         seed: int,
         *,
         point_count: bool = True,
-        shape_points: int = 256,
-        neighbours: int = 16,
-        **settings,
+        shape_points: Count = 256,
+        neighbours: Annotated[int, Bounds(minimum=4)] = 16,
+        **settings: GPCArguments,
     ) -> None:
         super().__init__(source, seed, **settings)
         self._axes = (source, seed, "analytical")
         self._point_count = point_count
         self._shape_points = shape_points
-        self._neighbours = neighbours
+        self._neighbors = neighbours
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the features, the point-count ratio last, unless they are attached already."""
-        measure = partial(analytical_features, shape_points=self._shape_points, neighbours=self._neighbours)
+        measure = partial(analytical_features, shape_points=self._shape_points, neighbours=self._neighbors)
         return measured(registrations, self._prefix, lambda: {"features": measure(registrations, *self._axes)})
 
     def features(self, registrations: Registrations) -> np.ndarray:
@@ -57,7 +60,7 @@ class AnalyticalGPC(GPCA):
 
     @property
     def _prefix(self) -> str:
-        return "_".join(map(str, (*self._axes, self._shape_points, self._neighbours, "")))
+        return "_".join(map(str, (*self._axes, self._shape_points, self._neighbors, "")))
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
         return self.features(registrations)

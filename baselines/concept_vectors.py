@@ -10,17 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import known_concepts
 from gpca.errors import InputError
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
+from gpca.settings import Positive
 
 
 class ConceptVectors(ScoringExplainer):
-    """One-vs-rest logistic probes; scores are the softmax over concepts of the standardised projections.
+    """One-vs-rest logistic probes; scores are the softmax over concepts of the standardized projections.
 
-    The embedding is standardised on the training rows. A projection on a unit CAV is the signed distance from the
-    probe's plane up to a constant; it is standardised on the training rows too, so that the concepts compare. The
+    The embedding is standardized on the training rows. A projection on a unit CAV is the signed distance from the
+    probe's plane up to a constant; it is standardized on the training rows too, so that the concepts compare. The
     softmax changes no order; it gives a concept without training rows, which has no CAV, the score 0.
 
     Args:
@@ -28,8 +29,8 @@ class ConceptVectors(ScoringExplainer):
         inverse_regularisation: scikit-learn's C, of the L2 penalty of the probes.
     """
 
-    def __init__(self, source: str, seed: int, inverse_regularisation: float = 1.0) -> None:
-        self._inverse_regularisation = inverse_regularisation
+    def __init__(self, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> None:
+        self._inverse_regularization = inverse_regularisation
 
     def fit(self, registrations: Registrations) -> None:
         """Fit one probe for each concept among the labels.
@@ -46,7 +47,7 @@ class ConceptVectors(ScoringExplainer):
             raise InputError("array 'embedding'", "is the same for all training registrations", "train the encoder")
         self._embedding_scaler = StandardScaler().fit(embedding_N_d)
         scaled_N_d = self._embedding_scaler.transform(embedding_N_d)
-        probe = LogisticRegression(C=self._inverse_regularisation, max_iter=1000)
+        probe = LogisticRegression(C=self._inverse_regularization, max_iter=1000)
         normals = [probe.fit(scaled_N_d, registrations.concept == concept).coef_[0] for concept in self._known]
         self.vectors_K_d = np.array([normal / np.linalg.norm(normal) for normal in normals])
         self._projection_scaler = StandardScaler().fit(scaled_N_d @ self.vectors_K_d.T)

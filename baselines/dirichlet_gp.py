@@ -12,8 +12,8 @@ from time import perf_counter
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import known_concepts
-from gpca.attribution.scores import Attribution, summarise_marginals
+from gpca.attribution.scores import Attribution, summarize_marginals
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -47,7 +47,7 @@ class DirichletGP:
         self._draws = draws
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labelled embeddings; fewer than two concepts among the labels raise an InputError."""
+        """Fit to the labeled embeddings; fewer than two concepts among the labels raise an InputError."""
         import torch
         from sklearn.preprocessing import StandardScaler
 
@@ -66,20 +66,20 @@ class DirichletGP:
         self._log_scale_C = torch.from_numpy(np.log(values_C_N.var(axis=1, ddof=1)))
         self._mean_C = torch.from_numpy(values_C_N.mean(axis=1))
         parameters = [self._log_lengthscale_C, self._log_scale_C, self._mean_C]
-        optimiser = Adam(parameters, self._learning_rate)
+        optimizer = Adam(parameters, self._learning_rate)
         data = [(c, squared_N_N, values_C_N[c], noise_C_N[c]) for c in range(len(CONCEPTS))]
         for _ in range(self._iterations):
             gradient_C_3 = np.array([self._gradient(*of_concept) for of_concept in data]) / len(h_N_d)
             for parameter, gradient_C in zip(parameters, gradient_C_3.T, strict=True):
                 parameter.grad = torch.from_numpy(gradient_C.copy())
-            optimiser.step()
+            optimizer.step()
         self._factors = [self._factor(*of_concept)[1:] for of_concept in data]
 
     def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every embedding and summarise, as GP-CA does."""
+        """Draw from the posterior at every embedding and summarize, as GP-CA does."""
         started = perf_counter()
         normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, len(CONCEPTS)))
-        scores_N_C, variances_N_C, bald_N = summarise_marginals(*self._posterior(registrations), normal_M_C)
+        scores_N_C, variances_N_C, bald_N = summarize_marginals(*self._posterior(registrations), normal_M_C)
         seconds = (perf_counter() - started) / len(registrations)
         return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
 
@@ -105,7 +105,7 @@ class DirichletGP:
     def _factor(
         self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the covariance, the Cholesky factor L of the noisy one, and L⁻¹ of the centred targets."""
+        """Return the covariance, the Cholesky factor L of the noisy one, and L⁻¹ of the centered targets."""
         from scipy.linalg import cholesky, solve_triangular
 
         K_N_N = self._covariance(c, squared_N_N)

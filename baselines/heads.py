@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from itertools import pairwise
 from time import perf_counter
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import known_concepts
-from gpca.attribution.scores import Attribution, summarise_draws
+from gpca.attribution.scores import Attribution, summarize_draws
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
-from gpca.settings import Bounds
+from gpca.settings import ArgumentsOf, Bounds, Count
 
 BATCH_SIZE = 64
 DropoutRate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
@@ -57,7 +57,7 @@ class Heads:
         self._weight_decay = weight_decay
 
     def fit(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
-        """Train on standardised embeddings and the numbers of their concepts."""
+        """Train on standardized embeddings and the numbers of their concepts."""
         import torch
         from sklearn.preprocessing import StandardScaler
 
@@ -71,8 +71,8 @@ class Heads:
             weight = torch.randn((self._heads, width, outputs), generator=random) * (2 / width) ** 0.5
             self._layers += [weight.requires_grad_(), torch.zeros((self._heads, 1, outputs), requires_grad=True)]
         # Fused, since the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
-        optimiser = torch.optim.AdamW(self._layers, self._learning_rate, weight_decay=self._weight_decay, fused=True)
-        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, self._steps)
+        optimizer = torch.optim.AdamW(self._layers, self._learning_rate, weight_decay=self._weight_decay, fused=True)
+        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, self._steps)
         for _ in range(self._steps):
             rows_E_B = torch.rand((self._heads, len(targets_N)), generator=random).argsort(dim=1)[:, :BATCH_SIZE]
             hidden_E_B_H = self._hidden_units(inputs_N_d[rows_E_B])
@@ -81,10 +81,10 @@ class Heads:
                 hidden_E_B_H = hidden_E_B_H * kept / (1 - self._rate)
             logits_E_B_C = self._last_layer(hidden_E_B_H)
             loss = torch.nn.functional.cross_entropy(logits_E_B_C.flatten(0, 1), targets_N[rows_E_B].flatten())
-            optimiser.zero_grad()
+            optimizer.zero_grad()
             # A head's gradient is that of its own loss, however many are trained beside it.
             (loss * self._heads).backward()
-            optimiser.step()
+            optimizer.step()
             schedule.step()
 
     def hidden(self, h_N_d: np.ndarray) -> np.ndarray:
@@ -115,25 +115,28 @@ class Heads:
         return hidden @ weight + bias
 
 
+HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # of a function that hands them on
+
+
 class HeadLearner:
     """What such learners share: heads, and draws of the logits from them. Training takes `training`'s settings."""
 
-    def __init__(self, source: str, seed: int, **training) -> None:
+    def __init__(self, source: str, seed: int, **training: HeadArguments) -> None:
         self._axes = (source, seed, type(self).__name__)
         self._heads = Heads(*self._axes, **training)
 
     def fit(self, registrations: Registrations) -> None:
-        """Train on the labelled embeddings; fewer than two concepts among the labels raise an InputError."""
+        """Train on the labeled embeddings; fewer than two concepts among the labels raise an InputError."""
         known_concepts(registrations.concept)
         h_N_d = attached(registrations, "embedding", None)
         target_N = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
         self._train(h_N_d, target_N)
 
     def explain(self, registrations: Registrations) -> Attribution:
-        """Draw the logits of every registration and summarise, as GP-CA does."""
+        """Draw the logits of every registration and summarize, as GP-CA does."""
         started = perf_counter()
         logits_M_N_C = self._draw_logits(attached(registrations, "embedding", None))
-        scores_N_C, variances_N_C, bald_N = summarise_draws(logits_M_N_C)
+        scores_N_C, variances_N_C, bald_N = summarize_draws(logits_M_N_C)
         seconds = (perf_counter() - started) / len(registrations)
         return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
 
@@ -147,7 +150,7 @@ class HeadLearner:
 class Ensemble(HeadLearner):
     """A deep ensemble of heads: each is a draw."""
 
-    def __init__(self, source: str, seed: int, members: int = 5, **training) -> None:
+    def __init__(self, source: str, seed: int, members: Count = 5, **training: HeadArguments) -> None:
         super().__init__(source, seed, heads=members, **training)
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
@@ -157,7 +160,9 @@ class Ensemble(HeadLearner):
 class Dropout(HeadLearner):
     """Monte-Carlo dropout: every pass is a draw, its mask shared by all samples, as one network is."""
 
-    def __init__(self, source: str, seed: int, rate: DropoutRate = 0.5, passes: int = 100, **training) -> None:
+    def __init__(
+        self, source: str, seed: int, rate: DropoutRate = 0.5, passes: Count = 100, **training: HeadArguments
+    ) -> None:
         super().__init__(source, seed, rate=rate, **training)
         self._rate = rate
         self._passes = passes

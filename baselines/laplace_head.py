@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.heads import HeadLearner
+from baselines.heads import HeadArguments, HeadLearner
 from gpca.attribution.diagnostics import negative_log_likelihood
-from gpca.attribution.scores import summarise_draws
+from gpca.attribution.scores import summarize_draws
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
+from gpca.settings import Count
 
 
 class LastLayerLaplace(HeadLearner):
-    """Laplace's approximation over the last layer, with the full generalised Gauss-Newton matrix.
+    """Laplace's approximation over the last layer, with the full generalized Gauss-Newton matrix.
 
     The last layer is fitted anew to the hidden units under a Gaussian prior: an approximation about weights that are no
     maximum of the posterior would not be Laplace's. The prior's precision is the one that predicts a fifth of the
@@ -23,7 +24,7 @@ class LastLayerLaplace(HeadLearner):
 
     PRECISIONS = tuple(10.0 ** (exponent / 2) for exponent in range(6, -5, -1))
 
-    def __init__(self, source: str, seed: int, draws: int = 1000, **training) -> None:
+    def __init__(self, source: str, seed: int, draws: Count = 1000, **training: HeadArguments) -> None:
         super().__init__(source, seed, **training)
         self._draws = draws
 
@@ -37,7 +38,7 @@ class LastLayerLaplace(HeadLearner):
             losses = []
             for candidate in self.PRECISIONS:
                 self._approximate(h_N_d[rest], target_N[rest], candidate)
-                scores_N_C, _, _ = summarise_draws(self._draw_logits(h_N_d[validation]))
+                scores_N_C, _, _ = summarize_draws(self._draw_logits(h_N_d[validation]))
                 losses.append(negative_log_likelihood(scores_N_C, target_N[validation]))
             precision = self.PRECISIONS[int(np.argmin(losses))]
         super()._train(h_N_d, target_N)
@@ -46,7 +47,7 @@ class LastLayerLaplace(HeadLearner):
     def _approximate(self, h_N_d: np.ndarray, target_N: np.ndarray, precision: float) -> None:
         features_N_F = self._features(h_N_d)
         wanted_N_C = np.eye(len(CONCEPTS))[target_N]
-        self._weights_F_C = _regularised_weights(features_N_F, wanted_N_C, precision)
+        self._weights_F_C = _regularized_weights(features_N_F, wanted_N_C, precision)
         p_N_C = np.exp(_log_softmax(features_N_F @ self._weights_F_C))
         eigenvalues, self._vectors = np.linalg.eigh(_gauss_newton(features_N_F, p_N_C))
         self._deviations = 1 / np.sqrt(np.maximum(eigenvalues, 0) + precision)
@@ -67,8 +68,8 @@ class LastLayerLaplace(HeadLearner):
         return np.column_stack([hidden_N_H, np.ones(len(hidden_N_H))])
 
 
-def _regularised_weights(features_N_F: np.ndarray, wanted_N_C: np.ndarray, precision: float) -> np.ndarray:
-    """Return the weights (F, C) that minimise cross-entropy + precision / 2 · |weights|²."""
+def _regularized_weights(features_N_F: np.ndarray, wanted_N_C: np.ndarray, precision: float) -> np.ndarray:
+    """Return the weights (F, C) that minimize cross-entropy + precision / 2 · |weights|²."""
     from scipy.optimize import minimize
 
     shape = (features_N_F.shape[1], wanted_N_C.shape[1])

@@ -9,9 +9,12 @@ from functools import partial
 import numpy as np
 
 from baselines.pair import PairDescription
+from gpca.classifier.settings import GPCArguments
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry
+from gpca.features.settings import DescribedPoints
 from gpca.pairs.dataset import Registrations
+from gpca.settings import Count, PositiveShare
 
 
 class LearnedPairGPCA(PairDescription, GPCA):
@@ -30,11 +33,11 @@ class LearnedPairGPCA(PairDescription, GPCA):
         encoder: str,
         source: str,
         seed: int,
-        points: int = 512,
-        draw_points: int = 96,
-        epochs: int = 6,
-        encoder_learning_rate: float = 4e-3,
-        **settings,
+        points: DescribedPoints = 512,
+        draw_points: DescribedPoints = 96,
+        epochs: Count = 6,
+        encoder_learning_rate: PositiveShare = 4e-3,
+        **settings: GPCArguments,
     ) -> None:
         PairDescription.__init__(self, source, seed, "relations", points)
         GPCA.__init__(self, source, seed, **settings)
@@ -44,7 +47,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         self._embed: Callable[[Registrations], Registrations] | None = None
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
-        """Train the encoder on the labelled pairs, and return what attaches its embeddings."""
+        """Train the encoder on the labeled pairs, and return what attaches its embeddings."""
         from gpca.encoders.settings import EncoderSettings
         from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
         from gpca.features.registered import MOTION
@@ -67,7 +70,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         return embed
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit the GPC to the labelled pairs, after the encoder, unless its embeddings are attached."""
+        """Fit the GPC to the labeled pairs, after the encoder, unless its embeddings are attached."""
         if self._embedding not in registrations.attached:
             self._embed = self.learn_encoder(registrations)
         super().fit(registrations)

@@ -9,12 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer, ConceptClassifier, standardised_regression
 from gpca.errors import InputError
+from gpca.explainers.concept_classifier import (
+    PAPERS_RANDOM_STATE,
+    ClassifierExplainer,
+    ConceptClassifier,
+    standardized_regression,
+)
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
-
-PAPERS_RANDOM_STATE = 42
+from gpca.settings import Count, Positive
 
 
 class Learner(ClassifierExplainer):
@@ -25,11 +29,11 @@ class Learner(ClassifierExplainer):
         return attached(registrations, "embedding", None)
 
 
-def forest(source: str, seed: int, trees: int = 50) -> Learner:
+def forest(source: str, seed: int, trees: Count = 50) -> Learner:
     """Make a random forest."""
     from sklearn.ensemble import RandomForestClassifier
 
-    return Learner(_standardised(RandomForestClassifier(n_estimators=trees, random_state=PAPERS_RANDOM_STATE)))
+    return Learner(_standardized(RandomForestClassifier(n_estimators=trees, random_state=PAPERS_RANDOM_STATE)))
 
 
 class ProbableSVM(Learner):
@@ -39,7 +43,7 @@ class ProbableSVM(Learner):
         self._kernel = kernel
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labelled embeddings; a concept of which there is a single sample raises an InputError."""
+        """Fit to the labeled embeddings; a concept of which there is a single sample raises an InputError."""
         from sklearn.calibration import CalibratedClassifierCV
         from sklearn.svm import SVC
 
@@ -47,23 +51,23 @@ class ProbableSVM(Learner):
         if folds < 2:
             raise InputError("training registrations", "have a single sample of a concept", "give at least two")
         svm = SVC(kernel=self._kernel, random_state=PAPERS_RANDOM_STATE)
-        self._classifier = ConceptClassifier(_standardised(CalibratedClassifierCV(svm, cv=folds, ensemble=False)))
+        self._classifier = ConceptClassifier(_standardized(CalibratedClassifierCV(svm, cv=folds, ensemble=False)))
         super().fit(registrations)
 
 
 class Nearest(Learner):
-    """A k-nearest-neighbour classifier."""
+    """A k-nearest-neighbor classifier."""
 
     def __init__(self, neighbours: int) -> None:
         from sklearn.neighbors import KNeighborsClassifier
 
-        self._neighbours = neighbours
-        super().__init__(_standardised(KNeighborsClassifier(neighbours)))
+        self._neighbors = neighbours
+        super().__init__(_standardized(KNeighborsClassifier(neighbours)))
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labelled embeddings; fewer of them than neighbours raise an InputError."""
-        if self._neighbours > len(registrations):
-            fault = f"{self._neighbours} neighbors are too many for {len(registrations)} training samples"
+        """Fit to the labeled embeddings; fewer of them than neighbors raise an InputError."""
+        if self._neighbors > len(registrations):
+            fault = f"{self._neighbors} neighbors are too many for {len(registrations)} training samples"
             raise InputError("learner_nearest", fault, "lower neighbours")
         super().fit(registrations)
 
@@ -78,22 +82,22 @@ def rbf_svm(source: str, seed: int) -> Learner:
     return ProbableSVM("rbf")
 
 
-def logistic(source: str, seed: int, inverse_regularisation: float = 1.0) -> Learner:
+def logistic(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> Learner:
     """Make a multinomial logistic regression."""
-    return Learner(standardised_regression(inverse_regularisation))
+    return Learner(standardized_regression(inverse_regularisation))
 
 
-def nearest(source: str, seed: int, neighbours: int = 5) -> Learner:
-    """Make a k-nearest-neighbour classifier; a probability is a share of the neighbours."""
+def nearest(source: str, seed: int, neighbours: Count = 5) -> Learner:
+    """Make a k-nearest-neighbor classifier; a probability is a share of the neighbors."""
     return Nearest(neighbours)
 
 
-def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:
+def laplace_gpc(source: str, seed: int, lengthscale: Positive = 1.0) -> Learner:
     """Make scikit-learn's Gaussian process classifier: one against the rest, Laplace's approximation, RBF kernel.
 
     Args:
-        lengthscale: in units of √(2 d), the expected distance of two standardised embeddings. It stays fixed,
-            since scikit-learn's optimiser takes minutes.
+        lengthscale: in units of √(2 d), the expected distance of two standardized embeddings. It stays fixed,
+            since scikit-learn's optimizer takes minutes.
     """
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
@@ -101,7 +105,7 @@ def laplace_gpc(source: str, seed: int, lengthscale: float = 1.0) -> Learner:
 
     kernel = ConstantKernel(10.0) * RBF(lengthscale)
     return Learner(
-        _standardised(FunctionTransformer(_to_unit_distance), GaussianProcessClassifier(kernel, optimizer=None))
+        _standardized(FunctionTransformer(_to_unit_distance), GaussianProcessClassifier(kernel, optimizer=None))
     )
 
 
@@ -109,7 +113,7 @@ def _to_unit_distance(features_N_F):
     return features_N_F / (2 * features_N_F.shape[1]) ** 0.5
 
 
-def _standardised(*steps):
+def _standardized(*steps):
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 

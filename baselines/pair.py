@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.concept_classifier import ClassifierExplainer, standardised_regression
+from gpca.classifier.settings import GPCArguments
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, measured
+from gpca.features.settings import DescribedPoints
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
+from gpca.settings import Count, Positive
 
 
 class PairDescription:
@@ -55,7 +58,7 @@ class PairGPCA(PairDescription, DescriptorGPCA):
         settings: those of the GPC, as for GP-CA.
     """
 
-    def __init__(self, source: str, seed: int, points: int = 512, **settings) -> None:
+    def __init__(self, source: str, seed: int, points: DescribedPoints = 512, **settings: GPCArguments) -> None:
         PairDescription.__init__(self, source, seed, "relations", points)
         DescriptorGPCA.__init__(self, (source, seed, "gpca_pair"), source, seed, **settings)
 
@@ -68,7 +71,7 @@ class PairLearner(PairDescription, ClassifierExplainer):
         ClassifierExplainer.__init__(self, classifier)
 
 
-def pair_forest(source: str, seed: int, trees: int = 200, points: int = 512) -> PairLearner:
+def pair_forest(source: str, seed: int, trees: Count = 200, points: DescribedPoints = 512) -> PairLearner:
     """Make a random forest on the 52 distances of the pair."""
     from sklearn.ensemble import RandomForestClassifier
 
@@ -78,9 +81,11 @@ def pair_forest(source: str, seed: int, trees: int = 200, points: int = 512) -> 
     )
 
 
-def density(source: str, seed: int, inverse_regularisation: float = 1.0, points: int = 512) -> PairLearner:
+def density(
+    source: str, seed: int, inverse_regularisation: Positive = 1.0, points: DescribedPoints = 512
+) -> PairLearner:
     """Make the logistic regression that knows spacing and extent of the observed cloud, and nothing else."""
-    return PairLearner(standardised_regression(inverse_regularisation), source, seed, "densities", points)
+    return PairLearner(standardized_regression(inverse_regularisation), source, seed, "densities", points)
 
 
 EXPLAINERS = {

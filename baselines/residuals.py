@@ -13,11 +13,12 @@ from functools import partial
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer, standardised_regression
 from gpca.attribution.scores import Attribution
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
+from gpca.settings import Count, Positive
 
 FLOOR = 1e-6  # variance, as that of the uncertainty itself: a thousandth of a radian or of the diameter, squared
 OBSERVED = 0  # the condition of the uncertainty design in which the observed pair is left as it is
@@ -89,12 +90,14 @@ def _observed(registrations: Registrations, name: str) -> np.ndarray:
     return attached(registrations, name, None)[:, OBSERVED]
 
 
-def residuals_logistic(source: str, seed: int, inverse_regularisation: float = 1.0, floor: float = FLOOR) -> Residuals:
+def residuals_logistic(
+    source: str, seed: int, inverse_regularisation: Positive = 1.0, floor: Positive = FLOOR
+) -> Residuals:
     """Make the rival with logistic regression."""
-    return Residuals(standardised_regression(inverse_regularisation), floor)
+    return Residuals(standardized_regression(inverse_regularisation), floor)
 
 
-def residuals_forest(source: str, seed: int, trees: int = 200, floor: float = FLOOR) -> Residuals:
+def residuals_forest(source: str, seed: int, trees: Count = 200, floor: Positive = FLOOR) -> Residuals:
     """Make the rival with a random forest."""
     from sklearn.ensemble import RandomForestClassifier
 

@@ -7,11 +7,12 @@ explainer that does no better than a few thresholds has found nothing that a per
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 from baselines.residuals import FLOOR, Residuals
 from gpca.explainers.interface import ExplainerEntry
 from gpca.seeds import seed_of
-from gpca.settings import OpenShare
+from gpca.settings import Bounds, Positive
 
 # How a person reads the three features: name, unit, and how often the logarithm counts the quantity. The sixth root of
 # a covariance's determinant is a variance, and the root of this a deviation.
@@ -32,7 +33,12 @@ class ResidualRules(Residuals):
     """
 
     def __init__(
-        self, source: str, seed: int, depth: int = 3, smallest_leaf: OpenShare = 0.02, floor: float = FLOOR
+        self,
+        source: str,
+        seed: int,
+        depth: Annotated[int, Bounds(minimum=1, maximum=20)] = 3,
+        smallest_leaf: Annotated[float, Bounds(exclusiveMinimum=0, maximum=0.5)] = 0.02,
+        floor: Positive = FLOOR,
     ) -> None:
         from sklearn.tree import DecisionTreeClassifier
 

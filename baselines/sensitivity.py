@@ -12,8 +12,9 @@ from functools import partial
 
 import numpy as np
 
-from baselines.values import KnobValues, LearnedValues, ScaledValues
+from baselines.values import KnobValues, LearnedValues, ScaledValues, Worth
 from gpca.explainers.interface import ExplainerEntry
+from gpca.settings import Positive
 
 ONE_AT_A_TIME = [0, 1, 2, 4]  # the corners with none or one of the three features present
 STEPS = [0, 8, 9, 10]  # the conditions of design ``additive`` that are untouched or a small step of one knob
@@ -92,12 +93,12 @@ def single_drops(worth_N_8: np.ndarray) -> np.ndarray:
     return worth_N_8[:, ONE_AT_A_TIME[1:]] - worth_N_8[:, :1]
 
 
-def sa_local_removal(source: str, seed: int, worth: str = "uncertainty") -> ScaledValues:
+def sa_local_removal(source: str, seed: int, worth: Worth = "uncertainty") -> ScaledValues:
     """Make the explainer that names the remedy which alone lowers the worth most."""
     return ScaledValues(single_drops, ONE_AT_A_TIME, worth)
 
 
-def sa_supervised(source: str, seed: int, inverse_regularisation: float = 1.0) -> LearnedValues:
+def sa_supervised(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> LearnedValues:
     """Make the explainer that learns from what each remedy alone changes."""
     return LearnedValues(single_drops, ONE_AT_A_TIME, inverse_regularisation)
 

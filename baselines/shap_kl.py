@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.values import KnobValues, LearnedValues, ScaledValues
+from baselines.values import KnobValues, LearnedValues, ScaledValues, Worth
 from gpca.explainers.interface import ExplainerEntry
+from gpca.settings import Positive
 
 ALL_CORNERS = list(range(8))
 
@@ -37,12 +38,12 @@ def shap_over_knobs(source: str, seed: int) -> KnobValues:
     return KnobValues(lambda uncertainty_N_K: shapley_values(uncertainty_N_K[:, :8]), ALL_CORNERS)
 
 
-def shap_removal(source: str, seed: int, worth: str = "uncertainty") -> ScaledValues:
+def shap_removal(source: str, seed: int, worth: Worth = "uncertainty") -> ScaledValues:
     """Make the explainer that names the remedy which lowers the worth most."""
     return ScaledValues(shapley_values, ALL_CORNERS, worth)
 
 
-def shap_supervised(source: str, seed: int, inverse_regularisation: float = 1.0) -> LearnedValues:
+def shap_supervised(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> LearnedValues:
     """Make the explainer that learns from the remedies' Shapley values."""
     return LearnedValues(shapley_values, ALL_CORNERS, inverse_regularisation)
 

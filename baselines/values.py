@@ -8,21 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from time import perf_counter
+from typing import Literal, get_args
 
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer, standardised_regression
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
-WORTHS = (
-    "uncertainty",
-    "residual",
-)  # a condition's worth: KL in nats, or log distance from the target to the source
+Worth = Literal["uncertainty", "residual"]  # of a condition: KL in nats, or log distance from target to source
+WORTHS: tuple[str, ...] = get_args(Worth)
 
 
 class ChargedValues(ScoringExplainer):
@@ -92,7 +91,7 @@ class LearnedValues(ChargedValues, ClassifierExplainer):
         self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], inverse_regularisation: float
     ) -> None:
         ChargedValues.__init__(self, conditions)
-        ClassifierExplainer.__init__(self, standardised_regression(inverse_regularisation))
+        ClassifierExplainer.__init__(self, standardized_regression(inverse_regularisation))
         self._values = values
 
     def features(self, registrations: Registrations) -> np.ndarray:

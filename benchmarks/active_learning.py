@@ -85,16 +85,16 @@ def compare_bald(gpc, pool, options: argparse.Namespace) -> tuple[list[float], l
     """Return the seconds of the plain loop and of ours, in pairs, and the largest difference of their BALD."""
     import numpy as np
 
-    from gpca.attribution.scores import summarise_marginals
+    from gpca.attribution.scores import summarize_marginals
 
     mean_N_C, deviation_N_C = gpc.posterior(pool)
     normal_M_C = np.random.default_rng(1).normal(size=(options.draws, mean_N_C.shape[1]))
     of_plain, of_ours = [], []
     for _ in range(options.repeats):
         of_plain.append(seconds(lambda: plain_bald(mean_N_C, deviation_N_C, normal_M_C)))
-        of_ours.append(seconds(lambda: summarise_marginals(mean_N_C, deviation_N_C, normal_M_C)))
+        of_ours.append(seconds(lambda: summarize_marginals(mean_N_C, deviation_N_C, normal_M_C)))
     difference_N = (
-        plain_bald(mean_N_C, deviation_N_C, normal_M_C) - summarise_marginals(mean_N_C, deviation_N_C, normal_M_C)[2]
+        plain_bald(mean_N_C, deviation_N_C, normal_M_C) - summarize_marginals(mean_N_C, deviation_N_C, normal_M_C)[2]
     )
     return of_plain, of_ours, float(np.abs(difference_N).max())
 

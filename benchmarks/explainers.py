@@ -79,12 +79,14 @@ def compare_icp(registrations, settings) -> tuple[float, float]:
     from gpca.alignment.batched_icp import BatchedICP
     from gpca.alignment.icp import ICP
     from gpca.alignment.twist import exp
-    from gpca.uncertainty.designs import Pair
+    from gpca.uncertainty.designs import RegisteredRow
 
     starts_n = exp(np.random.default_rng(SEED).normal(size=(settings.starts, 6)) * settings.deviation_6())
     ratios, errors = [], []
     for row in registrations.rows("test"):
-        source, target, T_init, _ = Pair(registrations, row).observed(settings.icp_points, np.random.default_rng(row))
+        source, target, T_init, _ = RegisteredRow(registrations, row).observed(
+            settings.icp_points, np.random.default_rng(row)
+        )
         poses_n = starts_n @ T_init
         started = perf_counter()
         batched_n, *_ = BatchedICP(target, settings.icp).register(source, poses_n)
@@ -100,7 +102,7 @@ def measure(registrations, icp_seconds_S, settings) -> dict[str, tuple[float, fl
     """Return for every explainer ICP calls and seconds per test sample, and the share of ICP."""
     import inspect
 
-    from baselines.registry import explainers
+    from gpca.explainers.registry import explainers
     from gpca.uncertainty.designs import DESIGNS
     from gpca.uncertainty.evaluation import design_rows, evaluate_design
 

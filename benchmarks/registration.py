@@ -76,11 +76,12 @@ def make_pairs(samples: int, points: int) -> list:
 
     from benchmarks.explainers import make_registrations
     from gpca.alignment.methods.interface import Pair
-    from gpca.uncertainty.designs import Pair as Observed
+    from gpca.uncertainty.designs import RegisteredRow
 
     registrations, _ = make_registrations(samples)
     observed = [
-        Observed(registrations, row).observed(points, np.random.default_rng(row)) for row in registrations.rows("test")
+        RegisteredRow(registrations, row).observed(points, np.random.default_rng(row))
+        for row in registrations.rows("test")
     ]
     return [Pair(source, target, T_init, seed=n) for n, (source, target, T_init, _) in enumerate(observed)]
 

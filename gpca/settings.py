@@ -1,39 +1,51 @@
-"""Settings against their schema: that of the whole config, or of the section that a step is given by hand.
+"""Settings: what the types of a settings class, or of a function's arguments, allow. pydantic checks them.
 
-Apart from :mod:`gpca.config.check`, because every step imports this: what it imports counts as code of all of them.
+A settings class is a frozen dataclass with fields such as ``batch: Annotated[int, Bounds(minimum=2)]``.
 """
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+import json
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import is_dataclass
 from difflib import get_close_matches
-from functools import cache
-from inspect import isclass, signature
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from functools import cache, partial
+from inspect import Parameter, isclass, signature
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_type_hints
 
 from gpca.errors import InputError
 
 if TYPE_CHECKING:
-    from jsonschema.exceptions import ValidationError
+    from pydantic import GetCoreSchemaHandler, TypeAdapter
+    from pydantic_core import CoreSchema, ErrorDetails
+
+T = TypeVar("T")
+# No count of a run comes near a million, and no setting near the other: what is above is a slip, which would otherwise
+# end hours later, or in no memory left.
+LARGEST = {"int": 10**6, "float": 1e12}
 
 
 class Bounds:
-    """What the values of a settings class's field may be, in the words of JSON schema.
+    """The range of a number; one without an upper end has that of its type, `LARGEST`."""
 
-    A field says it with its type, ``train: Annotated[int, Bounds(minimum=9)]``; the config's schema is made from that.
-    A number without a `maximum` has the one of its type, `LARGEST`.
-    """
+    def __init__(
+        self,
+        minimum: float | None = None,
+        maximum: float | None = None,
+        exclusiveMinimum: float | None = None,
+        exclusiveMaximum: float | None = None,
+        multipleOf: int | None = None,
+    ) -> None:
+        bounds = {"ge": minimum, "le": maximum, "gt": exclusiveMinimum, "lt": exclusiveMaximum}
+        bounds["multiple_of"] = multipleOf
+        self._bounds = {name: bound for name, bound in bounds.items() if bound is not None}
 
-    def __init__(self, **keywords: object) -> None:
-        self.keywords = keywords
+    def __get_pydantic_core_schema__(self, kind: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Narrow the number's schema."""
+        schema: dict[str, Any] = dict(handler(kind))
+        upper = {} if {"le", "lt"} & self._bounds.keys() else {"le": LARGEST[schema["type"]]}
+        return schema | self._bounds | upper
 
-
-# No count of a run comes near a million, and no setting near the other: what is above is a slip, which would otherwise
-# end hours later, or in no memory left.
-LARGEST = {"integer": 10**6, "number": 1e12}
 
 Count = Annotated[int, Bounds(minimum=1)]
 NotNegative = Annotated[float, Bounds(minimum=0)]
@@ -42,65 +54,237 @@ Share = Annotated[float, Bounds(minimum=0, maximum=1)]
 PositiveShare = Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]
 OpenShare = Annotated[float, Bounds(exclusiveMinimum=0, exclusiveMaximum=1)]
 
-SCHEMA = Path(__file__).parent / "config" / "config.schema.yaml"
+
+class Different:
+    """Marks a list whose values differ, and of which there are so many at least."""
+
+    def __init__(self, fewest: int = 1) -> None:
+        self._fewest = fewest
+
+    def __get_pydantic_core_schema__(self, kind: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Add the check to the list's schema."""
+        from pydantic_core import core_schema
+
+        return core_schema.no_info_after_validator_function(self._checked, handler(kind))
+
+    def _checked(self, values: Collection) -> Collection:
+        if len(values) < self._fewest:
+            raise ValueError(f"is empty; name at least {self._fewest}")
+        if any(value in tuple(values)[:n] for n, value in enumerate(values)):
+            raise ValueError(f"{list(values)} holds a value twice; keep one of them")
+        return values
+
+
+Distinct = Annotated[tuple[T, ...], Different()]  # one or more
+
+
+class Keys:
+    """Marks a mapping as one of these keys, each with a type of its own: some of them must be there, and no other."""
+
+    def __init__(self, kinds: Mapping[str, Any], required: Iterable[str] = (), closed: bool = True) -> None:
+        self.kinds = kinds
+        self._required = tuple(required)
+        self._closed = closed
+
+    def __get_pydantic_core_schema__(self, _kind: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the mapping's schema."""
+        from pydantic_core import core_schema
+
+        fields = {
+            name: core_schema.typed_dict_field(handler.generate_schema(kind), required=name in self._required)
+            for name, kind in self.kinds.items()
+        }
+        others: Literal["forbid", "allow"] = "forbid" if self._closed else "allow"
+        strict = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
+        return core_schema.typed_dict_schema(fields, extra_behavior=others, config=strict)
+
+
+def part_of(settings: type, without: Collection[str] = ()) -> Keys:
+    """Mark a mapping as the settings of that class without some; each of the others must be there."""
+    kinds = changes_of(settings, without).kinds
+    return Keys(kinds, required=kinds)
+
+
+def changes_of(settings: type, without: Collection[str] = ()) -> Keys:
+    """Mark a mapping as settings of that class that replace others; of these none need be there, and some may not."""
+    hints = get_type_hints(settings, include_extras=True)
+    return Keys({name: kind for name, kind in hints.items() if name not in without})
+
+
+class ArgumentsOf:
+    """Marks a function's ``**arguments`` as those of another function or settings class."""
+
+    def __init__(self, function: Callable) -> None:
+        self.function = function
+
+
+def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "setting") -> T:
+    """Return an instance of a settings class, with all that it holds, from what a config says.
+
+    Args:
+        kind: the class, or another type that pydantic knows.
+        settings: of text, numbers, booleans, None, lists and mappings.
+        subject: stands before the name of a key in messages.
+
+    Raises:
+        InputError: a key that is unknown or missing, a value of another type or out of range, or values that do not
+            fit each other.
+    """
+    from pydantic import ValidationError
+
+    adapter: TypeAdapter = _adapter(kind)  # type: ignore[arg-type]
+    try:
+        return adapter.validate_json(json.dumps([settings], default=repr))[0]
+    except ValidationError as fault:
+        raise _input_error(fault.errors(), settings, adapter, subject) from None
+
+
+def require_arguments(subject: str, function: Callable, given: int, settings: Mapping[str, object]) -> None:
+    """Check settings that a function takes by the names of its arguments.
+
+    A number without a range is one from 0 on where its default is.
+
+    Args:
+        subject: what has the settings, for the message.
+        function: what takes them, after `given` other arguments.
+
+    Raises:
+        InputError: what :func:`read_settings` raises.
+    """
+    read_settings(_settings_of_arguments(function, given), settings, f"{subject}: setting")
 
 
 @cache
-def load_schema() -> dict:
-    """Return the JSON schema of a configuration: one object for all who ask."""
-    import yaml
-
-    return yaml.load(SCHEMA.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+def _settings_of_arguments(function: Callable, given: int) -> Any:
+    kinds, required, closed = _arguments(function, given)
+    return Annotated[dict, Keys(kinds, required, closed)]
 
 
-def check_settings(settings: dict, *section: str) -> None:
-    """Check what a step was given with ``--settings`` like that section of the config; none of its keys is required.
+def _arguments(function: Callable, given: int) -> tuple[dict[str, Any], set[str], bool]:
+    """Return the types of the arguments after the first, those without a default, and whether these are all."""
+    plain = function.func if isinstance(function, partial) else function
+    made = isclass(plain) and not is_dataclass(plain)
+    hints = get_type_hints(plain.__init__ if made else plain, include_extras=True)
+    kinds: dict[str, Any] = {}
+    others: dict[str, Any] = {}
+    required, closed = set(), True
+    for parameter in list(signature(function).parameters.values())[given:]:
+        hint, default = hints.get(parameter.name, type(parameter.default)), parameter.default
+        if parameter.kind is Parameter.VAR_KEYWORD:
+            source = next((note for note in getattr(hint, "__metadata__", ()) if isinstance(note, ArgumentsOf)), None)
+            closed = source is not None
+            others = _arguments(source.function, 0)[0] if source else {}
+        elif parameter.kind is not Parameter.VAR_POSITIONAL:
+            kinds[parameter.name] = (
+                Annotated[hint, Bounds(minimum=0)] if hint in (int, float) and not default < 0 else hint
+            )
+            if default is Parameter.empty:
+                required.add(parameter.name)
+    return others | kinds, required, closed
 
-    Args:
-        section: the section's path, e.g. ``"encoders", "dgcnn"``.
 
-    Raises:
-        InputError: unknown key, wrong type or value out of range.
-    """
-    whole = part = load_schema()
-    for key in section:
-        part = part.get("properties", {}).get(key) or part["additionalProperties"]
-    require_valid(settings, part | {"$defs": whole["$defs"]}, "setting", complete=False)
+@cache
+def _adapter(kind: Any) -> TypeAdapter:
+    from pydantic import ConfigDict, TypeAdapter
+
+    # Strict: neither 36.0 nor true is a whole number.
+    config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, arbitrary_types_allowed=True)
+    return TypeAdapter(list[kind], config=config)  # a list, as a dataclass takes no config from elsewhere
+
+
+UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
+
+def _input_error(faults: list[ErrorDetails], settings: Any, adapter: TypeAdapter, subject: str) -> InputError:
+    """Return the error that tells the worst fault: an unknown key, or else a value that its type allows."""
+    fault = min(faults, key=lambda fault: (fault["type"] not in UNKNOWN, fault["type"].endswith("_type")))
+    path = list(_path(settings, fault["loc"][1:]))
+    key, value = ".".join(map(str, path)) or "(top level)", fault["input"]
+    if fault["type"] in UNKNOWN:
+        known = list(_keys_at(adapter.json_schema(), path[:-1]))
+        close = get_close_matches(str(path[-1]), known, n=1)
+        remedy = f"did you mean {close[0]}?" if close else f"choose one of {', '.join(known)}"
+        return InputError(f"{subject} {key}", "unknown", remedy)
+    if fault["type"] == "missing" and isinstance(path[-1], int):
+        return InputError(f"{subject} {'.'.join(map(str, path[:-1]))}", f"{value} is too short")
+    if fault["type"] == "missing":
+        return InputError(f"{subject} {key}", "is missing", "add it, as in config/config.yaml")
+    if fault["type"] == "value_error":
+        return InputError(f"{subject} {key}", str(fault["ctx"]["error"]))
+    # Input should be less than ..., String should have ..., List should have at least 1 item after validation, not 0
+    message = fault["msg"][fault["msg"].index("should") :].split(" after validation")[0]
+    scalar = fault["type"] in ("tuple_type", "list_type") and isinstance(value, str | int | float)
+    return InputError(f"{subject} {key}", f"{value!r} {message}", f"give a list: [{value}]" if scalar else "")
+
+
+def _path(settings: Any, location: Iterable[str | int]) -> Iterator[str | int]:
+    """Find the keys in where pydantic locates a fault, beside which it names the parts of unions."""
+    for name in location:
+        inside = dict(enumerate(settings)) if isinstance(settings, list) else settings
+        if isinstance(inside, Mapping) and name in inside:
+            settings = inside[name]
+        elif name == "[key]" or not isinstance(settings, Mapping | list):
+            continue
+        yield name
+
+
+def _keys_at(schema: dict, path: Iterable[str | int]) -> Iterator[str]:
+    """Find the keys that a JSON schema knows at a path."""
+
+    def alternatives(part: dict) -> Iterator[dict]:
+        part = schema["$defs"][part["$ref"].rpartition("/")[2]] if "$ref" in part else part
+        yield part
+        for inner in part.get("anyOf", ()):
+            yield from alternatives(inner)
+
+    parts = [schema["items"]]
+    for name in path:
+        inside = []
+        for part in (each for whole in parts for each in alternatives(whole)):
+            named = part.get("properties", {}).get(name)
+            others = [*part.get("patternProperties", {}).values(), part.get("additionalProperties"), part.get("items")]
+            inside += [named] if named else [other for other in others if isinstance(other, dict)]
+        parts = inside
+    for part in (each for whole in parts for each in alternatives(whole)):
+        yield from part.get("properties", ())
+
+
+# Until no step is called by a command line: checks of what was given with --settings. The class of the whole config is
+# found by name, so that it counts as no code of the steps.
+
+
+def check_settings(settings: Mapping, *section: str) -> None:
+    """Check what a step was given with ``--settings`` like that section of the config; none of its keys is required."""
+    from importlib import import_module
+
+    from pydantic import ValidationError
+
+    adapter = _adapter(import_module("gpca.config.schema").whole_config())
+    whole: Any = settings
+    for key in reversed(section):
+        whole = {key: whole}
+    try:
+        adapter.validate_json(json.dumps([whole]))
+    except ValidationError as invalid:
+        faults = [fault for fault in invalid.errors() if fault["loc"][1 : len(section) + 1] == section]
+        if faults := [fault for fault in faults if not {fault["type"], *fault["loc"]} & {"missing", "[key]"}]:
+            raise _input_error(faults, whole, adapter, "setting") from None
 
 
 def checked_sections(
     settings: Mapping[str, dict], sections: Mapping[str, tuple[str, ...]], by_name: Collection[str] = ()
 ) -> dict[str, dict]:
-    """Return the parts of ``--settings`` by name, each checked like a section of the config; what is absent is empty.
-
-    Args:
-        settings: name -> part.
-        sections: name -> path of the section.
-        by_name: further parts, which are for :func:`checked_by_name`.
-
-    Raises:
-        InputError: an unknown name, or what :func:`check_settings` refuses.
-    """
-    known = (*sections, *by_name)
-    if unknown := set(settings) - set(known):
-        raise InputError(f"setting {sorted(unknown)[0]}", "unknown", f"choose one of {', '.join(known)}")
-    given = {name: settings.get(name) or {} for name in known}
+    """Return the parts of ``--settings`` by name, each checked like a section of the config; absent ones are empty."""
+    given = {name: settings.get(name) or {} for name in (*sections, *by_name)}
     for name, section in sections.items():
         check_settings(given[name], *section)
     return given
 
 
 def checked_by_name(
-    given: dict[str, Any], section: str, names: Collection[str], require: Callable[[str, Mapping], None]
+    given: dict[str, Any], _section: str, names: Collection[str], require: Callable[[str, Mapping], None]
 ) -> dict[str, dict]:
-    """Return the settings of each of the names, none for those that a section of the config does not give.
-
-    Args:
-        given: that section, name -> settings.
-        require: raises an InputError unless a name is known and takes its settings.
-    """
-    given = given or dict.fromkeys(names)
-    check_settings(given, section)
+    """Return the settings of each of the names, none for those that a section of the config does not give."""
     for name in (*given, *names):
         require(name, given.get(name) or {})
     return {name: given.get(name) or {} for name in names}
@@ -108,91 +292,6 @@ def checked_by_name(
 
 def checked_with_icp(settings: Mapping[str, Any], *section: str) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return ``--settings`` that are a section of the config, and those of ICP, which they hold under ``icp``."""
-    given = dict(settings)
-    icp = given.pop("icp", {})
+    given = {name: value for name, value in settings.items() if name != "icp"}
     check_settings(given, *section)
-    check_settings(icp, "registrations", "icp")
-    return given, icp
-
-
-def require_arguments(subject: str, function: Callable, given: int, settings: Mapping[str, object]) -> None:
-    """Check settings that go to a function by their names, where no schema has them.
-
-    Args:
-        subject: what has the settings, for the message.
-        function: what takes them, after `given` other arguments.
-
-    Raises:
-        InputError: an unknown setting; one that its type does not allow (`Bounds`, or a literal); or one that is no
-            number from 0 to `LARGEST` where the default is such a one.
-    """
-    try:
-        bound = signature(function).bind(*[None] * given, **settings)
-    except TypeError as fault:
-        raise InputError(subject, str(fault), "correct its settings") from fault
-    function = getattr(function, "func", function)  # of a partial
-    hints = get_type_hints(function.__init__ if isclass(function) else function, include_extras=True)
-    for name, value in settings.items():
-        if get_origin(hints.get(name)) is Literal and value not in (choices := get_args(hints[name])):
-            raise InputError(f"{subject}: setting {name}", f"must be one of {', '.join(choices)}, not {value!r}")
-        default = getattr(bound.signature.parameters.get(name), "default", None)
-        schema = {"properties": {name: _schema_of_argument(default, hints.get(name))}}
-        require_valid({name: value}, schema, f"{subject}: setting")
-
-
-def _schema_of_argument(default: Any, hint: Any) -> dict[str, Any]:
-    """Return what a function's argument may be, by its default and its type."""
-    kind = {int: "integer", float: "number"}.get(type(default))
-    schema = {"type": kind, "minimum": 0, "maximum": LARGEST[kind]} if kind and default >= 0 else {}
-    for bounds in getattr(hint, "__metadata__", ()):
-        schema |= bounds.keywords
-    return schema
-
-
-def require_valid(instance: dict, schema: dict, subject: str, complete: bool = True) -> None:
-    """Raise an InputError for the worst fault of `instance`; `subject` stands before the name of its key.
-
-    Unless it has to be `complete`, missing keys are no fault.
-    """
-    from jsonschema import Draft202012Validator
-    from jsonschema.exceptions import best_match
-    from jsonschema.validators import extend
-
-    # JSON Schema takes 36.0 for an integer, and no limit stops NaN.
-    types = Draft202012Validator.TYPE_CHECKER.redefine_many({"integer": _is_integer, "number": _is_finite_number})
-    validator = extend(Draft202012Validator, {"pattern": _matches}, type_checker=types)(schema)
-    faults = validator.iter_errors(instance)
-    fault = best_match(fault for fault in faults if complete or fault.validator != "required")
-    if fault is None:
-        return
-    key = ".".join(map(str, fault.absolute_path)) or "(top level)"
-    if fault.validator == "additionalProperties":
-        known = list(fault.schema["properties"])
-        unknown = next(name for name in fault.instance if name not in known)
-        path = ".".join([*map(str, fault.absolute_path), str(unknown)])
-        close = get_close_matches(str(unknown), known, n=1)
-        raise InputError(
-            f"{subject} {path}",
-            "unknown",
-            f"did you mean {close[0]}?" if close else f"choose one of {', '.join(known)}",
-        )
-    if fault.validator == "type" and fault.schema["type"] == "array" and isinstance(fault.instance, str | int | float):
-        raise InputError(f"{subject} {key}", fault.message, f"give a list: [{fault.instance}]")
-    see = "add it, as in config/config.yaml" if fault.validator == "required" else "see gpca/config/config.schema.yaml"
-    raise InputError(f"{subject} {key}", fault.message, see)
-
-
-def _matches(_validator, pattern: str, value: object, _schema) -> Iterator[ValidationError]:
-    """Find a pattern as JSON Schema means it: its ``$`` is the end, and not what is before a last line break."""
-    from jsonschema.exceptions import ValidationError
-
-    if isinstance(value, str) and not re.search(re.sub(r"\$$", r"\\Z", pattern), value):
-        yield ValidationError(f"{value!r} does not match {pattern!r}")
-
-
-def _is_integer(_checker, value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _is_finite_number(_checker, value: object) -> bool:
-    return _is_integer(_checker, value) or (isinstance(value, float) and math.isfinite(value))
+    return given, settings.get("icp", {})

@@ -5,13 +5,12 @@ It is what the steps load before they look at their input, and what each of hund
 
 from importlib import import_module
 
-from baselines.registry import explainers
 from gpca.__main__ import STEPS
-from gpca.settings import load_schema
+from gpca.explainers.registry import explainers
 
 OURS = ("gpca.config.check", "gpca.encoders.dgcnn", "gpca.objects.uw_rgbd", "gpca.objects.shapes.linemod")
 LIBRARIES = (
-    *("jsonschema", "open3d", "pandas", "PIL.PngImagePlugin", "sklearn.pipeline", "trimesh"),
+    *("pydantic", "open3d", "pandas", "PIL.PngImagePlugin", "sklearn.pipeline", "trimesh"),
     # torch imports these only where a model is first run, and sympy with them
     *("torch.fx.experimental.symbolic_shapes", "torch.utils.serialization"),
 )
@@ -19,4 +18,3 @@ LIBRARIES = (
 for module in (*(f"gpca.steps.{name.replace('-', '_')}" for name in STEPS), *OURS, *LIBRARIES):
     import_module(module)
 explainers()
-load_schema()

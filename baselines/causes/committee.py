@@ -6,7 +6,7 @@ import numpy as np
 
 from baselines.causes.described import DescriptorClassifier
 from baselines.causes.gaussian_processes import CausePairGPCA
-from baselines.causes.trees import boosted_trees, randomised_trees
+from baselines.causes.trees import boosted_trees, randomized_trees
 from gpca.causes.labels import LABELS
 from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, ScoringExplainer
 from gpca.features.groups import GROUPS
@@ -20,7 +20,7 @@ class Committee(ScoringExplainer):
 
     def __init__(self, source: str, seed: int) -> None:
         self._members: list[ConceptExplainer] = [
-            DescriptorClassifier(randomised_trees(source, seed), GROUPS),
+            DescriptorClassifier(randomized_trees(source, seed), GROUPS),
             DescriptorClassifier(boosted_trees(source, seed), GROUPS),
             CausePairGPCA(source, seed, learning_rate=0.1, iterations=200),
         ]

@@ -10,9 +10,10 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.causes.described import joined
-from baselines.concept_classifier import known_concepts
 from gpca.causes.labels import LABELS
 from gpca.causes.truth import NOMINAL
+from gpca.classifier.settings import GPCArguments
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.features.groups import GROUPS
@@ -25,7 +26,7 @@ class CausePairGPCA(DescriptorGPCA):
 
     labels = LABELS
 
-    def __init__(self, source: str, seed: int, **settings) -> None:
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
         super().__init__((source, seed, "causes"), source, seed, **settings)
 
     def features(self, registrations: Registrations) -> np.ndarray:
@@ -41,7 +42,7 @@ class MultiLabelGPCA(ScoringExplainer):
 
     labels = LABELS
 
-    def __init__(self, source: str, seed: int, **settings) -> None:
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.classifier.settings import GPCSettings
         from gpca.explainers.pair_classifier import PairClassifier
 
@@ -55,7 +56,7 @@ class MultiLabelGPCA(ScoringExplainer):
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Return the probabilities: of no failure, and of each cause and a failure."""
-        judged = self._classifier.judge(self._classifier.normalised(joined(registrations, GROUPS)))
+        judged = self._classifier.judge(self._classifier.normalized(joined(registrations, GROUPS)))
         return np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
 
 

@@ -12,7 +12,7 @@ class NominalThreshold:
     """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`."""
 
     def fit(self, alarm_N: np.ndarray, label_N: np.ndarray) -> NominalThreshold:
-        """Find the threshold of the best balanced accuracy on labelled samples, and the scale of the alarm.
+        """Find the threshold of the best balanced accuracy on labeled samples, and the scale of the alarm.
 
         Where one of the two is missing among the labels, the threshold is the median.
         """

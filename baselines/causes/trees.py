@@ -7,13 +7,15 @@ fitness and spread. ``pair_boosting`` reads every descriptor.
 from __future__ import annotations
 
 from baselines.causes.described import DescriptorClassifier
+from gpca.classifier.settings import LearningRate
 from gpca.explainers.interface import ExplainerEntry
 from gpca.features.groups import GROUPS
 from gpca.seeds import seed_of
+from gpca.settings import Count
 
 
-def randomised_trees(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2):
-    """Return an unfitted forest of extremely randomised trees (Geurts et al. 2006)."""
+def randomized_trees(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2):
+    """Return an unfitted forest of extremely randomized trees (Geurts et al. 2006)."""
     from sklearn.ensemble import ExtraTreesClassifier
 
     return ExtraTreesClassifier(
@@ -39,12 +41,14 @@ def boosted_trees(source: str, seed: int, iterations: int = 150, learning_rate: 
     )
 
 
-def pair_forest(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2) -> DescriptorClassifier:
+def pair_forest(source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2) -> DescriptorClassifier:
     """Make the forest."""
-    return DescriptorClassifier(randomised_trees(source, seed, trees, smallest_leaf), ("distances", "motion"))
+    return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), ("distances", "motion"))
 
 
-def pair_boosting(source: str, seed: int, iterations: int = 150, learning_rate: float = 0.06) -> DescriptorClassifier:
+def pair_boosting(
+    source: str, seed: int, iterations: Count = 150, learning_rate: LearningRate = 0.06
+) -> DescriptorClassifier:
     """Make the boosted trees."""
     return DescriptorClassifier(boosted_trees(source, seed, iterations, learning_rate), GROUPS)
 

@@ -21,16 +21,16 @@ class Pool:
     """N samples without a label, and what the classifier makes of them.
 
     Attributes:
-        h_N_d: embeddings, standardised.
+        h_N_d: embeddings, standardized.
         scores_N_C, bald_N: mean class probabilities (Eq. 4) and BALD in nats (Eq. 7).
-        h_labelled_L_d: embeddings of the samples with a label.
+        h_labeled_L_d: embeddings of the samples with a label.
         truth_N: the true classes, for strategies that are an upper bound.
     """
 
     h_N_d: np.ndarray
     scores_N_C: np.ndarray
     bald_N: np.ndarray
-    h_labelled_L_d: np.ndarray
+    h_labeled_L_d: np.ndarray
     truth_N: np.ndarray
 
 
@@ -151,16 +151,16 @@ def badge(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
         def predict_proba(self, _h_N_d):
             return pool.scores_N_C
 
-    unlabelled_N = np.full(len(pool.h_N_d), np.nan)
+    unlabeled_N = np.full(len(pool.h_N_d), np.nan)
     strategy = Badge(random_state=int(random.integers(2**31)))
-    return strategy.query(pool.h_N_d, unlabelled_N, Scored(), fit_clf=False, batch_size=batch)
+    return strategy.query(pool.h_N_d, unlabeled_N, Scored(), fit_clf=False, batch_size=batch)
 
 
 def coreset(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Take what is farthest from everything labelled, one after the other (Sener & Savarese 2018)."""
+    """Take what is farthest from everything labeled, one after the other (Sener & Savarese 2018)."""
     from skactiveml.pool import CoreSet
 
-    return _with_labelled(CoreSet(random_state=int(random.integers(2**31))), pool, batch)
+    return _with_labeled(CoreSet(random_state=int(random.integers(2**31))), pool, batch)
 
 
 def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
@@ -170,15 +170,15 @@ def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray
     options = {"n_init": 1, "max_iter": 20, "init": "random"}  # k-means++ of that many clusters takes all the time
     strategy = TypiClust(random_state=int(random.integers(2**31)), cluster_algo_dict=options)
     try:
-        return _with_labelled(strategy, pool, batch)
-    except UnboundLocalError:  # scikit-activeml 1.0.1 raises it where every cluster holds a labelled sample
+        return _with_labeled(strategy, pool, batch)
+    except UnboundLocalError:  # scikit-activeml 1.0.1 raises it where every cluster holds a labeled sample
         return np.array([], dtype=int)
 
 
-def _with_labelled(strategy, pool: Pool, batch: int) -> np.ndarray:
-    """Query a strategy that looks at where the labelled samples lie, not at what their labels are."""
-    labels = np.concatenate([np.full(len(pool.h_N_d), np.nan), np.zeros(len(pool.h_labelled_L_d))])
-    return strategy.query(np.concatenate([pool.h_N_d, pool.h_labelled_L_d]), labels, batch_size=batch)
+def _with_labeled(strategy, pool: Pool, batch: int) -> np.ndarray:
+    """Query a strategy that looks at where the labeled samples lie, not at what their labels are."""
+    labels = np.concatenate([np.full(len(pool.h_N_d), np.nan), np.zeros(len(pool.h_labeled_L_d))])
+    return strategy.query(np.concatenate([pool.h_N_d, pool.h_labeled_L_d]), labels, batch_size=batch)
 
 
 STRATEGIES = {

@@ -1,6 +1,6 @@
 """A Bayesian last layer that learns label by label: what it believed before is the prior of what it believes after.
 
-Softmax regression on fixed features, with Laplace's approximation of the posterior and its generalised Gauss-Newton
+Softmax regression on fixed features, with Laplace's approximation of the posterior and its generalized Gauss-Newton
 curvature (Daxberger et al. 2021). A label changes the curvature by a matrix of rank C, so that the logits of its sample
 settle the new weights in C dimensions (the extended Kalman filter of Bayesian continual learning).
 """
@@ -12,7 +12,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy.special import softmax
 
-from gpca.attribution.scores import summarise_draws
+from gpca.attribution.scores import summarize_draws
 
 NEWTON_STEPS = 20
 TOLERANCE = 1e-10  # of a logit
@@ -52,7 +52,7 @@ class BayesianLayer:
         """Return scores, variances and BALD of samples from draws of their logits by standard normal numbers."""
         mean_N_C, covariance_N_C_C = self.logits(x_N_D)
         root_N_C_C = np.linalg.cholesky(covariance_N_C_C + 1e-9 * np.eye(covariance_N_C_C.shape[1]))
-        return summarise_draws(mean_N_C + np.einsum("ncd,md->mnc", root_N_C_C, normal_M_C))
+        return summarize_draws(mean_N_C + np.einsum("ncd,md->mnc", root_N_C_C, normal_M_C))
 
     def _learn(self, features_F: np.ndarray, label: int) -> None:
         classes, width = self._mean_C_F.shape

@@ -14,7 +14,6 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, require_strategy, select
-from gpca.active_learning.embedded import Embedded
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
@@ -22,6 +21,33 @@ from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
+
+
+@dataclass(frozen=True)
+class Embedded:
+    """S samples.
+
+    Attributes:
+        embedding: (S, d).
+        concept, split: (S,) label, and ``train`` or ``test``.
+    """
+
+    embedding: np.ndarray
+    concept: np.ndarray
+    split: np.ndarray
+
+    def rows(self, split: str) -> np.ndarray:
+        """Return the row numbers of a split."""
+        return np.flatnonzero(self.split == split)
+
+    def followed_by(self, other: Embedded) -> Embedded:
+        """Return these samples and those of the other after them."""
+        return Embedded(
+            np.concatenate([self.embedding, other.embedding]),
+            np.concatenate([self.concept, other.concept]),
+            np.concatenate([self.split, other.split]),
+        )
+
 
 Inputs = TypeVar("Inputs", np.ndarray, Projection)
 
@@ -38,18 +64,18 @@ class Samples(Generic[Inputs]):
 
 
 @dataclass(frozen=True)
-class Task(Generic[Inputs]):
-    """What one experiment starts from: the concept held out, labelled samples of the others, pool and test samples."""
+class LabelingTask(Generic[Inputs]):
+    """What one experiment starts from: the concept held out, labeled samples of the others, pool and test samples."""
 
     held_out: str
     initial: Samples
     pool: Samples
     test: Samples
 
-    def project(self, gpc: GPC) -> Task[Projection]:
+    def project(self, gpc: GPC) -> LabelingTask[Projection]:
         """Return the task with every embedding as the GPC's covariance sees it."""
         parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
-        return Task(self.held_out, *parts)
+        return LabelingTask(self.held_out, *parts)
 
 
 def make_task(
@@ -59,12 +85,12 @@ def make_task(
     *axes: object,
     classes: tuple[str, ...] = CONCEPTS,
     new_share: float | None = None,
-) -> Task[np.ndarray]:
-    """Split the training samples into those labelled at the start and the pool, which holds all the rest.
+) -> LabelingTask[np.ndarray]:
+    """Split the training samples into those labeled at the start and the pool, which holds all the rest.
 
     Args:
         samples: they carry their embeddings.
-        held_out: the concept of which no sample is labelled at the start.
+        held_out: the concept of which no sample is labeled at the start.
         axes: names of the draw (source, seed).
         classes: all concepts; the start has equally many samples of each known one.
         new_share: share, below 1, of the pool that is of that concept, or as much of it as there is; by default all of
@@ -91,16 +117,16 @@ def make_task(
             f"lower active_learning.initial or raise {'registrations' if classes == CONCEPTS else 'causes'}.train",
         )
     rows = (initial, pool, samples.rows("test"))
-    return Task(held_out, *(Samples(samples.embedding[part], concept_S[part]) for part in rows))
+    return LabelingTask(held_out, *(Samples(samples.embedding[part], concept_S[part]) for part in rows))
 
 
 def initial_gpc(
-    task: Task[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
+    task: LabelingTask[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
 ) -> GPC:
     """Fit the GPC that knows all of its concepts but one.
 
-    Scaling, inducing inputs and lengthscale are initialised on the unlabelled pool too: it lies open, and inducing
-    inputs at the labelled samples alone would leave none where the new concept is.
+    Scaling, inducing inputs and lengthscale are initialized on the unlabeled pool too: it lies open, and inducing
+    inputs at the labeled samples alone would leave none where the new concept is.
     """
     gpc = GPC(classes, settings.gpc, *axes, "active_learning", task.held_out)
     around = np.concatenate([task.initial.h, task.pool.h])
@@ -110,7 +136,7 @@ def initial_gpc(
 
 
 def run_rounds(
-    task: Task[Projection],
+    task: LabelingTask[Projection],
     gpc: GPC,
     strategy: str,
     settings: ActiveLearningSettings,
@@ -134,14 +160,14 @@ def run_rounds(
 
 
 def rounds(
-    task: Task[Projection],
+    task: LabelingTask[Projection],
     gpc: GPC,
     strategy: str,
     settings: ActiveLearningSettings,
     *axes: object,
     answers_N: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, float], list[int]]]:
-    """Yield each step of :func:`run_rounds` as it is made, and the rows of the pool that were labelled so far."""
+    """Yield each step of :func:`run_rounds` as it is made, and the rows of the pool that were labeled so far."""
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc = copy(gpc)
     answers_N = task.pool.concept_N if answers_N is None else answers_N
@@ -157,7 +183,9 @@ def rounds(
         yield step_of(task, gpc, queried, epochs), list(queried)
 
 
-def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
+def pool_of(
+    task: LabelingTask[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True
+) -> Pool:
     """Return what a strategy chooses from: the rows `left` of the pool, and what the GPC makes of them."""
     h = task.pool.h[left]
     if needs_scores:
@@ -165,11 +193,11 @@ def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[in
     else:
         scores_N_C = np.empty((len(left), 0))
         bald_N = np.empty(len(left))
-    labelled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])
-    return Pool(h.inputs_N_d, scores_N_C, bald_N, labelled, task.pool.concept_N[left])
+    labeled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])
+    return Pool(h.inputs_N_d, scores_N_C, bald_N, labeled, task.pool.concept_N[left])
 
 
-def step_of(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
+def step_of(task: LabelingTask[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
     """Return a step of :func:`run_rounds`, after the labels of these rows of the pool are known."""
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
@@ -181,7 +209,7 @@ def step_of(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -
     }
 
 
-def accuracies(task: Task[Projection], classifier) -> tuple[float, float]:
+def accuracies(task: LabelingTask[Projection], classifier) -> tuple[float, float]:
     """Return the accuracy over all test samples and over those of the concept held out; NaN of none.
 
     The classifier is a GPC, or what has its ``classes`` and ``scores``.

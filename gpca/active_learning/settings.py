@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, OpenShare, PositiveShare
+from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class ActiveLearningSettings:
     """How the rounds go; the same for every strategy.
 
     Attributes:
-        initial: labelled samples of the known concepts before the first query, balanced.
+        initial: labeled samples of the known concepts before the first query, balanced.
         labels: L, the budget of queries.
         batch: B, labels per round.
         iterations, tolerance: the most passes over the labels in a retraining, and when it ends before.
@@ -82,11 +82,11 @@ class NewConceptSettings:
     """
 
     seeds: Count = 3
-    embeddings: tuple[SeenBy, ...] = ("other_samples", "other_source", "self_supervised", "pair")
-    errors: tuple[OpenShare, ...] = (0.05, 0.1, 0.2, 0.3)
-    erring: tuple[SeenBy, ...] = ("other_samples", "pair")
+    embeddings: Distinct[SeenBy] = ("other_samples", "other_source", "self_supervised", "pair")
+    errors: Distinct[OpenShare] = (0.05, 0.1, 0.2, 0.3)
+    erring: Distinct[SeenBy] = ("other_samples", "pair")
     points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
-    causes: tuple[NewCause, ...] = ("nominal", "geometry")
+    causes: Distinct[NewCause] = ("nominal", "geometry")
     geometry_train: Annotated[int, Bounds(minimum=2)] = 60
     geometry_test: Annotated[int, Bounds(minimum=1)] = 30
     geometry_candidates: Count = 1500

@@ -76,7 +76,7 @@ class Pulls:
     def __call__(self, source: np.ndarray, T_target_source_n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
 
-        r = y - q leads to the moved point y from its neighbour q; the mean is half the gradient of the mean of |r|² by
+        r = y - q leads to the moved point y from its neighbor q; the mean is half the gradient of the mean of |r|² by
         a twist on the left of each pose (n, 4, 4).
         """
         n = len(T_target_source_n)

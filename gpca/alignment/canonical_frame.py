@@ -1,4 +1,4 @@
-"""The canonical frame of a target, in which encoders are trained: centred on its bounding box, in diameters."""
+"""The canonical frame of a target, in which encoders are trained: centered on its bounding box, in diameters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS, diameter, require_points, require_size
-from gpca.objects.mesh_folder import metres_per
+from gpca.objects.mesh_folder import meters_per
 from gpca.seeds import generator
 
 MEASURED_POINTS = 10_000  # so many measure the frame of a larger cloud, since all of them may lie on its hull
@@ -16,9 +16,9 @@ MEASURED_POINTS = 10_000  # so many measure the frame of a larger cloud, since a
 
 @dataclass(frozen=True)
 class CanonicalFrame:
-    """Where the origin lies, the centre of the upright bounding box, and the unit: the diameter."""
+    """Where the origin lies, the center of the upright bounding box, and the unit: the diameter."""
 
-    centre_3: np.ndarray
+    center_3: np.ndarray
     diameter: float
 
     @classmethod
@@ -31,17 +31,17 @@ class CanonicalFrame:
         require_cloud_points(points, subject)
         points = thin(points, MEASURED_POINTS, "frame")
         size = diameter(points, subject)
-        require_size(size * metres_per(unit), subject)
+        require_size(size * meters_per(unit), subject)
         return cls((points.min(axis=0) + points.max(axis=0)) / 2, size)
 
     def coordinates(self, points: np.ndarray) -> np.ndarray:
         """Return points (N, 3) in this frame."""
-        return (points - self.centre_3) / self.diameter
+        return (points - self.center_3) / self.diameter
 
     def pose_outside(self, T_b_a: np.ndarray) -> np.ndarray:
         """Return a motion (4, 4) of this frame as one of the points that it was measured on."""
         outside = T_b_a.copy()
-        outside[:3, 3] = self.diameter * T_b_a[:3, 3] + self.centre_3 - T_b_a[:3, :3] @ self.centre_3
+        outside[:3, 3] = self.diameter * T_b_a[:3, 3] + self.center_3 - T_b_a[:3, :3] @ self.center_3
         return outside
 
 

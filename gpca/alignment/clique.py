@@ -10,21 +10,21 @@ MOST_BRANCHES = 20_000  # then the best so far is taken: counted, not timed, so 
 def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES) -> tuple[np.ndarray, bool]:
     """Return the nodes of the largest clique, sorted, and whether it is certain that none is larger.
 
-    Branch and bound over sets of bits, bounded by greedy colours (Tomita & Seki 2003; San Segundo et al. 2011).
+    Branch and bound over sets of bits, bounded by greedy colors (Tomita & Seki 2003; San Segundo et al. 2011).
 
     Args:
         adjacent_n_n: symmetric; what is on the diagonal does not matter.
         most_branches: limit of the search.
     """
     adjacent_n_n = adjacent_n_n & ~np.eye(len(adjacent_n_n), dtype=bool)
-    order = np.argsort(-adjacent_n_n.sum(axis=1), kind="stable")  # colours are given to nodes of many neighbours first
+    order = np.argsort(-adjacent_n_n.sum(axis=1), kind="stable")  # colors are given to nodes of many neighbors first
     packed = np.packbits(adjacent_n_n[np.ix_(order, order)], axis=1, bitorder="little")
     neighbours = [int.from_bytes(row.tobytes(), "little") for row in packed]
 
     best: list[int] = []
     path: list[int] = []  # the clique so far; for it and each of its beginnings, what may come next:
     candidates = [(1 << len(order)) - 1]
-    branches = [_coloured(candidates[0], neighbours)]
+    branches = [_colored(candidates[0], neighbours)]
     tried = 0
     while branches:
         if not branches[-1] or len(path) + branches[-1][-1][1] <= len(best) or tried >= most_branches:
@@ -39,18 +39,18 @@ def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES)
         if further:
             path.append(node)
             candidates.append(further)
-            branches.append(_coloured(further, neighbours))
+            branches.append(_colored(further, neighbours))
         elif len(path) >= len(best):
             best = [*path, node]
     return np.sort(order[best]), tried < most_branches
 
 
-def _coloured(candidates: int, neighbours: list[int]) -> list[tuple[int, int]]:
-    """Give each candidate a colour, no two neighbours the same, and list both by colour.
+def _colored(candidates: int, neighbours: list[int]) -> list[tuple[int, int]]:
+    """Give each candidate a color, no two neighbors the same, and list both by color.
 
-    A clique among the candidates up to any place in the list has no more nodes than the colour there.
+    A clique among the candidates up to any place in the list has no more nodes than the color there.
     """
-    coloured, colour = [], 0
+    colored, colour = [], 0
     while candidates:
         colour += 1
         free = candidates
@@ -58,5 +58,5 @@ def _coloured(candidates: int, neighbours: list[int]) -> list[tuple[int, int]]:
             node = (free & -free).bit_length() - 1
             free &= ~(neighbours[node] | 1 << node)
             candidates ^= 1 << node
-            coloured.append((node, colour))
-    return coloured
+            colored.append((node, colour))
+    return colored

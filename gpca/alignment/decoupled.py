@@ -58,7 +58,7 @@ def _agreeing(source_n_3: np.ndarray, target_n_3: np.ndarray, bound: float) -> n
 
 
 def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rotation (3×3) that minimises Σ min(|b - R a|², bound²), and the weights (m,), 1 of inliers.
+    """Return the rotation (3×3) that minimizes Σ min(|b - R a|², bound²), and the weights (m,), 1 of inliers.
 
     Graduated non-convexity: a convex cost is bent step by step until it is the truncated one (Yang et al. 2020).
     """
@@ -84,7 +84,7 @@ def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -
 
 
 def vote(shifts_n: np.ndarray, bound: float) -> float:
-    """Return the number t that minimises Σ min((s - t)², bound²) over shifts (n,), exactly.
+    """Return the number t that minimizes Σ min((s - t)², bound²) over shifts (n,), exactly.
 
     As t grows, shifts come within the bound and leave it: between two such events the inliers are the same, and the
     best t of them is their mean. So every set of inliers is tried.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.icp_motion import move
-from gpca.alignment.icp_neighbours import nearest
+from gpca.alignment.icp_neighbors import nearest
 from gpca.alignment.icp_target import LISTED
 from gpca.process.compilation import INNER_LOOP, njit
 
@@ -17,18 +17,18 @@ def align_all(source, target, poses, fitness, rmse, max_iterations):
     """Align the source (N, 3) from every pose (n, 4, 4), in place; fill fitness (n,) and inlier RMSE (n,)."""
     room = np.empty(LISTED)
     moments, matrices = np.empty((4, 4)), np.empty((8, 4))
-    neighbour = np.empty(len(source), np.int64)
-    # Where each point's neighbour was searched, and the square of the radius around it.
+    neighbor = np.empty(len(source), np.int64)
+    # Where each point's neighbor was searched, and the square of the radius around it.
     held = np.zeros((len(source), 4))
     for n in range(len(poses)):
         pose = poses[n]
         held[:, 3] = -1.0  # nothing was searched yet
-        fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbour, held)
+        fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbor, held)
         for _ in range(max_iterations):
             if fitness[n] > 0:
                 move(pose, moments, matrices)
             old_fitness, old_rmse = fitness[n], rmse[n]
-            fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbour, held)
+            fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbor, held)
             if abs(old_fitness - fitness[n]) < CONVERGED and abs(old_rmse - rmse[n]) < CONVERGED:
                 break
 
@@ -40,11 +40,11 @@ def pull_all(source, target, poses, pulls, fitness, rmse):
     That is half of the gradient of the mean square of r by a twist on the left of the pose.
     """
     room, moments = np.empty(LISTED), np.empty((4, 4))
-    neighbour, held = np.empty(len(source), np.int64), np.zeros((len(source), 4))
+    neighbor, held = np.empty(len(source), np.int64), np.zeros((len(source), 4))
     for n in range(len(poses)):
         held[:, 3] = -1.0
         moments[:] = 0.0
-        fitness[n], rmse[n] = _correspond(source, target, poses[n], moments, room, neighbour, held)
+        fitness[n], rmse[n] = _correspond(source, target, poses[n], moments, room, neighbor, held)
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
             pulls[n, i] = moments[j, k] - moments[k, j]
@@ -94,7 +94,7 @@ def _plane_sums(source, target, normals, pose, hessian, gradient, room, row):
 
 
 @njit(**INNER_LOOP)
-def _correspond(source, target, pose, moments, room, neighbour, held):
+def _correspond(source, target, pose, moments, room, neighbor, held):
     """Return fitness and inlier RMSE at a pose, and in `moments` the mean of [q, 1] [p, 1]ᵀ over correspondences."""
     r00, r01, r02, t0 = pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3]
     r10, r11, r12, t1 = pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3]
@@ -108,7 +108,7 @@ def _correspond(source, target, pose, moments, room, neighbour, held):
         px = r00 * x + r01 * y + r02 * z + t0
         py = r10 * x + r11 * y + r12 * z + t1
         pz = r20 * x + r21 * y + r22 * z + t2
-        # As long as a point stays within the radius around where its neighbour was searched, it keeps it.
+        # As long as a point stays within the radius around where its neighbor was searched, it keeps it.
         moved = (px - held[i, 0]) ** 2 + (py - held[i, 1]) ** 2 + (pz - held[i, 2]) ** 2
         if moved >= held[i, 3]:
             index, radius = nearest(
@@ -130,9 +130,9 @@ def _correspond(source, target, pose, moments, room, neighbour, held):
                 used,
                 distance,
             )
-            neighbour[i] = index
+            neighbor[i] = index
             held[i, 0], held[i, 1], held[i, 2], held[i, 3] = px, py, pz, radius * radius
-        index = neighbour[i]
+        index = neighbor[i]
         if index < 0:
             continue
         qx, qy, qz = points[index, 0], points[index, 1], points[index, 2]

@@ -3,7 +3,7 @@
 Space is cut into voxels. The first point that falls into one has the target points nearest to the voxel's center
 listed; every later point there, in whichever iteration and from whichever initial pose, finds its neighbor among
 those. A list says how far it is complete; where that does not suffice, the point is searched by itself, so the
-neighbor is always the true one (:mod:`gpca.alignment.icp_neighbours`).
+neighbor is always the true one (:mod:`gpca.alignment.icp_neighbors`).
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ class Target(NamedTuple):
     """Points sorted into cubic cells, and the voxels' lists, which the searches fill.
 
     Attributes:
-        points: (P, 3) in the order of their cells; a neighbour is a row of it.
+        points: (P, 3) in the order of their cells; a neighbor is a row of it.
         starts: where each cell's points start, and where the last one's end.
         low: (3,) corner of the cells; the voxels begin `distance` before it.
         cell, cells: edge of a cell, number along each axis.
         voxel, voxels: the same of the voxels.
         list_of_voxel: row of its list, -1 before it has one.
-        listed, offsets: (lists, LISTED) points, (lists, 3, LISTED) their positions from the voxel's centre.
-        reach: every point that is not in the list is at least so far from the centre.
+        listed, offsets: (lists, LISTED) points, (lists, 3, LISTED) their positions from the voxel's center.
+        reach: every point that is not in the list is at least so far from the center.
         used: (1,) number of lists.
-        distance: farther points are no neighbours; unit of the points.
+        distance: farther points are no neighbors; unit of the points.
     """
 
     points: np.ndarray

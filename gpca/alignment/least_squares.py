@@ -9,7 +9,7 @@ from gpca.alignment.rigid import rigid_motion, rotate
 
 
 def best_rotation(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.ndarray) -> np.ndarray:
-    """Return the rotation (3×3) that minimises Σ w |q - R p|² (Wahba's problem, by Kabsch 1976)."""
+    """Return the rotation (3×3) that minimizes Σ w |q - R p|² (Wahba's problem, by Kabsch 1976)."""
     # einsum sums in one order on every processor; a BLAS product does not.
     u, _, vt = np.linalg.svd(np.einsum("ni,nj->ij", weights_n[:, None] * target_n_3, source_n_3))
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
@@ -17,7 +17,7 @@ def best_rotation(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.
 
 
 def best_motion(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.ndarray) -> np.ndarray:
-    """Return the rigid motion (4×4) that minimises Σ w |q - T p|²."""
+    """Return the rigid motion (4×4) that minimizes Σ w |q - T p|²."""
     p_3, q_3 = (np.average(points, axis=0, weights=weights_n) for points in (source_n_3, target_n_3))
     R = best_rotation(source_n_3 - p_3, target_n_3 - q_3, weights_n)
     return rigid_motion(R, q_3 - rotate(R, p_3))

@@ -49,7 +49,7 @@ def wilson_interval(successes: float, trials: int, level: float = 0.95) -> tuple
         raise ValueError("interval of no trials")
     z = NormalDist().inv_cdf((1 + level) / 2)
     share = successes / trials
-    centre = share + z**2 / (2 * trials)
+    center = share + z**2 / (2 * trials)
     half_width = z * sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
-    low, high = ((centre + sign * half_width) / (1 + z**2 / trials) for sign in (-1, 1))
+    low, high = ((center + sign * half_width) / (1 + z**2 / trials) for sign in (-1, 1))
     return max(0.0, low), min(1.0, high)

@@ -58,10 +58,10 @@ def confusion(
 
 
 def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
-    """Return the largest accuracy over all one-to-one relabellings of the predicted concepts.
+    """Return the largest accuracy over all one-to-one relabelings of the predicted concepts.
 
     Far above the plain accuracy it shows that an explainer tells the concepts apart but names them wrongly: an
-    artefact of sign or scale. It looks at the truth, so it is an upper bound and never a result: of many balanced
+    artifact of sign or scale. It looks at the truth, so it is an upper bound and never a result: of many balanced
     guesses it is slightly above 1/C. Solved as an assignment (Kuhn 1955).
     """
     from scipy.optimize import linear_sum_assignment

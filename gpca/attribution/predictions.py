@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.csv_file import numbers, read_csv, write_csv
+from gpca.io.csv_file import numbers, read_csv, read_numbers, write_csv
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 PREDICTION_COLUMNS = ("sample", "split", "object", "concept_true", "concept_predicted", "abstained", "icp_calls")
 TIMING_COLUMNS = ("sample", "split", "seconds", "icp_seconds")
 _OF_CONCEPTS = ("score_?*", "variance_?*", "bald", "entropy")  # further columns; an explainer may lack some
-_TRUTH = {"true": True, "1": True, "false": False, "0": False}
 
 
 def write_predictions(path: str | Path, registrations: Registrations, attribution: Attribution) -> None:
@@ -60,35 +59,19 @@ def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFra
         labels: columns before those of the samples; a number may occur once for each combination of theirs.
 
     Raises:
-        InputError: missing, empty or unreadable file; missing column; a concept without a score column; a sample
-            twice in one split (and under the same labels); a split other than train and test; a score or a number of
-            ICP calls that is not a finite number; a variance that is neither that nor empty; negative variances or
-            numbers of calls.
+        InputError: missing, empty or unreadable file; missing column; an unknown concept; a sample twice in one split
+            (and under the same labels); a score that is not a finite number, unless the explainer abstained.
     """
     rows = read_csv(path, (*labels, *PREDICTION_COLUMNS), _OF_CONCEPTS)
-    concepts = concepts_of(rows)
-    if not concepts:
-        raise InputError(path, "has no column score_<concept>", "regenerate it")
-    rows["abstained"] = rows["abstained"].str.lower().map(_TRUTH)
-    if rows["abstained"].isna().any():
-        raise InputError(path, "column 'abstained' contains values other than True and False", "regenerate it")
-    rows["abstained"] = rows["abstained"].astype(bool)
-    for column in ("concept_true", "concept_predicted"):
-        known = rows[column].isin(concepts)
-        if column == "concept_predicted":
-            known |= rows["abstained"] & (rows[column] == "")
-        if not known.all():
-            unknown = rows.loc[~known, column].iloc[0]
-            raise InputError(
-                path, f"unknown concept '{unknown}' in '{column}'", f"its concepts are {', '.join(concepts)}"
-            )
+    rows["abstained"] = rows["abstained"] == "True"
+    if unknown := set(rows["concept_true"]) - set(concepts := concepts_of(rows)):
+        raise InputError(path, f"unknown concept '{min(unknown)}'", f"its concepts are {', '.join(concepts)}")
     require_samples(path, rows, (*labels, "split", "sample"))
-    rows["icp_calls"] = numbers(path, rows, "icp_calls", least=0)
+    rows["icp_calls"] = numbers(path, rows, "icp_calls")
     for column in (name for name in rows.columns if name.startswith(("score_", "variance_"))):
         # Every explainer that does not abstain has scores; one without variances leaves them empty.
         needed = ~rows["abstained"] if column.startswith("score_") else rows[column] != ""
-        least = -np.inf if column.startswith("score_") else 0
-        rows[column] = numbers(path, rows, column, needed, least)
+        rows[column] = numbers(path, rows, column, needed)
     return rows
 
 
@@ -111,15 +94,13 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
     """Return seconds (S,) and icp_seconds (S,) of the registrations.
 
     Raises:
-        InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers, or
-            negative.
+        InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers.
     """
-    rows = read_csv(path, TIMING_COLUMNS)
+    rows = read_numbers(path, TIMING_COLUMNS, ("seconds", "icp_seconds"))
     for name in ("sample", "split"):
         if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
             raise InputError(path, "does not contain the times of these samples", "regenerate it")
-    seconds, icp_seconds = (numbers(path, rows, name, least=0).to_numpy() for name in ("seconds", "icp_seconds"))
-    return seconds, icp_seconds
+    return rows["seconds"].to_numpy(), rows["icp_seconds"].to_numpy()
 
 
 def require_samples(path: str | Path, rows: pd.DataFrame, keys: Iterable[str] = ("split", "sample")) -> None:

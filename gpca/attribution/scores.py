@@ -68,7 +68,7 @@ class Attribution:
 
     @property
     def entropy_N(self) -> np.ndarray:
-        """Predictive entropy H[ŝ] in nats of the scores, normalised to sum to one.
+        """Predictive entropy H[ŝ] in nats of the scores, normalized to sum to one.
 
         Scores may be signed, as Shapley values are: a negative one has no share. Without any share all are equal.
         """
@@ -82,7 +82,7 @@ def entropy(p: np.ndarray) -> np.ndarray:
     return -np.sum(p * np.log(np.where(p > 0, p, 1.0)), axis=-1)
 
 
-def summarise_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def summarize_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Turn M posterior draws of the latent logits into scores, variances and BALD.
 
     Eqs. 2, 4, 5 and 7 of the paper: p^(m) = softmax(f^(m)), ŝ = mean over m, v = mean squared deviation over m,
@@ -91,18 +91,18 @@ def summarise_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     Returns:
         scores_N_C, variances_N_C, bald_N.
     """
-    return _summarise(np.array(logits_M_N_C.T, order="C", dtype=float))
+    return _summarize(np.array(logits_M_N_C.T, order="C", dtype=float))
 
 
-def summarise_marginals(
+def summarize_marginals(
     mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int = 16
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Summarise draws mean + deviation · normal of independent latents, as :func:`summarise_draws` does.
+    """Summarize draws mean + deviation · normal of independent latents, as :func:`summarize_draws` does.
 
     All N points share the M·C numbers, so a point's result does not depend on the others. Blocks of points small
-    enough for the processor's cache are summarised one after the other.
+    enough for the processor's cache are summarized one after the other.
     """
-    parts = [_summarise(logits_C_N_M) for logits_C_N_M in _drawn(mean_N_C, deviation_N_C, normal_M_C, block)]
+    parts = [_summarize(logits_C_N_M) for logits_C_N_M in _drawn(mean_N_C, deviation_N_C, normal_M_C, block)]
     scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
     return scores_N_C, variances_N_C, bald_N
 
@@ -110,7 +110,7 @@ def summarise_marginals(
 def score_marginals(
     mean_N_C: np.ndarray, deviation_N_C: np.ndarray, normal_M_C: np.ndarray, block: int = 16
 ) -> np.ndarray:
-    """Return the scores (N, C) of :func:`summarise_marginals` alone, in two thirds of its time."""
+    """Return the scores (N, C) of :func:`summarize_marginals` alone, in two thirds of its time."""
     drawn = _drawn(mean_N_C, deviation_N_C, normal_M_C, block)
     return np.concatenate([_probabilities(logits_C_N_M)[0].mean(axis=2).T for logits_C_N_M in drawn])
 
@@ -134,10 +134,10 @@ def _probabilities(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return p_C_N_M, total_N_M
 
 
-def _summarise(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Do what :func:`summarise_draws` says, in the array that it is given.
+def _summarize(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Do what :func:`summarize_draws` says, in the array that it is given.
 
-    New arrays would take most of the time. Classes come first, as sums over three neighbours are several times as slow
+    New arrays would take most of the time. Classes come first, as sums over three neighbors are several times as slow
     as sums of three arrays, and draws last, so that a point's sums do not depend on how many others there are.
     """
     p_C_N_M, total_N_M = _probabilities(logits_C_N_M)

@@ -23,7 +23,7 @@ def labels_of(truth: Truth) -> np.ndarray:
     return np.where(np.isin(named_S, LABELS), named_S, BORDERLINE)
 
 
-def labelled(causes: Causes) -> Registrations:
+def labeled(causes: Causes) -> Registrations:
     """Return the registrations with their labels in the place of the concepts, and the sets of causes attached.
 
     An explainer that learns gets these; ``causes`` (S, 3) is 1 where a concept is one of the causes.
@@ -35,5 +35,5 @@ def labelled(causes: Causes) -> Registrations:
 
 def with_label(causes: Causes) -> Registrations:
     """Return those registrations that have a label, as :func:`labelled` does."""
-    registrations = labelled(causes)
+    registrations = labeled(causes)
     return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))

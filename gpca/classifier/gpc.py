@@ -15,7 +15,7 @@ import numpy as np
 import torch
 
 from gpca.adam import Adam
-from gpca.attribution.scores import score_marginals, summarise_marginals
+from gpca.attribution.scores import score_marginals, summarize_marginals
 from gpca.classifier.covariances import make_covariance
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
@@ -43,15 +43,15 @@ class GPC:
         self._sites: Sites | None = None  # what the labels say of the latents, once they were refined
 
     def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
-        """Maximise the ELBO (variational parameters, inducing inputs, covariance parameters).
+        """Maximize the ELBO (variational parameters, inducing inputs, covariance parameters).
 
-        Inputs are standardised, inducing inputs start at k-means centres and the lengthscale at the median distance:
+        Inputs are standardized, inducing inputs start at k-means centers and the lengthscale at the median distance:
         with gpytorch's default lengthscale an RBF kernel on some hundred dimensions stays at chance.
 
         Args:
-            h_N_d, labels_N: labelled embeddings.
-            around_R_d: embeddings by which the inputs are standardised and the inducing inputs and the lengthscale
-                initialised, where those to come lie elsewhere than the labelled ones; by default the labelled ones.
+            h_N_d, labels_N: labeled embeddings.
+            around_R_d: embeddings by which the inputs are standardized and the inducing inputs and the lengthscale
+                initialized, where those to come lie elsewhere than the labeled ones; by default the labeled ones.
         """
         for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N, around_R_d):
             pass
@@ -69,23 +69,23 @@ class GPC:
         random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
         covariance = make_covariance(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
         model = SparseGPs(covariance, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
-        optimiser = Adam(model.parameters(), self.settings.learning_rate)
+        optimizer = Adam(model.parameters(), self.settings.learning_rate)
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
-            optimiser.zero_grad()
+            optimizer.zero_grad()
             (-model.elbo(inputs_N_d, torch.from_numpy(targets_N))).backward()
-            optimiser.step()
+            optimizer.step()
             if done in stops:
                 self._prior = Prior.of(model)
                 self._latents = model.latents()
-                self._labelled = self.project(h_N_d)
+                self._labeled = self.project(h_N_d)
                 self._targets_N = targets_N
                 self._sites = None
                 yield done
 
     def elbo(self) -> float:
-        """Return the evidence lower bound per labelled sample in nats."""
-        return elbo(self._labelled, self._targets_N, self._latents) / len(self._targets_N)
+        """Return the evidence lower bound per labeled sample in nats."""
+        return elbo(self._labeled, self._targets_N, self._latents) / len(self._targets_N)
 
     def update(
         self, h_L_d: np.ndarray | Projection, labels_L: np.ndarray, iterations: int = 100, tolerance: float = 1e-3
@@ -100,7 +100,7 @@ class GPC:
         Returns:
             the number of iterations, each a pass over all labels.
         """
-        self._labelled = self._labelled.followed_by(self.project(h_L_d))
+        self._labeled = self._labeled.followed_by(self.project(h_L_d))
         self._targets_N = np.concatenate([self._targets_N, self._targets(labels_L)])
         return self.refine(iterations, tolerance)
 
@@ -111,7 +111,7 @@ class GPC:
         """
         sites = Sites.silent(0, 0) if self._sites is None else self._sites
         sites = sites.extend(len(self._targets_N), len(self.classes))
-        self._sites, self._latents, done = refine(self._labelled, self._targets_N, sites, iterations, tolerance)
+        self._sites, self._latents, done = refine(self._labeled, self._targets_N, sites, iterations, tolerance)
         return done
 
     def level(self) -> None:
@@ -133,7 +133,7 @@ class GPC:
 
     def _set_prior(self, prior: Prior) -> None:
         self._prior = prior
-        self._labelled = prior.project(torch.from_numpy(self._labelled.inputs_N_d))
+        self._labeled = prior.project(torch.from_numpy(self._labeled.inputs_N_d))
         self.refine()
 
     def project(self, h_N_d: np.ndarray | Projection) -> Projection:
@@ -141,9 +141,9 @@ class GPC:
         return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
 
     @property
-    def learnt_N_d(self) -> np.ndarray:
-        """The standardised inputs of the labels that it learned, (N, d)."""
-        return self._labelled.inputs_N_d
+    def learned_N_d(self) -> np.ndarray:
+        """The standardized inputs of the labels that it learned, (N, d)."""
+        return self._labeled.inputs_N_d
 
     def posterior(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation (N, C) of the latent logits q(f(h)); the latents are independent."""
@@ -160,7 +160,7 @@ class GPC:
         All points share the same M·C standard normal numbers, so a point's result does not depend on the others;
         per-point marginals suffice, because none of the three uses correlations between points.
         """
-        return summarise_marginals(*self.posterior(h_N_d), self._draws())
+        return summarize_marginals(*self.posterior(h_N_d), self._draws())
 
     def scores(self, h_N_d: np.ndarray | Projection) -> np.ndarray:
         """Return the scores_N_C of :meth:`attribute` alone."""
@@ -181,7 +181,7 @@ class GPC:
             "inducing": self._prior.inducing_M_d,
             "mean": torch.from_numpy(self._latents.mean_C_M),
             "covariance": torch.from_numpy(self._latents.covariance_C_M_M),
-            "labelled": torch.from_numpy(self._labelled.inputs_N_d),
+            "labelled": torch.from_numpy(self._labeled.inputs_N_d),
             "targets": torch.from_numpy(self._targets_N),
         }
 
@@ -194,7 +194,7 @@ class GPC:
         covariance.load_state_dict(state["kernel"])
         gpc._prior = Prior(covariance, state["inducing"])
         gpc._latents = Latents(state["mean"].numpy(), state["covariance"].numpy())
-        gpc._labelled = gpc._prior.project(state["labelled"])
+        gpc._labeled = gpc._prior.project(state["labelled"])
         gpc._targets_N = state["targets"].numpy()
         return gpc
 

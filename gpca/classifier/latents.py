@@ -62,7 +62,7 @@ class Latents:
 
 @dataclass(frozen=True)
 class Sites:
-    """One Gaussian factor per labelled input and latent, in natural parameters: what its label says of the latent.
+    """One Gaussian factor per labeled input and latent, in natural parameters: what its label says of the latent.
 
     The posterior is q(v) ∝ N(0, I) Π_n exp(linear_n f_n - precision_n f_n² / 2). A site of zeros says nothing.
     """
@@ -99,7 +99,7 @@ def refine(
     and covariance, it needs no learning rate to be tuned and ends after some ten steps.
 
     Args:
-        projection, targets_N: the N labelled inputs and the numbers of their classes.
+        projection, targets_N: the N labeled inputs and the numbers of their classes.
         sites: where to start; those of an earlier call, extended, continue from what was learned.
         iterations, tolerance: the most steps, and the largest change of a probability at which they end.
 

@@ -22,7 +22,7 @@ class Prior:
 
     Attributes:
         covariance: a ``ScaleKernel`` of batch shape (C,).
-        inducing_M_d: shared inducing inputs Z, standardised.
+        inducing_M_d: shared inducing inputs Z, standardized.
     """
 
     covariance: gpytorch.kernels.ScaleKernel
@@ -41,7 +41,7 @@ class Prior:
         object.__setattr__(self, "_cholesky_C_M_M", cholesky_C_M_M.numpy())
 
     def project(self, inputs_N_d: torch.Tensor) -> Projection:
-        """Return weights L⁻¹ k(Z, x) and residual variance k(x, x) - |weights|² of standardised inputs."""
+        """Return weights L⁻¹ k(Z, x) and residual variance k(x, x) - |weights|² of standardized inputs."""
         with torch.no_grad():
             K_C_M_N = cross_covariance(self.covariance, self.inducing_M_d, inputs_N_d).double().numpy()
             variance_C_N = variance(self.covariance, inputs_N_d).double().numpy() + JITTER
@@ -52,7 +52,7 @@ class Prior:
         return Projection(inputs_N_d.numpy(), np.swapaxes(weights_C_M_N, 1, 2), np.maximum(residual_C_N, 0))
 
     def means(self, inputs_N_d: torch.Tensor, mean_C_M: np.ndarray) -> torch.Tensor:
-        """Return the means (N, C) of the latents at standardised inputs, differentiable in these, in float64.
+        """Return the means (N, C) of the latents at standardized inputs, differentiable in these, in float64.
 
         Args:
             inputs_N_d: the inputs.

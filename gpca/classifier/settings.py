@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from gpca.errors import require_known
-from gpca.settings import Bounds, Count
+from gpca.settings import ArgumentsOf, Bounds, Count
 
 Kernel = Literal["rbf", "matern32", "polynomial"]
 KERNELS = get_args(Kernel)
@@ -33,3 +33,6 @@ class GPCSettings:
 
     def __post_init__(self) -> None:
         require_known("kernel", self.kernel, KERNELS)
+
+
+GPCArguments = Annotated[Any, ArgumentsOf(GPCSettings)]  # of a function that hands them on

@@ -1,4 +1,4 @@
-"""Sparse GPs under variational inference: their ELBO for a softmax likelihood, to be maximised by gradients.
+"""Sparse GPs under variational inference: their ELBO for a softmax likelihood, to be maximized by gradients.
 
 gpytorch's objective (``VariationalStrategy``, ``CholeskyVariationalDistribution``, ``SoftmaxLikelihood`` and
 ``VariationalELBO`` with their defaults), from the same random numbers, in several times less time: distances are
@@ -42,7 +42,7 @@ class SparseGPs(nn.Module):
         self._random = random
 
     def marginals(self, inputs_N_d: Tensor) -> tuple[Tensor, Tensor]:
-        """Return mean and variance (C, N) of the latents at standardised inputs."""
+        """Return mean and variance (C, N) of the latents at standardized inputs."""
         jitter_M_M = JITTER * torch.eye(len(self.inducing_M_d))
         K_C_M_M = cross_covariance(self.covariance, self.inducing_M_d, self.inducing_M_d) + jitter_M_M
         cholesky_C_M_M = psd_safe_cholesky(K_C_M_M.double()).float()
@@ -67,7 +67,7 @@ class SparseGPs(nn.Module):
         normal_D_N_C = torch.randn(shape, generator=self._random)
         deviation_N_C = square_root(variance_C_N.clamp_min(LEAST_VARIANCE)).T
         logits_D_C_N = (mean_C_N.T + deviation_N_C * normal_D_N_C).mT.contiguous()
-        # Classes before samples: sums over three neighbours are several times as slow.
+        # Classes before samples: sums over three neighbors are several times as slow.
         log_p_D_N = logits_D_C_N[:, targets_N, torch.arange(len(targets_N))] - logits_D_C_N.logsumexp(dim=1)
         return (log_p_D_N.mean(dim=0).sum() - self.divergence()) / len(targets_N)
 

@@ -85,8 +85,8 @@ def _training(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
     return [
         f"The diagnosis was trained on {diagnoser.classifier.samples} registrations whose causes were measured by "
         "counterfactuals (docs/causes.md). Their source clouds were sampled from the objects' surfaces and perturbed. "
-        f"GP-CA as in the paper, which is printed beside it, was trained on {len(model.gpc.learnt_N_d)} registrations, "
-        "each perturbed in one way.",
+        f"GP-CA as in the paper, which is printed beside it, was trained on {len(model.gpc.learned_N_d)} "
+        "registrations, each perturbed in one way.",
         _table(["objects", "number", "train"], rows),
     ]
 

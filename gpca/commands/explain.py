@@ -10,7 +10,7 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.model.location import model_path, require_model
 from gpca.model.point_file import read_points, read_pose, require_format
-from gpca.objects.mesh_folder import METRES_PER_UNIT
+from gpca.objects.mesh_folder import METERS_PER_UNIT
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 UNKNOWN_STATUS = 3  # of the process; 1 is a failed check of another step, 2 a fault of the user's
@@ -23,7 +23,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("target", type=Path, help="the reference that each source is aligned to")
     parser.add_argument("--init", type=Path, help="text file with the 4×4 numbers of T_target_source")
-    parser.add_argument("--unit", choices=METRES_PER_UNIT, default="m", help="unit of files and pose (default m)")
+    parser.add_argument("--unit", choices=METERS_PER_UNIT, default="m", help="unit of files and pose (default m)")
     parser.add_argument("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, the package's)")
     parser.add_argument("--method", help="registration method, such as gicp (default: the model's ICP)")
     parser.add_argument(

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from gpca.active_learning.labelling import SKIPPED, LabelFile, Question, Session, require_name
+from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Session, require_name
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings
@@ -26,8 +26,8 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.arguments import COUNT
 from gpca.process.provenance import record_provenance
-from gpca.reporting.figures.query import draw_query
-from gpca.settings import check_settings
+from gpca.reporting.figures.cloud_views import draw_query
+from gpca.settings import read_settings
 
 COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this one", "/quit": "stop here"}
 
@@ -56,14 +56,13 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> None:
     """Ask, write, retrain, until the questions, the answers or the samples are used up."""
     torch.set_num_threads(options.threads)
-    check_settings(options.settings, "explainers", "gpca")
+    settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
     read = [options.registrations, options.embeddings, *([options.answers] if options.answers else [])]
     require_outputs([path for path in (options.labels, options.picture, options.predictions) if path], read)
     registrations, h_S_d = _load(options)
     keys = list(zip(registrations.split.tolist(), registrations.sample.tolist(), strict=True))
     start = _start(registrations, keys, options)
     labels = LabelFile(options.labels, dict.fromkeys(keys))
-    settings = GPCSettings(**({"learning_rate": 0.2, "iterations": 150} | options.settings))
     session = Session(h_S_d, keys, start, labels, settings, options.strategy)
     answers = _answers(options.answers)
     asked = 0

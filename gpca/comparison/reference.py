@@ -13,9 +13,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from gpca.comparison.means import Mean, kind_of, read_means, samples_of_sources
+from gpca.comparison.means import KINDS, Mean, kind_of, read_means, samples_of_sources
 from gpca.errors import InputError
+from gpca.settings import Keys, NotNegative, Share
 
 VERDICTS = IDENTICAL, ROUNDING, DIFFERENT, MISSING = "identical", "rounding", "different", "missing"
 # What differs from run to run, and what is made of it: never compared.
@@ -30,24 +32,22 @@ class Allowance:
     """By how much two means may differ: section ``reference`` of the config.
 
     Attributes:
-        tolerances: the largest difference, for each kind in `KINDS`.
+        tolerances: the largest difference, for each kind in :data:`gpca.comparison.means.KINDS`.
         flipped: of a share of samples, or what follows from the share that another rounding may decide otherwise,
         deviations: and so many standard deviations of their balance.
         half_widths: of anything else, or so many half-widths of the reference's 95 % interval.
         ratio: or so much of a number of labels or epochs, which a target reached one step later changes.
     """
 
-    tolerances: Mapping[str, float]
-    half_widths: float
-    flipped: float
-    deviations: float
-    ratio: float
+    tolerances: Annotated[dict, Keys({kind: NotNegative for *_, kind in KINDS}, required=[kind for *_, kind in KINDS])]
+    half_widths: NotNegative
+    flipped: Share
+    deviations: NotNegative
+    ratio: Share
 
     def of(self, file: str, mean: Mean) -> float:
         """Return the largest difference from a mean of the reference's file that rounding explains."""
         kind = kind_of(file, mean.quantity)
-        if kind not in self.tolerances:
-            raise InputError("config key reference.tolerances", f"has no kind '{kind}'", "add its tolerance")
         allowed = self.tolerances[kind]
         if mean.samples and mean.unit:
             # Not its interval: that of a few seeds is wider than anything that the samples can explain.

@@ -4,30 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gpca.config.checks.estimators import check_estimators
-from gpca.config.checks.explainers import (
-    check_controls,
-    check_diagnosis,
-    check_encoders,
-    check_explainers,
-    check_learners,
-    check_registrations,
-    check_strategies,
-    check_tolerances,
-)
-from gpca.config.checks.frames import check_real_world
-from gpca.config.checks.left_out import check_left_out
-from gpca.config.checks.methods import check_methods
-from gpca.config.checks.places import check_places
-from gpca.config.checks.recovery import check_recovery
-from gpca.config.checks.sizes import check_sizes
-from gpca.config.checks.sources import check_named_sources, resolve_sources
+from gpca.config.checks import check_shared, resolve_sources
 from gpca.config.command_line import with_types
 from gpca.config.layers import with_defaults
-from gpca.config.leave_out import names_left_out, without_false
+from gpca.config.leave_out import check_left_out, names_left_out, without_false
+from gpca.config.schema import whole_config
 from gpca.experiments.registry import experiments
 from gpca.io.structured_text import require_plain
-from gpca.settings import load_schema, require_valid
+from gpca.settings import read_settings
 
 
 def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:
@@ -63,27 +47,13 @@ def check(config: dict) -> dict[str, dict]:
     """
     require_plain(config, "config key")
     whole = without_false(config)
-    require_valid(whole, load_schema(), "config key")
-    encoders, designs, sources, actions = (
-        names_left_out(config, key) for key in ("encoders", "uncertainty", "sources", "recovery.actions")
-    )
+    read_settings(whole_config(), whole, "config key")
     check_left_out(config)
-    check_places(whole)
-    check_registrations(whole)
-    check_encoders(whole, encoders)
-    check_methods(whole, names_left_out(config, "methods"))
-    check_estimators(whole)
-    check_explainers(whole, designs)
-    check_diagnosis(whole)
-    check_strategies(whole)
-    check_learners(whole)
-    check_controls(whole)
+
+    def left_out(key: str) -> set[str]:
+        return names_left_out(config, key)
+
+    check_shared(whole, left_out)
     for experiment in experiments():
-        experiment.check(whole, lambda key: names_left_out(config, key))
-    check_tolerances(whole)
-    check_real_world(whole, encoders)
-    check_recovery(whole, actions, designs, sources)
-    check_sizes(whole)
-    resolved = resolve_sources(whole)
-    check_named_sources(whole, sources, encoders)
-    return resolved
+        experiment.check(whole, left_out)
+    return resolve_sources(whole)

@@ -5,32 +5,30 @@ A config that is laid over another can add to its mappings but take nothing away
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import fields
+from functools import partial
 from typing import Any
 
-from baselines.registry import explainers
-from gpca.errors import InputError
+from gpca.config.schema import DESIGNS, Reductions
+from gpca.errors import InputError, require_names
+from gpca.experiments.experiment import EXPLAINERS, Names
 from gpca.experiments.registry import experiments
-from gpca.recovery.policies import ALWAYS, POLICIES
+from gpca.explainers.registry import explainers
 
-EXPLAINED = tuple(f"{each.name}.explainers" for each in experiments() if each.explainers)
-# Mappings of which any entry may be false.
-LEAVABLE = (
-    *("sources", "encoders", "reductions", "uncertainty", "methods", "explainers", "learners", "controls.explainers"),
-    *("real_world.datasets", "recovery.actions", "diagnosis.explainers", "estimators", "estimator_pairs.methods"),
-    "readings.groups",
-    *EXPLAINED,
-)
-# Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
-SWITCHES = ("active_learning.strategies", "recovery.policies")
-# Lists that lose the names of what is left out elsewhere: the list's key, and that of the mapping.
-LISTED = {
-    "kernel_grid.sources": "sources",
-    **{f"{each.name}.{key}": mapping for each in experiments() for key, mapping in each.lists.items()},
-    "real_world.backbones": "encoders",
-    "real_world.condition_backbones": "encoders",
-    "real_world.reductions": "reductions",
+# Mappings of which any entry may be false -> the names that they have.
+LEAVABLE: dict[str, Names] = {
+    "sources": Names("source"),
+    "encoders": Names("encoder"),
+    "reductions": Names("reduction", lambda: [field.name for field in fields(Reductions)]),
+    "uncertainty": Names("uncertainty", lambda: DESIGNS),
+    "explainers": EXPLAINERS,
+    **{key: names for each in experiments() for key, names in each.leavable.items()},
 }
+# Mappings name -> true or false, read as the list of the names that are true. A list may stand there instead.
+SWITCHES = {key: names for each in experiments() for key, names in each.switches.items()}
+# Lists and mappings that lose the names of what is left out elsewhere: the key, and that of the other mapping.
+LISTED = {key: names for each in experiments() for key, names in each.lists.items()}
 
 
 def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -45,24 +43,25 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     left_out = {key: set(_false_names(_at(config, key))) for key in LEAVABLE}
     whole = dict(config)
     for key, names in left_out.items():
-        _change(whole, key, lambda mapping, gone=names: {n: entry for n, entry in mapping.items() if n not in gone})
+        _change(whole, key, partial(_without, gone=names))
     for key in SWITCHES:
         _change(whole, key, lambda switches, key=key: list(_names_switched_on(key, switches)))
     for key, of in LISTED.items():
-        _change(
-            whole, key, lambda names, gone=left_out[of]: [name for name in names if name not in gone] or names, list
-        )
+        gone = left_out[of] if isinstance(of, str) else of(lambda key: names_left_out(config, key))
+        _change(whole, key, partial(_without, gone=gone), (list, dict))
     if left_out["real_world.datasets"] and not _at(whole, "real_world.datasets"):
         _change(whole, "real_world.virtual", lambda _frames: None)  # no models are left to render
-    gone = left_out["encoders"]
-    _change(whole, "real_world.training", lambda mapping: {n: e for n, e in mapping.items() if n not in gone})
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
-    for key in ("explainers", "controls.explainers", *EXPLAINED):
-        _change(whole, key, lambda rows: {name: row for name, row in rows.items() if name not in without})
-    acting = {f"{ALWAYS}{name}" for name in left_out["recovery.actions"]}
-    reading = {name for name, entry in POLICIES.items() if entry.explainer in without}
-    _change(whole, "recovery.policies", lambda names: [n for n in names if n not in acting | reading], list)
+    for key in (key for key, names in LEAVABLE.items() if names is EXPLAINERS):
+        _change(whole, key, partial(_without, gone=without))
     return whole
+
+
+def check_left_out(config: Mapping[str, Any]) -> None:
+    """Check the names that are false: one that nothing has would be left out in vain, and nobody would notice."""
+    for key, names in {**LEAVABLE, **SWITCHES}.items():
+        if names.known:
+            require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
 
 
 def names_left_out(config: Mapping[str, Any], key: str) -> set[str]:
@@ -90,7 +89,14 @@ def _at(config: Mapping[str, Any], key: str) -> Any:
     return found
 
 
-def _change(config: dict[str, Any], key: str, change, kind: type = dict) -> None:
+def _without(names: list | dict, gone: Collection[str]) -> list | dict:
+    """Return what is left of a list or mapping; a list of nothing else stays."""
+    if isinstance(names, dict):
+        return {name: entry for name, entry in names.items() if name not in gone}
+    return [name for name in names if name not in gone] or names
+
+
+def _change(config: dict[str, Any], key: str, change, kind: type | tuple[type, ...] = dict) -> None:
     """Replace what is at the key by what `change` makes of it, in copies of the sections on the way."""
     *path, last = key.split(".")
     if not isinstance(_at(config, key), kind):

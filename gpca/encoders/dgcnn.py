@@ -15,11 +15,11 @@ class DGCNN(nn.Module):
     """Four EdgeConvs (64, 64, 128, 256) on dynamic graphs, a point-wise layer, max and mean pooling.
 
     The published widths; the point-wise layer has 256 channels here (1024 in the ModelNet40 network), which keeps
-    it to half of the arithmetic. The cloud is used as it is: no centring, scaling or spatial transformer, which would
+    it to half of the arithmetic. The cloud is used as it is: no centering, scaling or spatial transformer, which would
     erase the concepts.
 
     Args:
-        k: neighbours per point, the point itself included.
+        k: neighbors per point, the point itself included.
         point_features: width of the point-wise layer.
         widths: of the EdgeConvs.
         inputs: numbers of a point; its coordinates, unless there are more.

@@ -4,7 +4,7 @@ The edge function is one linear layer W on ``[x_j - x_i ; x_i]``. With ``W = [W1
 
     y_ij = W1 x_j + (W2 - W1) x_i = A_j + C_i ,
 
-so the matrix product runs over N points, not N·k edges. Batch normalisation is affine and LeakyReLU monotone, hence
+so the matrix product runs over N points, not N·k edges. Batch normalization is affine and LeakyReLU monotone, hence
 
     max_j act(γ (y_ij - μ)/σ + β) = act(γ (ext_j y_ij - μ)/σ + β),  ext = max where γ >= 0, min where γ < 0.
 
@@ -31,7 +31,7 @@ NEGATIVE_SLOPE = 0.2
 def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
     """Return the indices (B, N, k) of each point's k nearest points in feature space, itself included.
 
-    The order within a neighbourhood is unspecified, because EdgeConv does not depend on it.
+    The order within a neighborhood is unspecified, because EdgeConv does not depend on it.
 
     Raises:
         InputError: a cloud has fewer than k points.
@@ -63,7 +63,7 @@ def knn_indices_within(x_1_P_F: torch.Tensor, k: int, sizes: Sequence[int]) -> t
 
 
 class EdgeConv(nn.Module):
-    """One EdgeConv layer: linear on edges, batch norm over edges, LeakyReLU(0.2), max over the k neighbours.
+    """One EdgeConv layer: linear on edges, batch norm over edges, LeakyReLU(0.2), max over the k neighbors.
 
     Parameters are laid out as in the per-edge form: ``weight`` (F_out, 2·F_in) acts on ``[x_j - x_i ; x_i]``.
     """
@@ -80,37 +80,37 @@ class EdgeConv(nn.Module):
 
         With `sizes`, B is 1 and the points are those of clouds of so many points, one after the other.
         """
-        neighbours_B_N_k = knn_indices(x_B_N_F, self.k) if sizes is None else knn_indices_within(x_B_N_F, self.k, sizes)
+        neighbors_B_N_k = knn_indices(x_B_N_F, self.k) if sizes is None else knn_indices_within(x_B_N_F, self.k, sizes)
         w1, w2 = self.weight.chunk(2, dim=1)
         ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
         wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
         if ac_B_N_2F.device.type != "cpu" or (wants_gradient and not self.training):
-            return _edge_max_plain(ac_B_N_2F, neighbours_B_N_k, self.norm)
+            return _edge_max_plain(ac_B_N_2F, neighbors_B_N_k, self.norm)
         if not self.training:
-            return self._inference(ac_B_N_2F, neighbours_B_N_k)
+            return self._inference(ac_B_N_2F, neighbors_B_N_k)
         out_B_N_F, mean_F, variance_F = _EdgeMax.apply(
-            ac_B_N_2F, neighbours_B_N_k, self.norm.weight, self.norm.bias, self.norm.eps
+            ac_B_N_2F, neighbors_B_N_k, self.norm.weight, self.norm.bias, self.norm.eps
         )
-        self.norm.track(mean_F, variance_F, neighbours_B_N_k.numel())
+        self.norm.track(mean_F, variance_F, neighbors_B_N_k.numel())
         return out_B_N_F
 
-    def _inference(self, ac_B_N_2F: torch.Tensor, neighbours_B_N_k: torch.Tensor) -> torch.Tensor:
-        arrays = _numpy(ac_B_N_2F, neighbours_B_N_k, *self.norm.scale_and_shift())
+    def _inference(self, ac_B_N_2F: torch.Tensor, neighbors_B_N_k: torch.Tensor) -> torch.Tensor:
+        arrays = _numpy(ac_B_N_2F, neighbors_B_N_k, *self.norm.scale_and_shift())
         out = edge_kernels.gather_max_affine(*arrays, NEGATIVE_SLOPE)
         return torch.from_numpy(out)
 
 
 class _EdgeMax(torch.autograd.Function):
-    """Batch-normalised, activated maximum over neighbours with the exact statistics of all edges (CPU)."""
+    """Batch-normalized, activated maximum over neighbors with the exact statistics of all edges (CPU)."""
 
     @staticmethod
-    def forward(ctx, ac_B_N_2F, neighbours_B_N_k, gamma_F, beta_F, eps):
-        n_edges = neighbours_B_N_k.numel()
-        ac, neighbours, gamma, beta = _numpy(ac_B_N_2F, neighbours_B_N_k, gamma_F, beta_F)
+    def forward(ctx, ac_B_N_2F, neighbors_B_N_k, gamma_F, beta_F, eps):
+        n_edges = neighbors_B_N_k.numel()
+        ac, neighbours, gamma, beta = _numpy(ac_B_N_2F, neighbors_B_N_k, gamma_F, beta_F)
         extreme, extreme_at, edge_sums, mean, variance = edge_kernels.gather_extreme_and_sums(ac, neighbours, gamma)
         inverse_std = (1.0 / (variance + eps) ** 0.5).astype(ac.dtype)
         mean = mean.astype(ac.dtype)
-        out = edge_kernels.normalise_activate(extreme, mean, inverse_std, gamma, beta, NEGATIVE_SLOPE)
+        out = edge_kernels.normalize_activate(extreme, mean, inverse_std, gamma, beta, NEGATIVE_SLOPE)
         ctx.numpy_arrays = (ac, neighbours, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges)
         mean_F, variance_F = torch.from_numpy(mean), torch.from_numpy(variance.astype(ac.dtype))
         ctx.mark_non_differentiable(mean_F, variance_F)
@@ -123,14 +123,14 @@ class _EdgeMax(torch.autograd.Function):
         return torch.from_numpy(grad_ac), None, torch.from_numpy(grad_gamma), torch.from_numpy(grad_beta), None
 
 
-def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbours_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
+def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbors_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
     """Evaluate the same layer with torch operations alone: gathers edges, still no per-edge matrix product.
 
     On a GPU, and where a trained layer is asked for the gradient in its inputs.
     """
     a_B_N_F, c_B_N_F = ac_B_N_2F.chunk(2, dim=-1)
-    batch, n, k = neighbours_B_N_k.shape
-    rows = (neighbours_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]).reshape(-1)
+    batch, n, k = neighbors_B_N_k.shape
+    rows = (neighbors_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]).reshape(-1)
     y_E_F = a_B_N_F.reshape(batch * n, -1)[rows] + c_B_N_F.reshape(batch * n, 1, -1).expand(-1, k, -1).flatten(0, 1)
     activated = nn.functional.leaky_relu(norm(y_E_F), NEGATIVE_SLOPE)
     return activated.view(batch, n, k, -1).amax(dim=2)

@@ -3,7 +3,7 @@
 All arrays are C-contiguous float32 (float64 works too, for gradient checks). ``ac`` (B, N, 2F) holds A in its first F
 and C in its last F channels. The loops over clouds run in parallel on the threads that numba is given; every
 floating-point sum is made within one cloud and the clouds are added in order, so the thread count changes no bit.
-Inner loops run over channels, where they vectorise.
+Inner loops run over channels, where they vectorize.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gpca.process.compilation import OVER_CLOUDS, njit, prange
 def smallest_k(distances, k):
     """Return for every row of ``distances`` (B, N, M) the columns of its k smallest entries, ties to the lower column.
 
-    Searches for a value that exactly k entries do not exceed. Counting vectorises, so this is about ten times faster
+    Searches for a value that exactly k entries do not exceed. Counting vectorizes, so this is about ten times faster
     than keeping the k best while scanning, and needs no order within the k. Every row is by itself, so that one cloud
     is work for several threads.
     """
@@ -78,7 +78,7 @@ def _bracket(row, k):
 @njit(cache=True, error_model="numpy")
 def _count(row, most):
     within = np.int32(0)
-    for j in range(row.size):  # iterating over the row itself would not vectorise
+    for j in range(row.size):  # iterating over the row itself would not vectorize
         within += np.int32(row[j] <= most)
     return within
 
@@ -115,7 +115,7 @@ def gather_extreme_and_sums(ac, neighbours, gamma):
         extreme (B, N, F): max_j y_ij where gamma >= 0, min_j y_ij elsewhere.
         extreme_at (B, N, F): the point j at which it is reached.
         edge_sums (B, N, F): Σ_j y_ij.
-        mean, variance (F,): float64, over all B·N·k edges (variance biased, as batch norm normalises by it).
+        mean, variance (F,): float64, over all B·N·k edges (variance biased, as batch norm normalizes by it).
     """
     batch, n, k = neighbours.shape
     features = ac.shape[2] // 2
@@ -161,7 +161,7 @@ def gather_extreme_and_sums(ac, neighbours, gamma):
 
 
 @njit(**OVER_CLOUDS)
-def normalise_activate(extreme, mean, inverse_std, gamma, beta, slope):
+def normalize_activate(extreme, mean, inverse_std, gamma, beta, slope):
     """Return act(γ (extreme - μ)/σ + β), the layer's output (B, N, F)."""
     batch, n, features = extreme.shape
     scale = gamma * inverse_std
@@ -206,9 +206,9 @@ def gather_max_affine(ac, neighbours, scale, shift, slope):
 def edge_max_backward(
     grad_out, ac, neighbours, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope
 ):
-    """Return the gradients of :func:`normalise_activate` after :func:`gather_extreme_and_sums`.
+    """Return the gradients of :func:`normalize_activate` after :func:`gather_extreme_and_sums`.
 
-    With g the gradient at the extreme edges and ŷ the normalised edges, batch norm over E edges gives
+    With g the gradient at the extreme edges and ŷ the normalized edges, batch norm over E edges gives
 
         ∂L/∂y_e = γ/σ [ g_e - (Σ g + ŷ_e Σ g ŷ)/E ] ;
 

@@ -29,7 +29,7 @@ class GroupMLP(nn.Module):
     """Layers of linear map, batch norm and ReLU on the slots of each group, then their maximum.
 
     Args:
-        in_features: how many a point has, beside its coordinates relative to the group's centre.
+        in_features: how many a point has, beside its coordinates relative to the group's center.
         widths: one for each layer.
         last_relu: False leaves the ReLU after the last batch norm out, where a residual is to be added first.
     """
@@ -45,28 +45,28 @@ class GroupMLP(nn.Module):
         """Return the features (B, M, F_out) of the groups from the points' coordinates and features."""
         if points_B_N_3.device.type != "cpu":
             return self.plain(points_B_N_3, x_B_N_F, groups)
-        batch, n_groups, _ = groups.centres_B_M_3.shape
+        batch, n_groups, _ = groups.centers_B_M_3.shape
         edges = _Edges(groups, points_B_N_3)
         (first, norm), *others = self._layers()
         y_E_F = self._first_layer(first.weight, points_B_N_3, x_B_N_F, groups, edges)
         for layer, next_norm in others:
-            y_E_F = linear(self._normalise(norm, y_E_F, edges), layer.weight)
+            y_E_F = linear(self._normalize(norm, y_E_F, edges), layer.weight)
             norm = next_norm
-        z_G_F = self._normalise(norm, y_E_F, edges, pool=True)
+        z_G_F = self._normalize(norm, y_E_F, edges, pool=True)
         return (z_G_F.relu() if self.last_relu else z_G_F).view(batch, n_groups, -1)
 
     def plain(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
         """Return the same with torch operations alone, every slot of every group evaluated."""
-        neighbours_B_M_k = groups.neighbours_B_M_k.long()
-        slots_B_M_k_F = (take(points_B_N_3, neighbours_B_M_k) - groups.centres_B_M_3[:, :, None]) / groups.radius
+        neighbors_B_M_k = groups.neighbors_B_M_k.long()
+        slots_B_M_k_F = (take(points_B_N_3, neighbors_B_M_k) - groups.centers_B_M_3[:, :, None]) / groups.radius
         if x_B_N_F is not None:
-            slots_B_M_k_F = torch.cat([slots_B_M_k_F, take(x_B_N_F, neighbours_B_M_k)], dim=-1)
+            slots_B_M_k_F = torch.cat([slots_B_M_k_F, take(x_B_N_F, neighbors_B_M_k)], dim=-1)
         z_S_F = slots_B_M_k_F.flatten(0, 2)
         for depth, (layer, norm) in enumerate(self._layers(), start=1):
             z_S_F = norm(layer(z_S_F))
             if depth < len(self.norms) or self.last_relu:
                 z_S_F = z_S_F.relu()
-        return z_S_F.view(*neighbours_B_M_k.shape, -1).amax(dim=2)
+        return z_S_F.view(*neighbors_B_M_k.shape, -1).amax(dim=2)
 
     def _layers(self) -> list[tuple[nn.Linear, BatchNorm]]:
         linears = cast("list[nn.Linear]", list(self.linears))
@@ -79,16 +79,16 @@ class GroupMLP(nn.Module):
         a_P_F = linear(inputs.flatten(0, 1), weight)
         if groups.is_whole:  # around the origin: C is zero
             return a_P_F
-        c_G_F = linear(groups.centres_B_M_3.flatten(0, 1), weight[:, :3] / -groups.radius)
+        c_G_F = linear(groups.centers_B_M_3.flatten(0, 1), weight[:, :3] / -groups.radius)
         return _Gather.apply(a_P_F, c_G_F, edges)
 
-    def _normalise(self, norm: BatchNorm, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:
+    def _normalize(self, norm: BatchNorm, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:
         if not self.training:
             arrays = [x.detach().numpy() for x in (y_E_F, *norm.scale_and_shift())]
             if pool:
-                return torch.from_numpy(kernels.normalise_max(*arrays, edges.ends, edges.batch)[0])
-            return torch.from_numpy(kernels.normalise(*arrays, edges.cloud_ends))
-        out, mean_F, variance_F = _Normalise.apply(y_E_F, norm.weight, norm.bias, norm.eps, edges, pool)
+                return torch.from_numpy(kernels.normalize_max(*arrays, edges.ends, edges.batch)[0])
+            return torch.from_numpy(kernels.normalize(*arrays, edges.cloud_ends))
+        out, mean_F, variance_F = _Normalize.apply(y_E_F, norm.weight, norm.bias, norm.eps, edges, pool)
         norm.track(mean_F, variance_F, edges.slots)
         return out
 
@@ -99,7 +99,7 @@ class _Edges:
     def __init__(self, groups: Groups, points_B_N_3: torch.Tensor) -> None:
         self.batch, n_points, _ = points_B_N_3.shape
         # All must be contiguous, or numba compiles the passes over them a second time.
-        neighbours, counts = (x.contiguous().numpy() for x in (groups.neighbours_B_M_k, groups.counts_B_M))
+        neighbours, counts = (x.contiguous().numpy() for x in (groups.neighbors_B_M_k, groups.counts_B_M))
         self.slots = neighbours.size
         self.point, self.weight, self.ends = kernels.distinct_edges(neighbours, counts, n_points)
         self.cloud_ends = self.ends[:: counts.shape[1]].copy()
@@ -121,7 +121,7 @@ class _Gather(torch.autograd.Function):
         return *(torch.from_numpy(grad) for grad in grads), None
 
 
-class _Normalise(torch.autograd.Function):
+class _Normalize(torch.autograd.Function):
     """Batch norm with the statistics of all slots, then ReLU per edge or, with `pool`, the maximum over each group."""
 
     @staticmethod
@@ -133,9 +133,9 @@ class _Normalise(torch.autograd.Function):
         scale = gamma * inverse_std
         shift = beta - scale * mean
         if pool:
-            out, kept = kernels.normalise_max(y, scale, shift, edges.ends, edges.batch)
+            out, kept = kernels.normalize_max(y, scale, shift, edges.ends, edges.batch)
         else:
-            out = kept = kernels.normalise(y, scale, shift, edges.cloud_ends)
+            out = kept = kernels.normalize(y, scale, shift, edges.cloud_ends)
         ctx.numpy_arrays = (kept, y, edges.weight, mean, inverse_std, gamma, edges.cloud_ends)
         ctx.pool = pool
         mean_F, variance_F = torch.from_numpy(mean), torch.from_numpy(variance.astype(y.dtype))
@@ -144,6 +144,6 @@ class _Normalise(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx, grad_out, _grad_mean, _grad_variance):
-        backward = kernels.normalise_max_backward if ctx.pool else kernels.normalise_backward
+        backward = kernels.normalize_max_backward if ctx.pool else kernels.normalize_backward
         grads = backward(grad_out.contiguous().numpy(), *ctx.numpy_arrays)
         return *(torch.from_numpy(grad) for grad in grads), None, None, None

@@ -4,7 +4,7 @@ Edges e are the distinct pairs of a group and a point of it, group after group a
 b are the rows ``cloud_ends[b]`` to ``cloud_ends[b + 1]`` and those of group g the rows ``ends[g]`` to ``ends[g + 1]``.
 All arrays are C-contiguous float32. The loops over clouds run in parallel on the threads that numba is given; every
 floating-point sum is made within one cloud and the clouds are added in order, so the thread count changes no bit.
-Inner loops run over channels, where they vectorise.
+Inner loops run over channels, where they vectorize.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def moments(y, weight, cloud_ends):
 
 
 @njit(**OVER_CLOUDS)
-def normalise(y, scale, shift, cloud_ends):
+def normalize(y, scale, shift, cloud_ends):
     """Return ReLU(scale y + shift), (E, F)."""
     out = np.empty_like(y)
     zero = y.dtype.type(0)
@@ -108,7 +108,7 @@ def normalise(y, scale, shift, cloud_ends):
 
 
 @njit(**OVER_CLOUDS)
-def normalise_max(y, scale, shift, ends, batch):
+def normalize_max(y, scale, shift, ends, batch):
     """Return the maximum of scale y + shift over each group's edges (G, F), and the edge where it is reached."""
     features = y.shape[1]
     groups = (len(ends) - 1) // batch
@@ -131,10 +131,10 @@ def normalise_max(y, scale, shift, ends, batch):
 
 
 @njit(**OVER_CLOUDS)
-def normalise_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud_ends):
-    """Return the gradients of :func:`normalise` where its scale and shift come from :func:`moments`.
+def normalize_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud_ends):
+    """Return the gradients of :func:`normalize` where its scale and shift come from :func:`moments`.
 
-    With g_e the gradient that reaches edge e through all of its w_e slots and ŷ the normalised edges, batch norm over
+    With g_e the gradient that reaches edge e through all of its w_e slots and ŷ the normalized edges, batch norm over
     W = Σ w slots gives
 
         ∂L/∂γ = Σ g_e ŷ_e,  ∂L/∂β = Σ g_e,  ∂L/∂y_e = γ/σ [ g_e - w_e (∂L/∂β + ŷ_e ∂L/∂γ)/W ] .
@@ -172,8 +172,8 @@ def normalise_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud
 
 
 @njit(**OVER_CLOUDS)
-def normalise_max_backward(grad_out, at, y, weight, mean, inverse_std, gamma, cloud_ends):
-    """Return the gradients of :func:`normalise_max`: as :func:`normalise_backward`, with g zero but at the maxima."""
+def normalize_max_backward(grad_out, at, y, weight, mean, inverse_std, gamma, cloud_ends):
+    """Return the gradients of :func:`normalize_max`: as :func:`normalize_backward`, with g zero but at the maxima."""
     features = y.shape[1]
     batch = len(cloud_ends) - 1
     groups = len(at) // batch

@@ -2,7 +2,7 @@
 
 All coordinates are C-contiguous float32. Clouds run in parallel on the threads that numba is given;
 each is worked on by one thread alone, so the thread count changes no bit. Inner loops run over points, where they
-vectorise.
+vectorize.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from gpca.process.compilation import OVER_CLOUDS, njit, prange
 
 
 @njit(**OVER_CLOUDS)
-def farthest_points(points, n_centres):
+def farthest_points(points, n_centers):
     """Return (B, M): point 0, then always the point farthest from all chosen ones, ties to the lower index."""
     batch, n, _ = points.shape
-    chosen = np.zeros((batch, n_centres), np.int32)
+    chosen = np.zeros((batch, n_centers), np.int32)
     for b in prange(batch):
         x, y, z = points[b, :, 0].copy(), points[b, :, 1].copy(), points[b, :, 2].copy()
         nearest = np.full(n, np.inf, points.dtype)  # squared distance to the nearest chosen point
         last = 0
-        for m in range(1, n_centres):
+        for m in range(1, n_centers):
             farthest = points.dtype.type(-1)
             for i in range(n):
                 dx, dy, dz = x[i] - x[last], y[i] - y[last], z[i] - z[last]
@@ -35,19 +35,19 @@ def farthest_points(points, n_centres):
 
 
 @njit(**OVER_CLOUDS)
-def ball_query(points, centres, radius, k):
-    """Return neighbours (B, M, k) and counts (B, M); see :func:`gpca.encoders.grouping.ball_query`."""
+def ball_query(points, centers, radius, k):
+    """Return neighbors (B, M, k) and counts (B, M); see :func:`gpca.encoders.grouping.ball_query`."""
     batch, n, _ = points.shape
-    n_centres = centres.shape[1]
-    # np.empty will not do: a centre of NaN has no neighbour at all, and the slots must still be indices of points.
-    neighbours = np.zeros((batch, n_centres, k), np.int32)
-    counts = np.zeros((batch, n_centres), np.int32)
+    n_centers = centers.shape[1]
+    # np.empty will not do: a center of NaN has no neighbor at all, and the slots must still be indices of points.
+    neighbours = np.zeros((batch, n_centers, k), np.int32)
+    counts = np.zeros((batch, n_centers), np.int32)
     limit = points.dtype.type(radius) * points.dtype.type(radius)
     for b in prange(batch):
         x, y, z = points[b, :, 0].copy(), points[b, :, 1].copy(), points[b, :, 2].copy()
         squares = np.empty(n, points.dtype)
-        for m in range(n_centres):
-            cx, cy, cz = centres[b, m, 0], centres[b, m, 1], centres[b, m, 2]
+        for m in range(n_centers):
+            cx, cy, cz = centers[b, m, 0], centers[b, m, 1], centers[b, m, 2]
             for i in range(n):
                 dx, dy, dz = x[i] - cx, y[i] - cy, z[i] - cz
                 squares[i] = dx * dx + dy * dy + dz * dz

@@ -14,14 +14,14 @@ from gpca.encoders.edge_conv import NEGATIVE_SLOPE
 from gpca.encoders.layers import PointLinear, stacked_product
 
 CHANNELS, MOTION = 7, 5  # numbers of a point, and of the motion
-SCALE = 0.1  # of all but the coordinates, so that neighbours in the first graph are neighbours on the surface
+SCALE = 0.1  # of all but the coordinates, so that neighbors in the first graph are neighbors on the surface
 
 
 class PairDGCNN(nn.Module):
     """DGCNN on the points of both clouds together, each with its membership (±1) as one more channel.
 
     Args:
-        k: neighbours per point, of either cloud.
+        k: neighbors per point, of either cloud.
         widths: of the EdgeConvs.
         point_features: width of the point-wise layer.
     """

@@ -45,8 +45,8 @@ class PointNet2(nn.Module):
         x_B_N_F = points_B_N_3
         centroids = min(self.centroids, max(1, points_B_N_3.shape[1] // 2))
         for layers, (radius, neighbours) in zip(self.levels, self.balls, strict=True):
-            centres_B_M_3 = take(points_B_N_3, farthest_points(points_B_N_3, centroids))
-            groups = Groups(centres_B_M_3, *ball_query(points_B_N_3, centres_B_M_3, radius, neighbours), radius)
+            centers_B_M_3 = take(points_B_N_3, farthest_points(points_B_N_3, centroids))
+            groups = Groups(centers_B_M_3, *ball_query(points_B_N_3, centers_B_M_3, radius, neighbours), radius)
             x_B_N_F = layers(points_B_N_3, x_B_N_F, groups)
-            points_B_N_3, centroids = centres_B_M_3, max(1, centroids // 4)
+            points_B_N_3, centroids = centers_B_M_3, max(1, centroids // 4)
         return self.whole(points_B_N_3, x_B_N_F, Groups.whole(points_B_N_3))[:, 0]

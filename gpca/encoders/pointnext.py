@@ -29,10 +29,10 @@ class SetAbstraction(nn.Module):
     def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Return the centroids (B, M, 3) and their features (B, M, F_out)."""
         chosen_B_M = farthest_points(points_B_N_3, max(1, points_B_N_3.shape[1] // 2))
-        centres_B_M_3 = take(points_B_N_3, chosen_B_M)
-        found = ball_query(points_B_N_3, centres_B_M_3, self.radius, self.neighbours)
-        pooled_B_M_F = self.layers(points_B_N_3, x_B_N_F, Groups(centres_B_M_3, *found, self.radius))
-        return centres_B_M_3, (pooled_B_M_F + self.skip(take(x_B_N_F, chosen_B_M))).relu()
+        centers_B_M_3 = take(points_B_N_3, chosen_B_M)
+        found = ball_query(points_B_N_3, centers_B_M_3, self.radius, self.neighbours)
+        pooled_B_M_F = self.layers(points_B_N_3, x_B_N_F, Groups(centers_B_M_3, *found, self.radius))
+        return centers_B_M_3, (pooled_B_M_F + self.skip(take(x_B_N_F, chosen_B_M))).relu()
 
 
 class PointNeXt(nn.Module):

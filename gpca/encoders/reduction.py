@@ -72,7 +72,7 @@ class UMAP:
 class Autoencoder:
     """Autoencoder (Hinton & Salakhutdinov 2006) d - 256 - components - 256 - d with GELU; the code itself is linear.
 
-    Adam trains it (learning rate 1e-3, batches of 32) on the mean squared error of the standardised embeddings.
+    Adam trains it (learning rate 1e-3, batches of 32) on the mean squared error of the standardized embeddings.
     """
 
     components: Count = 64
@@ -93,15 +93,15 @@ class Autoencoder:
             torch.manual_seed(seed_of(*axes, "autoencoder"))
             encoder = nn.Sequential(nn.Linear(d, hidden), nn.GELU(), nn.Linear(hidden, self.components))
             decoder = nn.Sequential(nn.Linear(self.components, hidden), nn.GELU(), nn.Linear(hidden, d))
-            optimiser = Adam([*encoder.parameters(), *decoder.parameters()], 1e-3)
+            optimizer = Adam([*encoder.parameters(), *decoder.parameters()], 1e-3)
             for epoch in range(self.epochs):
                 order = generator(*axes, "autoencoder", epoch).permutation(len(z_N_d))
                 for rows in np.array_split(order, -(-len(order) // batch_size)):
                     z_B_d = z_N_d[rows]
                     loss = nn.functional.mse_loss(decoder(encoder(z_B_d)), z_B_d)
-                    optimiser.zero_grad()
+                    optimizer.zero_grad()
                     loss.backward()
-                    optimiser.step()
+                    optimizer.step()
 
         @torch.inference_mode()
         def transform(z_S_d: np.ndarray) -> np.ndarray:
@@ -126,7 +126,7 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
 
     Raises:
         InputError: unknown reduction or setting; embeddings with NaN or infinity; training embeddings that are all
-            alike; more components or neighbours than there are training embeddings or numbers in them.
+            alike; more components or neighbors than there are training embeddings or numbers in them.
     """
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
@@ -145,7 +145,7 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
 
 
 def require_room(name: str, reduction: PCA | UMAP | Autoencoder, n: int, d: int | None) -> None:
-    """Raise an InputError where a reduction has more components or neighbours than the training embeddings allow.
+    """Raise an InputError where a reduction has more components or neighbors than the training embeddings allow.
 
     Args:
         n, d: how many training embeddings there are, and how many numbers each has, where that is known.
@@ -155,7 +155,7 @@ def require_room(name: str, reduction: PCA | UMAP | Autoencoder, n: int, d: int 
         fault = f"{reduction.components} components are too many for {n} training embeddings{of}"
         raise InputError(f"reduction '{name}'", fault, f"set components to at most {min(n, d or n)}")
     if isinstance(reduction, UMAP):
-        # Beyond these umap-learn takes fewer neighbours, or starts at random, with no more than a warning.
+        # Beyond these umap-learn takes fewer neighbors, or starts at random, with no more than a warning.
         for key, most in (("neighbours", n - 1), ("components", n - 3)):
             if (value := getattr(reduction, key)) > most:
                 fault = f"{value} {key} are too many for {n} training embeddings"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from gpca.errors import InputError
+from gpca.errors import InputError, with_key
 from gpca.pairs.reading import Reading
-from gpca.settings import Bounds, Count, PositiveShare, Share
+from gpca.settings import Bounds, Count, PositiveShare, Share, changes_of, read_settings
 
 OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of unlike sizes together
 
@@ -65,7 +66,7 @@ class EncoderSettings:
 
 @dataclass(frozen=True)
 class DGCNNOptions:
-    """Options of the backbone ``dgcnn``: neighbours of a point, and width of its features before the pooling."""
+    """Options of the backbone ``dgcnn``: neighbors of a point, and width of its features before the pooling."""
 
     k: Annotated[int, Bounds(minimum=2)] = 20
     point_features: Count = 256
@@ -106,6 +107,21 @@ class PointNeXtOptions(PointNetOptions):
     neighbours: Count = 32
 
 
+EncoderChanges = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options"))]
+
+
+def require_draws(key: str, encoder: Mapping[str, Any], points: int, points_key: str) -> None:
+    """Check an encoder's settings at a key of the config: it draws no more points than clouds have at most.
+
+    Args:
+        points: of a cloud, which the config has at `points_key`.
+    """
+    settings = with_key(key, lambda: EncoderSettings(**encoder))
+    if settings.draw_points > points:
+        fault = f"draws {settings.draw_points} points of clouds that have at most {points}"
+        raise InputError(f"config key {key}", fault, f"lower draw_points, or raise {points_key}")
+
+
 # Of the backbones whose options the config checks; any other checks its own, when it is made.
 OPTIONS = {
     "dgcnn": DGCNNOptions,
@@ -113,3 +129,15 @@ OPTIONS = {
     "pointnet2": PointNet2Options,
     "pointnext": PointNeXtOptions,
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedEncoder(EncoderSettings):
+    """An encoder, whose backbone is named; one without a class of options checks them itself, when it is made."""
+
+    backbone: str = field()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.backbone in OPTIONS:
+            read_settings(OPTIONS[self.backbone], self.options, "option")

@@ -1,49 +1,108 @@
-"""What an experiment says of itself, so that the config, the workflow, the command line and the page need not know it.
+"""What an experiment says of itself, so that the config, the workflow and the page need not know it.
 
-It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}/experiment.py``, which imports nothing heavy. Beside it are
-``step.py``, which runs it; ``results.yaml``, its part of the registry of tables and figures; and what makes these.
+It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}/experiment.py``, which imports nothing heavy. Beside it
+are the steps that run it; ``results.yaml``, its part of the registry of tables and figures; and what makes these.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import getitem
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field
+
+from gpca.explainers.registry import explainers
+from gpca.reporting.registry import expand
+
+ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own
 ByRun = Callable[[Mapping[str, Any], Mapping[str, Mapping]], dict[str, Any]]  # of the config, and of its sources
+LeftOut = Callable[[str], set[str]]  # key of a mapping of the config -> names that the config leaves out of it
+
+
+@dataclass(frozen=True)
+class Names:
+    """The names that a mapping of the config may have.
+
+    Attributes:
+        noun: for what has such a name.
+        known: returns all of them; None where any name may stand.
+    """
+
+    noun: str
+    known: Callable[[], Collection[str]] | None = None
+
+
+EXPLAINERS = Names("explainer", explainers)
+
+
+@dataclass(frozen=True)
+class Tidy:
+    """A file of tidy numbers; what has a collector is collected from other files of the run by a rule of its own.
+
+    Attributes:
+        file: its name.
+        collector: ``module:function`` that returns its rows; empty where another rule of the experiment writes it.
+        files: the collector's arguments -> patterns of files below the folder of a run, with names in braces.
+        arguments: its other arguments -> keys of the config.
+        rule: name of the rule, if it is not that of the file.
+    """
+
+    file: str
+    collector: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    rule: str = ""
+
+    @property
+    def target(self) -> str:
+        """The rule that collects it."""
+        return self.rule or self.file.removesuffix(".csv")
+
+    def inputs(self, names: Mapping[str, Any]) -> dict[str, list[str] | str]:
+        """Return the files that the collector is given, by argument."""
+        return {argument: expand((pattern,), names) for argument, pattern in self.files.items()}
+
+    def settings(self, config: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the collector's other arguments."""
+        return {argument: reduce(getitem, key.split("."), config) for argument, key in self.arguments.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """The declaration of an experiment.
+    """The declaration of an experiment. Keys of the config are paths with dots, such as ``real_world.backbones``.
 
     Attributes:
-        name: of its section of the config, its file of rules and its files of results.
+        name: of its file of rules, if it has one, and of its folder.
         folder: of its code, where that is named otherwise.
         summary: files that its step reads -> those that it writes, in a line.
-        settings: the type of its section of the config; every key has to be given.
-        tidy: its file of tidy numbers.
+        sections: its sections of the config -> their types; every key has to be given.
+        tidy: its files of numbers, which every run makes that has the experiment.
         needs: names that must not be empty, or a run does without it.
         names: what it adds to the names in the braces of paths (:func:`gpca.experiments.run.names_of`).
         shown: what it adds to what tables and figures are told (:func:`gpca.experiments.run.settings_of`).
-        check: refuses, with an InputError, a section that its type allows and that no run can use. It takes the config,
-            and the names that the config leaves out of a mapping, by the mapping's key.
-        lists: its lists of names, each with the mapping of the config from which names may be left out.
-        explainers: it has a mapping ``explainers``, of which any may be left out.
+        check: refuses, with an InputError, sections that their types allow and that no run can use.
+        leavable: keys of mappings of which any entry may be false -> names that they have.
+        switches: keys of mappings name -> true or false, which are read as the list of the names that are true.
+        lists: keys of lists and mappings -> the names that they lose where the config leaves out others: those left
+            out of the mapping at a key, or what a function returns.
     """
 
     name: str
-    summary: str
-    settings: Any
-    tidy: str
     folder: str = ""
+    summary: str = ""
+    sections: Mapping[str, Any] = field(default_factory=dict)
+    tidy: tuple[Tidy, ...] = ()
     needs: tuple[str, ...] = ()
     names: ByRun = lambda config, sources: {}
     shown: ByRun = lambda config, sources: {}
-    check: Callable[[dict, Callable[[str], set[str]]], None] = lambda config, left_out: None
-    lists: Mapping[str, str] = field(default_factory=dict)
-    explainers: bool = False
+    check: Callable[[dict, LeftOut], None] = lambda config, left_out: None
+    leavable: Mapping[str, Names] = field(default_factory=dict)
+    switches: Mapping[str, Names] = field(default_factory=dict)
+    lists: Mapping[str, str | Callable[[LeftOut], Collection[str]]] = field(default_factory=dict)
 
     @property
     def step(self) -> str:

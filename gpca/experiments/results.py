@@ -14,11 +14,19 @@ REGISTRY = Path(reporting.__file__).with_name("results.yaml")
 
 @cache
 def registered() -> tuple[Result, ...]:
-    """Return every entry, section by section; those of the experiments stand last in theirs."""
+    """Return every entry, section by section, as the first file orders them, and in these by experiment.
+
+    Entries that say which they stand below stand there.
+    """
     sections: dict[str, list[Result]] = {}
     for path in (REGISTRY, *(each.results for each in experiments())):
         for section, results in read_results(path):
             sections.setdefault(section, []).extend(results)
+    for results in sections.values():
+        for result in [result for result in results if result.after]:
+            results.remove(result)
+            names = [other.name for other in results]
+            results.insert(names.index(result.after) + 1, result)
     return tuple(result for results in sections.values() for result in results)
 
 

@@ -7,6 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from gpca.attribution.scores import Attribution
+from gpca.classifier.settings import GPCArguments
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -21,7 +22,7 @@ class GPCA:
 
     labels: tuple[str, ...] = CONCEPTS
 
-    def __init__(self, source: str, seed: int, **settings) -> None:
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.classifier.gpc import (  # here, because the workflow imports this file only to know its entries
             GPC,
             GPCSettings,
@@ -30,7 +31,7 @@ class GPCA:
         self._gpc = GPC(self.labels, GPCSettings(**settings), source, seed)
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit the GPC to the labelled embeddings."""
+        """Fit the GPC to the labeled embeddings."""
         self._gpc.fit(self._inputs(registrations), registrations.concept)
 
     def learn(self, registrations: Registrations) -> None:
@@ -38,7 +39,7 @@ class GPCA:
         self._gpc.update(self._inputs(registrations), registrations.concept)
 
     def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every embedding and summarise (Eqs. 4 to 7)."""
+        """Draw from the posterior at every embedding and summarize (Eqs. 4 to 7)."""
         started = perf_counter()
         scores_N_C, variances_N_C, bald_N = self._gpc.attribute(self._inputs(registrations))
         seconds = (perf_counter() - started) / len(registrations)
@@ -52,31 +53,31 @@ class GPCA:
 
 
 class DescriptorGPCA(GPCA):
-    """GP-CA on descriptors in the place of the embedding, normalised by their ranks among the training samples.
+    """GP-CA on descriptors in the place of the embedding, normalized by their ranks among the training samples.
 
     Args:
-        axes: name the draws of the normalisation.
+        axes: name the draws of the normalization.
         source, seed, settings: as for GP-CA.
     """
 
-    def __init__(self, axes: tuple, source: str, seed: int, **settings) -> None:
+    def __init__(self, axes: tuple, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.explainers.pair_classifier import NormalisedDescriptors
 
         super().__init__(source, seed, **settings)
-        self._normalised = NormalisedDescriptors(*axes)
+        self._normalized = NormalisedDescriptors(*axes)
 
     def fit(self, registrations: Registrations) -> None:
-        """Learn the scales of the descriptors, and fit the GPC to the labelled registrations."""
+        """Learn the scales of the descriptors, and fit the GPC to the labeled registrations."""
         features_N_F = self.features(registrations)
-        self._normalised.fit(features_N_F)
-        self._gpc.fit(self._normalised(features_N_F), registrations.concept)
+        self._normalized.fit(features_N_F)
+        self._gpc.fit(self._normalized(features_N_F), registrations.concept)
 
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the descriptors (N, F)."""
         raise NotImplementedError
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
-        return self._normalised(self.features(registrations))
+        return self._normalized(self.features(registrations))
 
 
 EXPLAINERS = {

@@ -1,4 +1,4 @@
-"""The interface of every explainer; :mod:`baselines.registry` finds them by name.
+"""The interface of every explainer; :mod:`gpca.explainers.registry` finds them by name.
 
 An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
 ``EXPLAINERS`` by the name under which the config switches it on::
@@ -24,7 +24,7 @@ class ConceptExplainer(Protocol):
     """What the workflow calls; made as ``make(source, seed, **settings)``."""
 
     def fit(self, registrations: Registrations) -> None:
-        """Learn from labelled registrations (the rows of split ``train``)."""
+        """Learn from labeled registrations (the rows of split ``train``)."""
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Attribute every registration. What was perturbed is hidden from it, unless it is an oracle."""
@@ -43,7 +43,7 @@ class Encoding(Protocol):
     """An explainer with an encoder of its own, learned once for all labels on its embeddings."""
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
-        """Train the encoder on labelled registrations, and return what attaches its embeddings.
+        """Train the encoder on labeled registrations, and return what attaches its embeddings.
 
         Where they are attached, ``fit`` and ``explain`` read them.
         """

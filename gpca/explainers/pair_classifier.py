@@ -18,8 +18,8 @@ from gpca.seeds import seed_of
 QUANTILES = 100  # of each descriptor, at most
 FARTHEST = 3.0  # standard deviations; what lies beyond all training samples lies there
 AT_THE_END = 1e-7  # of a descriptor; what comes as near to its last quantile has reached it
-NEIGHBOURS = 3  # among the training samples, by which a pair is told to be like them
-USUAL = 0.99  # share of the training samples that are no farther from their neighbours than is usual
+NEIGHBORS = 3  # among the training samples, by which a pair is told to be like them
+USUAL = 0.99  # share of the training samples that are no farther from their neighbors than is usual
 ABSENT, PRESENT = "absent", "present"
 
 
@@ -45,7 +45,7 @@ class NormalisedDescriptors:
         return self
 
     def __call__(self, features_N_F: np.ndarray) -> np.ndarray:
-        """Return the normalised descriptors (N, F)."""
+        """Return the normalized descriptors (N, F)."""
         columns = zip(features_N_F.T, self._quantiles_Q_F.T, strict=True)
         return ndtri(np.column_stack([_ranks(*column) for column in columns])).clip(-FARTHEST, FARTHEST)
 
@@ -55,14 +55,14 @@ class NormalisedDescriptors:
 
     @classmethod
     def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalisedDescriptors:
-        """Return what normalises as the one of that state did."""
+        """Return what normalizes as the one of that state did."""
         made = cls()
         made._quantiles_Q_F = quantiles_Q_F.numpy()
         return made
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Judgment:
     """What the classifiers say of N pairs.
 
     Attributes:
@@ -87,7 +87,7 @@ class PairClassifier:
     """
 
     def __init__(self, settings: GPCSettings, *axes: object) -> None:
-        self.normalised = NormalisedDescriptors(*axes)
+        self.normalized = NormalisedDescriptors(*axes)
         self._failure = GPC((NOMINAL, FAILED), settings, *axes, FAILED)
         self._causes = [GPC((ABSENT, PRESENT), settings, *axes, concept) for concept in CONCEPTS]
 
@@ -99,16 +99,16 @@ class PairClassifier:
             failed_N: whether each failed.
             causes_N_3: whether each concept is one of its causes.
         """
-        inputs_N_F = self.normalised.fit(features_N_F)(features_N_F)
+        inputs_N_F = self.normalized.fit(features_N_F)(features_N_F)
         self._failure.fit(inputs_N_F, np.where(failed_N, FAILED, NOMINAL))
         for gpc, present_N in zip(self._causes, causes_N_3.T, strict=True):
             gpc.fit(inputs_N_F, np.where(present_N, PRESENT, ABSENT))
         return self
 
-    def judge(self, inputs_N_F: np.ndarray) -> Judgement:
-        """Return what the classifiers say of descriptors that `normalised` has mapped."""
+    def judge(self, inputs_N_F: np.ndarray) -> Judgment:
+        """Return what the classifiers say of descriptors that `normalized` has mapped."""
         (failed, _, bald), *causes = (gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes))
-        return Judgement(
+        return Judgment(
             failure_N=failed[:, 1],
             causes_N_3=np.column_stack([scores[:, 1] for scores, _, _ in causes]),
             causes_variances_N_3=np.column_stack([variances[:, 1] for _, variances, _ in causes]),
@@ -118,21 +118,21 @@ class PairClassifier:
     def unlikeness(self, inputs_N_F: np.ndarray) -> np.ndarray:
         """Return how unlike the training samples each (N,) is; above 1 are 1 % of these themselves.
 
-        The mean distance to the nearest `NEIGHBOURS` training samples, in units of that which the share `USUAL` of
+        The mean distance to the nearest `NEIGHBORS` training samples, in units of that which the share `USUAL` of
         these have among one another.
         """
-        known = self._failure.learnt_N_d
+        known = self._failure.learned_N_d
         return _to_nearest(self._failure.project(inputs_N_F).inputs_N_d, known, 0) / self._usual_distance
 
     @cached_property
     def _usual_distance(self) -> float:
-        known = self._failure.learnt_N_d
+        known = self._failure.learned_N_d
         return float(np.quantile(_to_nearest(known, known, 1), USUAL))
 
     @property
     def samples(self) -> int:
         """How many it learned."""
-        return len(self._failure.learnt_N_d)
+        return len(self._failure.learned_N_d)
 
     def state(self) -> dict[str, object]:
         """Return all that was learned, for :meth:`from_state`.
@@ -141,15 +141,15 @@ class PairClassifier:
         """
         failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
         for gpc, state in zip(self._causes, causes, strict=True):
-            if np.array_equal(gpc.learnt_N_d, self._failure.learnt_N_d):
+            if np.array_equal(gpc.learned_N_d, self._failure.learned_N_d):
                 state["labelled"] = failure["labelled"]
-        return {"quantiles": self.normalised.state(), "failure": failure, "causes": causes}
+        return {"quantiles": self.normalized.state(), "failure": failure, "causes": causes}
 
     @classmethod
     def from_state(cls, state: dict) -> PairClassifier:
         """Return the classifier of a :meth:`state`."""
         made = cls.__new__(cls)
-        made.normalised = NormalisedDescriptors.from_state(state["quantiles"])
+        made.normalized = NormalisedDescriptors.from_state(state["quantiles"])
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
         return made
@@ -173,4 +173,4 @@ def _to_nearest(of_N_F: np.ndarray, known_M_F: np.ndarray, skipped: int) -> np.n
     from scipy.spatial.distance import cdist
 
     nearest_N_M = np.sort(cdist(of_N_F, known_M_F), axis=1)
-    return nearest_N_M[:, skipped : skipped + NEIGHBOURS].mean(axis=1)
+    return nearest_N_M[:, skipped : skipped + NEIGHBORS].mean(axis=1)

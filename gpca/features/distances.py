@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gpca.features.pair import ObservedPair
 
 QUANTILES = np.array([0.01, *np.arange(1, 12) / 12, 0.99])  # the very ends belong to single points
-NEIGHBOURS = 12  # so many span a local plane
+NEIGHBORS = 12  # so many span a local plane
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class LocalPlanes:
         tree: of the points.
         spacing: (N,) distance to the nearest other point.
         normals: (N, 3), without a sign.
-        thickness, extent: (N,) root mean square distance of the neighbours from the plane, and along its longest axis.
+        thickness, extent: (N,) root mean square distance of the neighbors from the plane, and along its longest axis.
     """
 
     tree: cKDTree
@@ -41,12 +41,12 @@ class LocalPlanes:
     def of(cls, points: np.ndarray) -> LocalPlanes:
         """Return the planes of least squares through the nearest points of each point (N, 3)."""
         tree = cKDTree(points)
-        neighbours = min(NEIGHBOURS, len(points))
-        distances_N_k, rows_N_k = tree.query(points, neighbours)
+        neighbors = min(NEIGHBORS, len(points))
+        distances_N_k, rows_N_k = tree.query(points, neighbors)
         around_N_k_3 = points[rows_N_k]
         offsets_N_k_3 = around_N_k_3 - around_N_k_3.mean(axis=1, keepdims=True)
         squares_N_3, axes_N_3_3 = np.linalg.eigh(_second_moments(offsets_N_k_3))
-        spread_N_3 = np.sqrt(np.maximum(squares_N_3, 0) / neighbours)
+        spread_N_3 = np.sqrt(np.maximum(squares_N_3, 0) / neighbors)
         return cls(tree, distances_N_k[:, 1], axes_N_3_3[:, :, 0], spread_N_3[:, 0], spread_N_3[:, 2])
 
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from gpca.features.pair import ObservedPair
 
 RADII = (0.06, 0.12)  # diameters: about the spacing of the sparsest clouds, and twice that
-FEWEST_NEIGHBOURS = 4  # without so many a covariance in space is singular
+FEWEST_NEIGHBORS = 4  # without so many a covariance in space is singular
 FLOOR = 1e-6  # squared diameters; a plane has no entropy otherwise
 ENTROPY = tuple(f"{what}_{radius:g}" for radius in RADII for what in ("joint", "apart", "difference", "measured"))
 
@@ -22,7 +22,7 @@ def describe_entropy(pair: ObservedPair) -> np.ndarray:
     """Return `ENTROPY`.
 
     At each radius the mean entropy (nats) of the points joint and apart, their difference, and the share of the points
-    that have enough neighbours for it.
+    that have enough neighbors for it.
     """
     joint = np.concatenate([pair.observed, pair.model])
     described: list[float] = []
@@ -49,7 +49,7 @@ def _entropies(points: np.ndarray, radius: float) -> np.ndarray:
     moments_N_3_3 = np.empty((len(points), 3, 3))
     for i, j in np.ndindex(3, 3):
         moments_N_3_3[:, i, j] = np.bincount(rows, offset_P_3[:, i] * offset_P_3[:, j], len(points)) / count_N
-    enough_N = count_N >= FEWEST_NEIGHBOURS
+    enough_N = count_N >= FEWEST_NEIGHBORS
     entropy_N = np.full(len(points), np.nan)
     determinants = np.linalg.slogdet(2 * np.pi * np.e * (moments_N_3_3[enough_N] + FLOOR * np.eye(3)))[1]
     entropy_N[enough_N] = 0.5 * determinants

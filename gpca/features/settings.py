@@ -10,6 +10,8 @@ import numpy as np
 from gpca.settings import Bounds, Positive
 from gpca.uncertainty.settings import start_deviation
 
+DescribedPoints = Annotated[int, Bounds(minimum=16, maximum=65536)]  # of each cloud
+
 
 @dataclass(frozen=True)
 class DescriptorSettings:

@@ -22,7 +22,7 @@ FEWEST_POINTS = 64
 
 @dataclass(frozen=True)
 class Annotation:
-    """One object in a frame: its id, its true pose in metres, the mask of its visible part, and where that stands."""
+    """One object in a frame: its id, its true pose in meters, the mask of its visible part, and where that stands."""
 
     object_id: int
     T_camera_model: np.ndarray
@@ -37,8 +37,8 @@ class Frame:
     Attributes:
         scene, image: numbers, as the folder and its files are named.
         camera_3_3: K, in pixels.
-        depth_scale: millimetres per unit of the depth image.
-        depth, colour: files.
+        depth_scale: millimeters per unit of the depth image.
+        depth, color: files.
         annotations: the objects in it.
     """
 
@@ -47,7 +47,7 @@ class Frame:
     camera_3_3: np.ndarray
     depth_scale: float
     depth: Path
-    colour: Path
+    color: Path
     annotations: tuple[Annotation, ...]
 
     @property
@@ -56,10 +56,10 @@ class Frame:
         return self.scene, self.image
 
     def depth_m(self) -> np.ndarray:
-        """Return depth (H, W) in metres, 0 where nothing was measured.
+        """Return depth (H, W) in meters, 0 where nothing was measured.
 
         Raises:
-            InputError: missing or unreadable image, colours instead of depth, 8 bits, negative or infinite depth, no
+            InputError: missing or unreadable image, colors instead of depth, 8 bits, negative or infinite depth, no
                 measurement at all.
         """
         depth_H_W = read_image(self.depth, REMEDY)
@@ -119,9 +119,9 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
 
 
 def back_project(depth_m: np.ndarray, mask: np.ndarray, camera_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the measured points (P, 3) of a mask in the camera's frame, metres, and their pixels (P, 2) as (u, v).
+    """Return the measured points (P, 3) of a mask in the camera's frame, meters, and their pixels (P, 2) as (u, v).
 
-    Pixel centres have whole coordinates: x = (u - c_x) z / f_x.
+    Pixel centers have whole coordinates: x = (u - c_x) z / f_x.
     """
     v, u = np.nonzero(mask & (depth_m > 0))
     z = depth_m[v, u].astype(np.float64)
@@ -178,7 +178,7 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
     except ValueError as fault:
         raise InputError(folder, "the name of a scene's folder is not a number", "name it like 000001") from fault
     cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
-    colours = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
+    colors = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
     frames = []
     for image, truth in truths.items():
         if image not in cameras:
@@ -193,7 +193,7 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
                 camera_3_3=camera_3_3,
                 depth_scale=depth_scale,
                 depth=_image(folder / "depth", f"{image:06d}"),
-                colour=_image(colours, f"{image:06d}"),
+                color=_image(colors, f"{image:06d}"),
                 annotations=tuple(_annotation(folder, image, n, entry) for n, entry in enumerate(truth)),
             )
         )

@@ -19,7 +19,7 @@ NOTHING = -1  # the mesh of a pixel that sees none
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera with whole coordinates at pixel centres, looking along +z, x right and y down.
+    """A pinhole camera with whole coordinates at pixel centers, looking along +z, x right and y down.
 
     Attributes:
         width, height: in pixels.
@@ -33,8 +33,8 @@ class Camera:
     @property
     def matrix_3_3(self) -> np.ndarray:
         """K, with the principal point in the middle of the image."""
-        centre_u, centre_v = (self.width - 1) / 2, (self.height - 1) / 2
-        return np.array([[self.focal_px, 0, centre_u], [0, self.focal_px, centre_v], [0, 0, 1.0]])
+        center_u, center_v = (self.width - 1) / 2, (self.height - 1) / 2
+        return np.array([[self.focal_px, 0, center_u], [0, self.focal_px, center_v], [0, 0, 1.0]])
 
     def rays(self) -> np.ndarray:
         """Return for every pixel (H, W, 3) the direction whose z is 1, so that a ray's length is its depth."""
@@ -63,7 +63,7 @@ class MeshScene:
     """Meshes in one world frame, ready to be looked at.
 
     Args:
-        meshes: (vertices (V, 3) in metres, faces (F, 3)) of each.
+        meshes: (vertices (V, 3) in meters, faces (F, 3)) of each.
     """
 
     def __init__(self, meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
@@ -133,9 +133,9 @@ def _dot(a_3: np.ndarray, b_3: np.ndarray) -> np.ndarray:
 class DepthNoise:
     """Noise of a structured-light depth camera, by Nguyen, Izadi and Lovell (3DIMPVT 2012).
 
-    With the distance z in metres and the angle θ between surface and line of sight:
+    With the distance z in meters and the angle θ between surface and line of sight:
 
-        axial deviation  σ_z = 0.0012 + 0.0019 (z - 0.4)²  metres, and beyond 60° more: + 0.0001 θ² / (√z (π/2 - θ)²),
+        axial deviation  σ_z = 0.0012 + 0.0019 (z - 0.4)²  meters, and beyond 60° more: + 0.0001 θ² / (√z (π/2 - θ)²),
         lateral deviation  σ_L = 0.8 + 0.035 θ / (π/2 - θ)  pixels.
 
     Lateral noise is a pixel that looks a little beside itself: edges fray. Past `grazing_deg` nothing is measured.
@@ -151,7 +151,7 @@ class DepthNoise:
     dropout: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)] = 0.01
 
     def measure(self, view: View, random: np.random.Generator) -> np.ndarray:
-        """Return measured depth (H, W) in metres, 0 where nothing was measured."""
+        """Return measured depth (H, W) in meters, 0 where nothing was measured."""
         theta = np.minimum(np.arccos(np.clip(view.cosine, 0, 1)), np.deg2rad(89))
         height, width = view.depth_m.shape
         lateral_px = self.scale * (0.8 + 0.035 * theta / (np.pi / 2 - theta))
@@ -167,16 +167,16 @@ class DepthNoise:
         return np.where(measured, z + self.scale * axial_m * random.normal(size=z.shape), 0.0)
 
 
-def shade(view: View, colours_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.ndarray:
-    """Return an image (H, W, 3) uint8 of coloured meshes under a lamp above and an even light; grey where nothing is.
+def shade(view: View, colors_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.ndarray:
+    """Return an image (H, W, 3) uint8 of colored meshes under a lamp above and an even light; gray where nothing is.
 
-    Lambert's law; colours are in [0, 1].
+    Lambert's law; colors are in [0, 1].
     """
     lamp_world = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
     lamp_camera = T_world_camera[:3, :3].T @ lamp_world
     light = 0.45 + 0.55 * np.clip(view.normals @ lamp_camera, 0, 1)
-    colours = np.where((view.mesh == NOTHING)[..., None], 0.55, colours_M_3[view.mesh] * light[..., None])
-    return np.rint(255 * np.clip(colours, 0, 1)).astype(np.uint8)
+    colors = np.where((view.mesh == NOTHING)[..., None], 0.55, colors_M_3[view.mesh] * light[..., None])
+    return np.rint(255 * np.clip(colors, 0, 1)).astype(np.uint8)
 
 
 def look_at(eye_m: np.ndarray, target_m: np.ndarray) -> np.ndarray:

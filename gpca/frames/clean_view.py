@@ -16,7 +16,7 @@ MOST_PIXELS = 20_000  # of a rendered side, about; of more, every second or thir
 
 @dataclass(frozen=True)
 class CleanView:
-    """An instance in the frame of its object, metres.
+    """An instance in the frame of its object, meters.
 
     Attributes:
         measured: (P, 3) what the sensor measured.
@@ -59,7 +59,7 @@ def clean_view(instances: Instances, i: int, mesh: MeshScene, surface_m: np.ndar
 def rendered_side(
     mesh: MeshScene, camera_3_3: np.ndarray, T_camera_object: np.ndarray, surface_m: np.ndarray
 ) -> np.ndarray:
-    """Return what a camera would see of an object at a pose, (V, 3) in the object's frame, metres; nothing in front.
+    """Return what a camera would see of an object at a pose, (V, 3) in the object's frame, meters; nothing in front.
 
     None of it is seen where a part of the object would lie behind the camera.
     """

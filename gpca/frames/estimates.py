@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse, rigid_motion
 from gpca.errors import InputError
-from gpca.frames.results_file import Estimates, nearest_to
+from gpca.frames.results_file import PosesByObject, nearest_to
 from gpca.io.csv_file import ANY, numbers, read_csv
 
 COLUMNS = ("obj_id", "rx", "ry", "rz", "tx", "ty", "tz")
@@ -29,7 +29,7 @@ class Estimators:
         by_name: of each results file its estimates.
     """
 
-    by_name: Mapping[str, Estimates]
+    by_name: Mapping[str, PosesByObject]
 
     def choose(
         self, place: tuple[int, int, int], alone: bool, seen: Mapping, random: np.random.Generator
@@ -57,7 +57,7 @@ class EstimatorErrors:
     """Errors that estimators made, by dataset and object id; objects without any get those of others.
 
     Attributes:
-        of_object: (dataset, object id) -> errors ``T_true_estimated`` (4, 4), metres.
+        of_object: (dataset, object id) -> errors ``T_true_estimated`` (4, 4), meters.
         symmetric: objects whose errors are no measure of another's: a turn that changes nothing about them counts.
     """
 
@@ -90,7 +90,7 @@ def error_of(T_camera_true: np.ndarray, T_camera_estimated: np.ndarray) -> np.nd
 
 
 def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.ndarray]]:
-    """Read a CSV of errors: `obj_id`, rotation vector `rx,ry,rz` in radians, translation `tx,ty,tz` in millimetres.
+    """Read a CSV of errors: `obj_id`, rotation vector `rx,ry,rz` in radians, translation `tx,ty,tz` in millimeters.
 
     Args:
         known: ids of the dataset's objects; rows of others are passed over.

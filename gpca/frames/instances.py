@@ -7,11 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
-from gpca.frames.scene_files import require_camera
 from gpca.io.arrays import TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.files import MOST_PIXELS
 from gpca.seeds import generator
 
 MADE_BY = "python -m gpca instances"
@@ -19,16 +16,16 @@ MADE_BY = "python -m gpca instances"
 
 @dataclass(frozen=True)
 class Instances:
-    """I objects in frames. The object frame is that of the canonical cloud, centred on its bounding box.
+    """I objects in frames. The object frame is that of the canonical cloud, centered on its bounding box.
 
     Attributes:
         dataset, scene, image: (I,) where the instance was seen.
         object_index: (I,) of the objects npz beside this file.
         symmetric: (I,) a rotation exists that changes nothing about the object's shape.
-        T_camera_object_true, T_camera_object_init: (I, 4, 4), metres.
+        T_camera_object_true, T_camera_object_init: (I, 4, 4), meters.
         init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
         camera_3_3: (I, 3, 3) K in pixels.
-        colour: (I,) path of the colour image.
+        colour: (I,) path of the color image.
         points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
             ``points_m[offsets[i]:offsets[i + 1]]``.
         pixels: (ΣP, 2) int32, where each was seen, (u, v).
@@ -96,11 +93,4 @@ class Instances:
         whole = len(offsets) == len(arrays["scene"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays["points_m"])
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
             raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", remedy)
-        pixels = arrays["pixels"]
-        if pixels.min() < 0 or np.prod(pixels.max(axis=0) + 1.0) > MOST_PIXELS:
-            raise InputError(path, "'pixels' lie outside any image", remedy)
-        for i in range(len(arrays["scene"])):
-            for name in ("T_camera_object_true", "T_camera_object_init"):
-                require_rigid(arrays[name][i], f"{path}: instance {i}, {name}")
-            require_camera(arrays["camera_3_3"][i], f"{path}: instance {i}, camera_3_3")
         return cls(**{name: arrays[name] for name in shapes})

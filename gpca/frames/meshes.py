@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
-from gpca.frames.reading import CentredModel, Dataset, distinct_surfaces, read_models, with_shared_models
+from gpca.frames.reading import CenteredModel, Dataset, distinct_surfaces, read_models, with_shared_models
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.source import folders
@@ -35,7 +35,7 @@ def datasets_of(
     return {name: Dataset(name, tuple(folders(entry, downloads)), **_given(entry)) for name, entry in entries.items()}
 
 
-def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CentredModel]]:
+def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredModel]]:
     """Return the models of the objects that each dataset's frames show; those that datasets share bear one name."""
     return with_shared_models({name: read_models(dataset, dataset.frames()) for name, dataset in datasets.items()})
 
@@ -48,7 +48,7 @@ def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scen
 
 
 def meshes_of(
-    models: Mapping[str, dict[int, CentredModel]], objects: ObjectClouds, shown: Iterable[int]
+    models: Mapping[str, dict[int, CenteredModel]], objects: ObjectClouds, shown: Iterable[int]
 ) -> dict[int, MeshScene]:
     """Return each object's mesh alone, in the object's frame, by the number that it has among the objects.
 

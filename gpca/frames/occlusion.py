@@ -28,13 +28,13 @@ def occlude(
     others = np.flatnonzero(
         (instances.dataset == instances.dataset[i]) & (instances.object_index != instances.object_index[i])
     )
-    centre = pixels_P_2.mean(axis=0)
+    center = pixels_P_2.mean(axis=0)
     for other in random.permutation(others):
         silhouette, corner = _silhouette(instances.pixels_of(other))
         angle = random.uniform(0, 2 * np.pi)
         direction = np.array([np.cos(angle), np.sin(angle)])
         reach = np.linalg.norm(np.ptp(pixels_P_2, axis=0)) + np.linalg.norm(silhouette.shape)
-        start = centre - corner - np.array(silhouette.shape[::-1]) / 2
+        start = center - corner - np.array(silhouette.shape[::-1]) / 2
         for distance_px in np.arange(reach, 0, -STEP_PX):
             covered_P = _covers(silhouette, pixels_P_2 - np.rint(corner + start + distance_px * direction).astype(int))
             if covered_P.mean() >= share:

@@ -82,7 +82,7 @@ class Observation:
 
     Attributes:
         subject: where the annotation stands.
-        T_camera_model: the annotated pose, metres, in the frame of the dataset's model.
+        T_camera_model: the annotated pose, meters, in the frame of the dataset's model.
         T_model_object: the frame of the canonical cloud in that of the model.
         tree: of the canonical cloud.
         diameter_m: of the object.
@@ -110,12 +110,12 @@ class Observation:
 
 
 def median_distance(tree: cKDTree, points_m: np.ndarray) -> float:
-    """Return the median distance in metres from points (P, 3) in the object's frame to its cloud."""
+    """Return the median distance in meters from points (P, 3) in the object's frame to its cloud."""
     return float(np.median(tree.query(points_m)[0]))
 
 
 def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
-    """Return the median distance (I,) in metres from each instance's points to its model under the true pose.
+    """Return the median distance (I,) in meters from each instance's points to its model under the true pose.
 
     Args:
         most_points: judge by about so many of each instance, where all would take too long.

@@ -1,4 +1,4 @@
-"""From frames of BOP datasets to instances: models centred, masks back-projected, initial poses found."""
+"""From frames of BOP datasets to instances: models centered, masks back-projected, initial poses found."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gpca.frames.instances import Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
 from gpca.frames.results_file import read_bop_results
 from gpca.objects import bop
-from gpca.objects.canonical import ObjectClouds, bounding_centre
+from gpca.objects.canonical import ObjectClouds, bounding_center
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries, read_symmetries
 from gpca.process.progress import progress
@@ -68,15 +68,15 @@ class Dataset:
 
 
 @dataclass(frozen=True)
-class CentredModel:
-    """An object of a dataset, its surface moved so that the bounding box is centred, and by how much."""
+class CenteredModel:
+    """An object of a dataset, its surface moved so that the bounding box is centered, and by how much."""
 
     surface: Surface
     T_model_object: np.ndarray
     listed_symmetries: dict | None
 
 
-def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CentredModel]:
+def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CenteredModel]:
     """Return the models of the objects that the frames show, by id.
 
     Raises:
@@ -94,20 +94,20 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CentredM
     models = {}
     for number, surface in zip(ids, bop.surfaces(folder, dataset.unit, ids), strict=True):
         T_model_object = np.eye(4)
-        T_model_object[:3, 3] = bounding_centre(surface)
+        T_model_object[:3, 3] = bounding_center(surface)
         name = f"{dataset.name} {info[number].get('name', surface.name)}"
-        centred = Surface(name, surface.vertices_m - T_model_object[:3, 3], surface.faces)
-        models[number] = CentredModel(centred, T_model_object, read_symmetries(info, number))
+        centered = Surface(name, surface.vertices_m - T_model_object[:3, 3], surface.faces)
+        models[number] = CenteredModel(centered, T_model_object, read_symmetries(info, number))
     return models
 
 
-def with_shared_models(models_of: Mapping[str, dict[int, CentredModel]]) -> dict[str, dict[int, CentredModel]]:
+def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dict[str, dict[int, CenteredModel]]:
     """Return the models of all datasets, where one that an earlier dataset has too bears the name that it has there.
 
     LINEMOD-Occlusion shows objects of LINEMOD: an object that training saw in one is not unseen in the other.
     """
     first: dict[bytes, str] = {}
-    shared: dict[str, dict[int, CentredModel]] = {}
+    shared: dict[str, dict[int, CenteredModel]] = {}
     for name, models in models_of.items():
         shared[name] = {}
         for number, model in models.items():
@@ -116,18 +116,18 @@ def with_shared_models(models_of: Mapping[str, dict[int, CentredModel]]) -> dict
     return shared
 
 
-def distinct_surfaces(models_of: Mapping[str, dict[int, CentredModel]]) -> list[Surface]:
+def distinct_surfaces(models_of: Mapping[str, dict[int, CenteredModel]]) -> list[Surface]:
     """Return the surfaces of all datasets' models, those that datasets share once."""
     of = {(model.surface.name, _shape(model)): model.surface for each in models_of.values() for model in each.values()}
     return list(of.values())
 
 
-def _shape(model: CentredModel) -> bytes:
+def _shape(model: CenteredModel) -> bytes:
     return np.asarray(model.surface.vertices_m).tobytes()
 
 
 def read_instances(
-    datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, CentredModel]]],
+    datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, CenteredModel]]],
     objects: ObjectClouds,
     settings: InitialPoseSettings,
 ) -> Instances:
@@ -153,7 +153,7 @@ def read_instances(
         of_dataset: list[tuple[_Objects, Frame, int, dict]] = []
         for frame in progress(frames, f"frames of {dataset.name}"):
             shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
-            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.colour)}
+            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color)}
             of_dataset += [(found, frame, n, shown | row) for n, row in found.in_frame(frame, left_out)]
         observations = [found.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]
         require_shared_form(dataset.name, observations)
@@ -209,7 +209,7 @@ class _Objects:
     """The objects of one dataset, ready to be found in frames."""
 
     def __init__(
-        self, dataset: Dataset, objects: ObjectClouds, models: dict[int, CentredModel], settings: InitialPoseSettings
+        self, dataset: Dataset, objects: ObjectClouds, models: dict[int, CenteredModel], settings: InitialPoseSettings
     ):
         self.name = dataset.name
         self._objects = objects
@@ -249,7 +249,7 @@ class _Objects:
         )
 
     def T_model_object(self, number: int) -> np.ndarray:
-        """Return where the centred object lies in the frame of its model."""
+        """Return where the centered object lies in the frame of its model."""
         return self._models[number].T_model_object
 
     def symmetric_ids(self) -> list[int]:
@@ -269,7 +269,7 @@ class _Objects:
         return self._registration[number].register(row["points_m"], seed_of(*axes))
 
     def diameter_m(self, number: int) -> float:
-        """Return an object's diameter in metres."""
+        """Return an object's diameter in meters."""
         return float(self._objects.diameters_m[self._index[number]])
 
     def _is_symmetric(self, number: int) -> bool:

@@ -16,8 +16,8 @@ FLAT = 1e-9  # volume of the convex hull in diameters cubed; that of a sheet of 
 def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the poses (n, 4, 4) in which an object rests on the plane z = 0, and their probabilities (n,).
 
-    Its density is uniform. Of an open surface the centre of mass may come out anywhere; outside of the convex hull,
-    where no object has one, the centre of the hull takes its place.
+    Its density is uniform. Of an open surface the center of mass may come out anywhere; outside of the convex hull,
+    where no object has one, the center of the hull takes its place.
 
     Raises:
         InputError: a surface that has no volume.
@@ -26,12 +26,12 @@ def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 
     mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
     with np.errstate(invalid="ignore", divide="ignore"):  # what is flat or open may enclose no volume
-        hull, centre_m = mesh.convex_hull, mesh.center_mass
+        hull, center_m = mesh.convex_hull, mesh.center_mass
     if hull.volume < FLAT * diameter(surface.vertices_m, surface.name) ** 3:
         raise InputError(f"object '{surface.name}'", "is flat and cannot be stood on a table", "leave it out")
-    if not _is_inside(centre_m, hull):
-        centre_m = hull.center_mass
-    return trimesh.poses.compute_stable_poses(mesh, center_mass=centre_m, sigma=0.0, threshold=0.0)
+    if not _is_inside(center_m, hull):
+        center_m = hull.center_mass
+    return trimesh.poses.compute_stable_poses(mesh, center_mass=center_m, sigma=0.0, threshold=0.0)
 
 
 def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Generator) -> np.ndarray:

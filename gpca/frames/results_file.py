@@ -20,16 +20,16 @@ REMEDY = "export it again"
 # A pose's distance from the camera, relative to that of the objects annotated in its image: no single estimate is off
 # by more than this, however bad ...
 ONE_OFF = 100.0
-# ... and half of a file's are not off by more than this, unless the unit is wrong: centimetres would be by 10.
+# ... and half of a file's are not off by more than this, unless the unit is wrong: centimeters would be by 10.
 HALF_OFF = 3.0
 UNIT_OFF = 0.3  # of a tenfold: so near to a power of ten the unit is told by it
 
-Estimates = Mapping[tuple[int, int, int], list[np.ndarray]]
+PosesByObject = Mapping[tuple[int, int, int], list[np.ndarray]]
 
 
 def read_bop_results(
     path: str | Path, distances_m: Mapping[tuple[int, int], Sequence[float]], known: Collection[int]
-) -> Estimates:
+) -> PosesByObject:
     """Read a results file, as every method for the benchmark exports it.
 
     Args:
@@ -37,12 +37,12 @@ def read_bop_results(
         known: ids of the dataset's objects.
 
     Returns:
-        (scene, image, object id) -> poses ``T_camera_model`` in metres, the highest score first.
+        (scene, image, object id) -> poses ``T_camera_model`` in meters, the highest score first.
 
     Raises:
         InputError: missing file or column, R without nine numbers or t without three, R that is no rotation, a number
             that is none, an image or object that the dataset does not have, a pose behind the camera, translations in
-            another unit than millimetres.
+            another unit than millimeters.
     """
     rows = read_csv(path, COLUMNS, others=ANY, remedy=REMEDY)
     found: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
@@ -66,10 +66,10 @@ def read_bop_results(
 
 
 def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.ndarray) -> np.ndarray:
-    """Return the pose whose origin is seen nearest to the mask's centre: which of several equal objects is meant."""
-    centre_2 = pixels_P_2.mean(axis=0)
+    """Return the pose whose origin is seen nearest to the mask's center: which of several equal objects is meant."""
+    center_2 = pixels_P_2.mean(axis=0)
     seen = [camera_3_3 @ pose[:3, 3] for pose in poses]
-    return poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - centre_2) for p in seen]))]
+    return poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - center_2) for p in seen]))]
 
 
 def _id(subject: str, row: dict, column: str) -> int:

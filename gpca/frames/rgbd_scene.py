@@ -20,14 +20,14 @@ from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries
 from gpca.process.progress import progress
 from gpca.seeds import generator
-from gpca.settings import Bounds, Count
+from gpca.settings import Bounds, Count, Distinct
 
-DEPTH_SCALE = 0.1  # millimetres per unit of the depth images
-Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in metres
+DEPTH_SCALE = 0.1  # millimeters per unit of the depth images
+Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in meters
 Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
 DESCRIPTION = "dataset_info.json"
 TABLE_M = 1.2  # edge length of the table
-TABLE_COLOUR = (0.72, 0.65, 0.55)
+TABLE_COLOR = (0.72, 0.65, 0.55)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class SceneSettings:
         noise: of depth.
     """
 
-    families: tuple[str, ...] = ("ycb",)
+    families: Distinct[str] = ("ycb",)
     count: Annotated[int, Bounds(minimum=2)] = 12
     views: Count = 4
     objects: tuple[Count, Count] = (4, 8)
@@ -87,7 +87,7 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
         InputError: the folder is there and holds something other than scenes, or the table is too small.
     """
     _require_replaceable(Path(folder))
-    surfaces = [centre(surface) for surface in surfaces]
+    surfaces = [center(surface) for surface in surfaces]
     resting = [stable_poses(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
         _write_models(surfaces, source, partial / "models")
@@ -172,10 +172,10 @@ def table() -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def centre(surface: Surface) -> Surface:
-    """Return the surface with its bounding box's centre at the origin."""
-    centre_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
-    return Surface(surface.name, surface.vertices_m - centre_m, surface.faces)
+def center(surface: Surface) -> Surface:
+    """Return the surface with its bounding box's center at the origin."""
+    center_m = (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0)) / 2
+    return Surface(surface.name, surface.vertices_m - center_m, surface.faces)
 
 
 def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
@@ -204,7 +204,7 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
     ]
     scene = MeshScene([*meshes, table()])
     alone = [MeshScene([mesh]) for mesh in meshes]
-    colours_M_3 = np.array([*(model_colour(p.model, len(surfaces)) for p in standing), TABLE_COLOUR])
+    colors_M_3 = np.array([*(model_color(p.model, len(surfaces)) for p in standing), TABLE_COLOR])
     for name in ("depth", "rgb", "mask", "mask_visib"):
         (folder / name).mkdir(parents=True)
     camera_json: dict[int, dict] = {}
@@ -216,7 +216,7 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
         write_png(
             folder / f"depth/{image:06d}.png", np.rint(1e3 * depth_m / DEPTH_SCALE).clip(0, 65535).astype(np.uint16)
         )
-        write_png(folder / f"rgb/{image:06d}.png", shade(view, colours_M_3, T_world_camera))
+        write_png(folder / f"rgb/{image:06d}.png", shade(view, colors_M_3, T_world_camera))
         truth_json[image] = []
         info_json[image] = []
         for n, object_ in enumerate(standing):
@@ -267,8 +267,8 @@ def _box(mask: np.ndarray) -> list[int]:
     return [int(u.min()), int(v.min()), int(np.ptp(u)) + 1, int(np.ptp(v)) + 1] if len(u) else [-1, -1, -1, -1]
 
 
-def model_colour(model: int, count: int) -> tuple[float, float, float]:
-    """Return the colour of a model among so many, in [0, 1]."""
+def model_color(model: int, count: int) -> tuple[float, float, float]:
+    """Return the color of a model among so many, in [0, 1]."""
     from colorsys import hsv_to_rgb
 
     return hsv_to_rgb(model * 0.618034 % 1, 0.55 if model % 2 else 0.75, 0.85)

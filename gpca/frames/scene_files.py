@@ -18,7 +18,7 @@ from gpca.numerals import whole
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
 # Wide of every depth camera there is; what lies between is for the measured points to say.
 FOCAL_PX = (1.0, 1e6)
-DEPTH_SCALES = (1e-6, 1e6)  # millimetres per unit: from nanometres to kilometres
+DEPTH_SCALES = (1e-6, 1e6)  # millimeters per unit: from nanometers to kilometers
 FARTHEST_MM = 1e6
 
 
@@ -41,7 +41,7 @@ def read_images(path: Path) -> dict[int, Any]:
 
 
 def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
-    """Return K (3, 3) in pixels and the millimetres per unit of depth; InputError where no camera has such."""
+    """Return K (3, 3) in pixels and the millimeters per unit of depth; InputError where no camera has such."""
     camera_3_3 = _numbers(entry, "cam_K", 9, subject).reshape(3, 3)
     require_camera(camera_3_3, f"{subject}: cam_K")
     (scale,) = _numbers(entry, "depth_scale", 1, subject)
@@ -63,7 +63,7 @@ def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
 
 
 def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
-    """Return an annotation's object id and ``T_camera_model`` in metres; InputError where it can be no pose."""
+    """Return an annotation's object id and ``T_camera_model`` in meters; InputError where it can be no pose."""
     R_camera_model = _numbers(entry, "cam_R_m2c", 9, subject).reshape(3, 3)
     translation_mm = _numbers(entry, "cam_t_m2c", 3, subject)
     if abs(translation_mm).max() > FARTHEST_MM:

@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 from gpca.alignment.rigid import inverse, rotate, transform
 from gpca.frames.bop import back_project
 from gpca.frames.camera import Camera
-from gpca.process.environment import require_open3d
+from gpca.process.environment import open3d_cloud
 
-NEIGHBOURS, OUTLIER_RATIO = 20, 2.0  # Open3D's usual values for the removal of statistical outliers
+NEIGHBORS, OUTLIER_RATIO = 20, 2.0  # Open3D's usual values for the removal of statistical outliers
 NEAR = 0.05  # diameters; a measured point that is so near lies on the model
 
 
@@ -46,7 +46,7 @@ class Shot:
         return transform(self.T_world_camera, points_m)
 
     def project(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return for points (P, 3) in the world their pixels as v and u, and their depth in metres.
+        """Return for points (P, 3) in the world their pixels as v and u, and their depth in meters.
 
         Points outside the image get the pixel (-1, -1).
         """
@@ -71,14 +71,12 @@ def median_depth(depth_n_H_W: np.ndarray) -> np.ndarray:
 def fuse(shots: Sequence[Shot], diameter_m: float, filtered: bool) -> np.ndarray:
     """Return the object's points (P, 3) of all shots in the world, without statistical outliers where `filtered`."""
     points_m = np.concatenate([shot.object_points_m(diameter_m) for shot in shots])
-    return without_outliers(points_m) if filtered and len(points_m) > NEIGHBOURS else points_m
+    return without_outliers(points_m) if filtered and len(points_m) > NEIGHBORS else points_m
 
 
 def without_outliers(points: np.ndarray) -> np.ndarray:
-    """Remove points that are far from their neighbours by the cloud's own measure (Rusu et al. 2008), by Open3D."""
-    o3d = require_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    _, rows = cloud.remove_statistical_outlier(NEIGHBOURS, OUTLIER_RATIO)
+    """Remove points that are far from their neighbors by the cloud's own measure (Rusu et al. 2008), by Open3D."""
+    _, rows = open3d_cloud(points).remove_statistical_outlier(NEIGHBORS, OUTLIER_RATIO)
     return points[np.asarray(rows)]
 
 

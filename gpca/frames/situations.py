@@ -14,7 +14,7 @@ from gpca.errors import InputError
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
 from gpca.frames.resting import rest, stable_poses
-from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, centre, lay_table, table
+from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, center, lay_table, table
 from gpca.frames.shots import Shot, median_depth
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
@@ -64,7 +64,7 @@ class Shelf:
     def __init__(
         self, surfaces: Sequence[Surface], source: str, points: int = 4096, estimator: InitialPoseSettings | None = None
     ) -> None:
-        self.surfaces = [centre(surface) for surface in surfaces]
+        self.surfaces = [center(surface) for surface in surfaces]
         self.resting = [stable_poses(surface) for surface in self.surfaces]
         self._hulls_m = [surface.vertices_m[ConvexHull(surface.vertices_m).vertices] for surface in self.surfaces]
         clouds = [canonical_cloud(surface, source, points) for surface in self.surfaces]
@@ -76,7 +76,7 @@ class Shelf:
         self._estimators: dict[int, GlobalRegistration] = {}
 
     def outline(self, object_: Placed):
-        """Return the convex outline of an object on the table, as a polygon in metres."""
+        """Return the convex outline of an object on the table, as a polygon in meters."""
         from shapely import MultiPoint
 
         return MultiPoint(transform(object_.T_world_object, self._hulls_m[object_.model])[:, :2]).convex_hull
@@ -212,11 +212,11 @@ class Situations:
         azimuth = random.uniform(0, 2 * np.pi)
         elevation = np.deg2rad(random.uniform(*scenes.elevation_deg))
         toward = np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
-        centre_m = T_world_object[:3, 3]
+        center_m = T_world_object[:3, 3]
         situation = Situation(
             self._shelf,
             tuple(standing),
-            look_at(centre_m + random.uniform(*scenes.distance_m) * toward, centre_m),
+            look_at(center_m + random.uniform(*scenes.distance_m) * toward, center_m),
             np.eye(4),
             scenes.camera,
             scenes.noise,

@@ -19,13 +19,13 @@ _SIDES = ([0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], 
 _FACES = np.array([triangle for a, b, c, d in _SIDES for triangle in ([a, b, c], [a, c, d])])
 
 
-def candidates(centre_m: np.ndarray, distance_m: float, azimuths: int, elevations_deg: Sequence[float]) -> np.ndarray:
+def candidates(center_m: np.ndarray, distance_m: float, azimuths: int, elevations_deg: Sequence[float]) -> np.ndarray:
     """Return camera poses ``T_world_camera`` (n, 4, 4) on a hemisphere about a point, which they look at."""
     poses = []
     for elevation in np.deg2rad(elevations_deg):
         for azimuth in 2 * np.pi * np.arange(azimuths) / azimuths:
             flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
-            poses.append(look_at(centre_m + distance_m * np.array([*flat, np.sin(elevation)]), centre_m))
+            poses.append(look_at(center_m + distance_m * np.array([*flat, np.sin(elevation)]), center_m))
     return np.array(poses)
 
 

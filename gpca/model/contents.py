@@ -9,19 +9,22 @@ from collections.abc import Collection, Mapping
 
 import torch
 
+from gpca.alignment.icp import ICPSettings
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.covariances import make_covariance
+from gpca.classifier.settings import GPCSettings
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import require_like
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.features.dataset import WIDTHS
+from gpca.features.settings import DescriptorSettings
 from gpca.model.familiarity import MEASURES
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import TREATMENTS
-from gpca.settings import check_settings
-from gpca.uncertainty.settings import FEWEST_STARTS
+from gpca.settings import read_settings
+from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 # The most that one explanation can be asked for: above it takes minutes, or all memory, and gains nothing. A score is
 # the mean over the draws of the classifier, so a million of them leave an error of 0.0005 at most.
@@ -30,15 +33,15 @@ MOST_ENCODED_POINTS = 10**6  # in all draws of the encoder together
 MOST_CLOUD_POINTS = 10**6
 MOST_ITERATIONS = 10**5  # of ICP
 MOST_RUNS = 10**4  # of ICP, to describe a pair
-MOST_NEIGHBOURS = 10**4  # or whatever else a backbone's options count
+MOST_NEIGHBORS = 10**4  # or whatever else a backbone's options count
 ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
 def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     """Raise a ValueError that says what cannot be in the content of a model file, whose encoder has these settings."""
-    check_settings(vars(settings), "encoders", "*")
-    check_settings(content["gpc"]["settings"], "explainers", "gpca")
-    check_settings(content["icp"], "registrations", "icp")
+    read_settings(EncoderSettings, vars(settings))
+    read_settings(GPCSettings, content["gpc"]["settings"])
+    read_settings(ICPSettings, content["icp"])
     if "familiar" in content:
         _require_ranges(content["familiar"])
     if content["diagnoser"] is not None:
@@ -52,8 +55,8 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     }
     _require_counts(counts)
     for name, value in settings.options.items():  # a backbone of a user's own has options of its own
-        if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBOURS:
-            raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBOURS}")
+        if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBORS:
+            raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBORS}")
     if not isinstance(content["title"], str) or not content["title"].isprintable():
         raise ValueError("its title is not a line of text")
     _require_treatments(content["treatments"])
@@ -99,9 +102,9 @@ def _require_ranges(ranges: Mapping) -> None:
 
 
 def _require_diagnoser(state: Mapping) -> None:
-    check_settings(state["descriptors"], "diagnosis", "descriptors")
-    check_settings(state["runs"], "uncertainty", "causal")
-    check_settings(state["icp"], "registrations", "icp")
+    read_settings(DescriptorSettings, state["descriptors"])
+    read_settings(UncertaintySettings, state["runs"])
+    read_settings(ICPSettings, state["icp"])
     causes = state["classifier"]["causes"]
     _require_counts(
         {
@@ -128,7 +131,7 @@ def _require_diagnoser(state: Mapping) -> None:
         *((cause, (ABSENT, PRESENT)) for cause in causes),
     ]:
         _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
-        check_settings(gpc["settings"], "explainers", "gpca")
+        read_settings(GPCSettings, gpc["settings"])
         _require_classifier(gpc, classes, features)
 
 

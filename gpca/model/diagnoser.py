@@ -98,7 +98,7 @@ class Diagnoser:
             model: (M, 3).
             T_icp: 4×4, what ICP found: takes the observed cloud to the model.
         """
-        inputs_1_F = self.classifier.normalised(self.features(observed, model, T_icp)[None])
+        inputs_1_F = self.classifier.normalized(self.features(observed, model, T_icp)[None])
         judged = self.classifier.judge(inputs_1_F)
         log_error = float(inputs_1_F[0] @ self.error_weights[:-1] + self.error_weights[-1])
         return Diagnosis(

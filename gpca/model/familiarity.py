@@ -22,8 +22,6 @@ CELL, CELLS = 1 / 16, 64  # diameters, and cells along an axis of the picture
 BEHIND = 0.1  # diameters behind the foremost point of a cell, from which on a point is hidden
 FLAT = 0.15  # closure below which a thin object looks the same as one side of it
 
-Pair = tuple[np.ndarray, np.ndarray]
-
 
 def measure(source: np.ndarray, target: np.ndarray) -> dict[str, float]:
     """Return `MEASURES` of a pair of clouds (N, 3) and (M, 3), both in diameters of the target.
@@ -72,7 +70,7 @@ class Familiarity:
     ranges: Mapping[str, tuple[float, float]]
 
     @classmethod
-    def of(cls, pairs: Iterable[Pair]) -> Familiarity:
+    def of(cls, pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> Familiarity:
         """Measure the training samples: source and target of each, in diameters."""
         measured = [measure(*pair) for pair in pairs]
         ends = ((1 - SHARE) / 2, (1 + SHARE) / 2)

@@ -78,12 +78,12 @@ def learn(
     clear = lessons.subset(lessons.label_N != BORDERLINE)
     first = _classifier(clear.subset(~clear.unseen_N), gpc, *axes, "calibration")
     unseen = clear.subset(clear.unseen_N)
-    judged = first.judge(first.normalised(unseen.features_N_F))
+    judged = first.judge(first.normalized(unseen.features_N_F))
     nominal_N = unseen.label_N == NOMINAL
     classifier = _classifier(clear, gpc, *axes)
     diagnoser = Diagnoser(
         classifier=classifier,
-        error_weights=fit_error(classifier.normalised(lessons.features_N_F), lessons.error_N),
+        error_weights=fit_error(classifier.normalized(lessons.features_N_F), lessons.error_N),
         threshold=threshold_of(judged.failure_N[nominal_N], false_alarms),
         points=causes.points[1],
         runs=causes.runs(),

@@ -12,7 +12,7 @@ from gpca.errors import InputError
 from gpca.io.limits import require_file
 from gpca.numerals import decimal
 from gpca.objects import mesh_folder, pcd
-from gpca.objects.canonical import bounding_centre, canonical_cloud
+from gpca.objects.canonical import bounding_center, canonical_cloud
 
 SAMPLED_POINTS = 16384  # so many are drawn on a mesh, as on the objects of the training
 LARGEST_POSE_BYTES = 10**5  # 16 numbers, however they are written
@@ -36,7 +36,7 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
         InputError: no such file, another format, unreadable, too few points, NaN, a mesh without area, or a diameter
             that this unit does not give.
     """
-    scale = mesh_folder.metres_per(unit)
+    scale = mesh_folder.meters_per(unit)
     require_format(path)
     if path.suffix.lower() == ".pcd":
         points = pcd.parse(path.read_bytes(), path)
@@ -44,8 +44,8 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
         surface = mesh_folder.read_surface(path, scale)
         if surface.faces is not None:
             points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS)
-            frame = CanonicalFrame(bounding_centre(surface) / scale, diameter_m / scale)
-            return points_m.astype(np.float64) / scale + frame.centre_3, frame
+            frame = CanonicalFrame(bounding_center(surface) / scale, diameter_m / scale)
+            return points_m.astype(np.float64) / scale + frame.center_3, frame
         points = surface.vertices_m / scale
     return points, CanonicalFrame.of(points, unit, path)
 

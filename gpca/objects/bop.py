@@ -16,7 +16,7 @@ from gpca.io.json_file import read_json
 from gpca.io.limits import require_file
 from gpca.numerals import whole
 from gpca.objects.canonical import diameter
-from gpca.objects.mesh_folder import metres_per, read_surface
+from gpca.objects.mesh_folder import meters_per, read_surface
 from gpca.objects.surface import Surface
 
 DIAMETER_TOLERANCE = 0.05
@@ -24,7 +24,7 @@ DIAMETER_TOLERANCE = 0.05
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     """Surfaces of a configured source: keys `objects` (ids, default all) and `unit` (default mm)."""
-    return surfaces(folder, entry.get("unit", "mm"), entry.get("objects"))
+    return surfaces(folder, entry.get("unit") or "mm", entry.get("objects"))
 
 
 def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None = None) -> Iterator[Surface]:
@@ -39,7 +39,7 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
         InputError: missing folder, model or models_info.json, or a model whose diameter is not the listed one.
     """
     models = models_folder(Path(folder))
-    scale = metres_per(unit)
+    scale = meters_per(unit)
     info = read_models_info(models / "models_info.json")
     listed_mm = {number: model["diameter"] for number, model in info.items()}
     ids = sorted(map(_id, models.glob("obj_[0-9]*.ply"))) if objects is None else sorted(objects)

@@ -1,4 +1,4 @@
-"""Surfaces into canonical clouds: sampled uniformly, centred on the bounding box, measured by the diameter, checked."""
+"""Surfaces into canonical clouds: sampled uniformly, centered on the bounding box, measured by diameter, checked."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import is_name
 from gpca.objects.surface import Surface
-from gpca.process.environment import require_open3d
+from gpca.process.environment import open3d_cloud, require_open3d
 
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
-NORMAL_NEIGHBOURS = 30
+NORMAL_NEIGHBORS = 30
 # A cloud spans nearly its object's diameter. Few points miss some of it, but never nine tenths.
 SMALLEST_EXTENT = 0.1  # diameters
 UNIT_TOLERANCE = 1e-3  # of the length of a normal, a hundred times what float32 rounds
@@ -66,32 +66,32 @@ def diameter(points: np.ndarray, subject: object) -> float:
     from scipy.spatial.distance import cdist, pdist
 
     require_points(points, subject)
-    centred = points - points.mean(axis=0)
-    extents, axes = np.linalg.svd(centred, full_matrices=False)[1:]
+    centered = points - points.mean(axis=0)
+    extents, axes = np.linalg.svd(centered, full_matrices=False)[1:]
     rank = int((extents > 1e-6 * extents[0]).sum())
     if rank < 2:
         raise InputError(subject, "all its points coincide or lie on one line", "an object needs a surface")
     if len(points) <= FEW_POINTS:
         return float(pdist(points).max())
     # In the plane or space that the points span: Qhull refuses a flat cloud in 3-D.
-    hull = points[ConvexHull(centred @ axes[:rank].T).vertices]
+    hull = points[ConvexHull(centered @ axes[:rank].T).vertices]
     blocks = np.array_split(hull, len(hull) // 1024 + 1)  # a sphere has thousands of hull vertices: bounded memory
     return float(max(cdist(block, hull).max() for block in blocks))
 
 
 def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tuple[np.ndarray, np.ndarray, float]:
-    """Sample a surface uniformly and centre it on its bounding box.
+    """Sample a surface uniformly and center it on its bounding box.
 
     A mesh gives `n_points` area-uniform samples with the normals of their triangles. A point cloud keeps all its
     points, in random order; missing normals are estimated and turned towards the camera at the origin.
 
     Args:
-        surface: vertices in metres.
+        surface: vertices in meters.
         source: the source's name; with the surface's name it seeds the draw.
         n_points: points drawn from a mesh.
 
     Returns:
-        points_m (P, 3) float32, normals (P, 3) float32 unit, diameter in metres of the vertices.
+        points_m (P, 3) float32, normals (P, 3) float32 unit, diameter in meters of the vertices.
 
     Raises:
         InputError: no points, NaN, zero area, too small a cloud, too few points to draw, or a diameter that no
@@ -116,11 +116,11 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
     diameter_m = diameter(hull_m, subject)
     require_size(diameter_m, subject)
     points_m, normals = draw(surface, n_points, seeds.generator(source, surface.name, "surface"))
-    return (points_m - bounding_centre(surface)).astype(np.float32), normals.astype(np.float32), diameter_m
+    return (points_m - bounding_center(surface)).astype(np.float32), normals.astype(np.float32), diameter_m
 
 
-def bounding_centre(surface: Surface) -> np.ndarray:
-    """Return the centre (3,) of a surface's upright bounding box, in metres: the origin of its canonical cloud."""
+def bounding_center(surface: Surface) -> np.ndarray:
+    """Return the center (3,) of a surface's upright bounding box, in meters: the origin of its canonical cloud."""
     used_m = _used_vertices(surface)
     return (used_m.min(axis=0) + used_m.max(axis=0)) / 2
 
@@ -162,10 +162,9 @@ def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tupl
 
 
 def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
-    """Return unit normals (P, 3) by the nearest neighbours of points (P, 3), turned towards a camera at the origin."""
-    o3d = require_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
-    cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBOURS))
+    """Return unit normals (P, 3) by the nearest neighbors of points (P, 3), turned towards a camera at the origin."""
+    cloud = open3d_cloud(points_m)
+    cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBORS))
     cloud.orient_normals_towards_camera_location(np.zeros(3))
     return np.asarray(cloud.normals)
 
@@ -205,7 +204,7 @@ class ObjectClouds:
     Attributes:
         names: those of the O objects.
         diameters_m: (O,) float64.
-        clouds: for each object its points (P, 3) in metres and unit normals (P, 3), both float32.
+        clouds: for each object its points (P, 3) in meters and unit normals (P, 3), both float32.
     """
 
     names: tuple[str, ...]
@@ -240,7 +239,7 @@ class ObjectClouds:
         points_m, diameter_m = self.points(i), self.diameters_m[i]
         if not SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
             raise InputError(subject, f"its diameter is {diameter_m:.4g} m", remedy)
-        # From the centre of its box, no point of an object is farther away than its diameter.
+        # From the center of its box, no point of an object is farther away than its diameter.
         extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
         if np.abs(points_m).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
             found = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
@@ -253,7 +252,7 @@ class ObjectClouds:
         return len(self.names)
 
     def points(self, i: int) -> np.ndarray:
-        """(P, 3) float32, metres, centred on the object's bounding box."""
+        """(P, 3) float32, meters, centered on the object's bounding box."""
         return self.clouds[i][0]
 
     def normals(self, i: int) -> np.ndarray:

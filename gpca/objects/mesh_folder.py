@@ -14,7 +14,7 @@ from gpca.objects.mesh_text import CORNERS, require_whole
 from gpca.objects.surface import Surface
 
 SUFFIXES = (".ply", ".obj", ".stl", ".off")
-METRES_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+METERS_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
@@ -24,16 +24,16 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 
 def surfaces(paths: Iterable[Path], unit: str | None) -> Iterator[Surface]:
     """Yield one surface per file, named by the file's stem."""
-    scale = metres_per(unit)
+    scale = meters_per(unit)
     for path in paths:
         yield read_surface(path, scale)
 
 
-def metres_per(unit: str | None) -> float:
-    """Metres in one `unit`; InputError for a unit other than m, cm, mm."""
-    if unit not in METRES_PER_UNIT:
+def meters_per(unit: str | None) -> float:
+    """Meters in one `unit`; InputError for a unit other than m, cm, mm."""
+    if unit not in METERS_PER_UNIT:
         raise InputError(f"unit '{unit}'", "is not a known unit of length", "set unit: m, cm or mm")
-    return METRES_PER_UNIT[unit]
+    return METERS_PER_UNIT[unit]
 
 
 def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Sequence[str]) -> list[Path]:

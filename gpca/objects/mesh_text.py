@@ -14,10 +14,10 @@ from typing import IO
 from gpca.errors import InputError
 from gpca.numerals import decimal
 
-OFF_VERTEX_COLUMNS = (3, 6, 7)  # coordinates, alone or with a colour
-OFF_COLOUR_COLUMNS = (0, 1, 3, 4)  # of a face
-OBJ_VERTEX_COLUMNS = (3, 4, 6, 7)  # coordinates, alone, with a weight, with a colour, with both
-# An exporter writes the vertices that its faces use. Of a file that ends early, more are left over than a modeller
+OFF_VERTEX_COLUMNS = (3, 6, 7)  # coordinates, alone or with a color
+OFF_COLOR_COLUMNS = (0, 1, 3, 4)  # of a face
+OBJ_VERTEX_COLUMNS = (3, 4, 6, 7)  # coordinates, alone, with a weight, with a color, with both
+# An exporter writes the vertices that its faces use. Of a file that ends early, more are left over than a modeler
 # leaves behind; an OBJ says in no other way how many faces it should have.
 LARGEST_UNUSED_SHARE = 0.1
 # Text takes a hundred times as long to parse as numbers in binary. A scan of a million triangles has 80 MB of text.
@@ -121,9 +121,7 @@ def _check_off(path: Path) -> None:
         for i in range(faces):
             row = next(rows, [b"0"])
             corners = _count(row[0])
-            whole = len(row) - 1 - corners in OFF_COLOUR_COLUMNS and all(
-                word.isdigit() for word in row[1 : 1 + corners]
-            )
+            whole = len(row) - 1 - corners in OFF_COLOR_COLUMNS and all(word.isdigit() for word in row[1 : 1 + corners])
             if corners < 3 or not whole:
                 found = f"has {corners} corners" if 0 < corners < 3 else "is missing or does not have its stated length"
                 raise ValueError(f"face {i + 1} of {faces} {found}")

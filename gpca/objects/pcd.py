@@ -28,7 +28,7 @@ class _Header:
     dtype: np.dtype  # one field per column of FIELDS, named by its position, since PCD repeats the name "_"
     xyz: tuple[int, ...]  # positions of x, y, z
     points: int
-    organised: bool
+    organized: bool
     encoding: str
 
     @property
@@ -44,7 +44,7 @@ def parse(content: bytes, subject: object) -> np.ndarray:
         subject: its name for messages.
 
     Returns:
-        (P, 3) float64 in the file's unit. An organised cloud (HEIGHT > 1) marks missing depth by NaN, and those
+        (P, 3) float64 in the file's unit. An organized cloud (HEIGHT > 1) marks missing depth by NaN, and those
         points are left out; in any other cloud NaN is a fault.
 
     Raises:
@@ -55,7 +55,7 @@ def parse(content: bytes, subject: object) -> np.ndarray:
         points = _DECODERS[header.encoding](body, header)
     except (ValueError, KeyError, IndexError, TypeError, struct.error) as fault:
         raise InputError(subject, f"is not a readable PCD file ({fault})", "fetch or export it again") from fault
-    if header.organised:
+    if header.organized:
         points = points[~np.isnan(points).any(axis=1)]
     require_points(points, subject)
     return points

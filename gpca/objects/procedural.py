@@ -18,7 +18,7 @@ FAMILIES = {  # family: the module of gpca.objects.shapes whose OBJECTS maps eac
 
 
 def surfaces(family: str) -> Iterator[Surface]:
-    """Yield the objects of a family as closed meshes in metres, z up, in a fixed order; the same at every call.
+    """Yield the objects of a family as closed meshes in meters, z up, in a fixed order; the same at every call.
 
     Raises:
         InputError: at the call, for a family that is not one of FAMILIES.

@@ -119,8 +119,9 @@ def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str,
 
     No other folder is named, so that a change of another one does not make the objects anew.
     """
-    folders = {"local": {"data_dir": data_dir}, "download": {"downloads": downloads}}.get(entry["origin"], {})
-    return {name: folder for name, folder in folders.items() if folder}
+    if entry["origin"] == "local":
+        return {"data_dir": data_dir} if data_dir else {}
+    return {"downloads": downloads} if entry["origin"] == "download" else {}
 
 
 def source_modules(entry: dict) -> list[str]:

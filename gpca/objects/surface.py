@@ -17,7 +17,7 @@ class Surface:
 
     Attributes:
         name: unique within the source.
-        vertices_m: (V, 3) float64, metres, in the source's own frame.
+        vertices_m: (V, 3) float64, meters, in the source's own frame.
         faces: (F, 3) int64 triangles, or None for a point cloud.
         normals: (V, 3) unit normals of a point cloud; estimated from the points when None. Unused for meshes.
     """

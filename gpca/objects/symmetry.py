@@ -73,7 +73,7 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
     counts: a printed can is symmetric, since registration sees no print.
 
     Args:
-        points_N_3: a dense cloud of the whole surface, centred on its bounding box.
+        points_N_3: a dense cloud of the whole surface, centered on its bounding box.
         diameter: the object's, in the unit of the points.
 
     Returns:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import PurePath
 
 STAND_IN = "procedural stand-in"
 
@@ -10,6 +11,11 @@ STAND_IN = "procedural stand-in"
 def title_of(entry: Mapping) -> str:
     """Return a source's title, with the words that it is a stand-in where it is one."""
     return f"{entry['title']} ({STAND_IN})" if entry["stand_in"] else entry["title"]
+
+
+def dataset_of(entry: Mapping) -> str:
+    """Return the BOP benchmark's name of the dataset that a source's objects are of; empty for other sources."""
+    return PurePath(entry.get("location") or "").name if entry.get("kind") == "bop" else ""
 
 
 def stand_in_clause(entries: Iterable[Mapping], partly: bool = True) -> str:

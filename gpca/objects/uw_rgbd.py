@@ -15,7 +15,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.io.limits import require_file
 from gpca.objects import archive, pcd
-from gpca.objects.mesh_folder import files_in, metres_per
+from gpca.objects.mesh_folder import files_in, meters_per
 from gpca.objects.surface import Surface, instance_of, view_order
 
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
@@ -42,7 +42,7 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
         InputError: damaged tar or PCD, a tar without PCD, NaN.
     """
     paths = [Path(path) for path in paths]
-    scale = metres_per(unit)
+    scale = meters_per(unit)
     single = [path for path in paths if path.suffix.lower() == ".pcd"]
     for path in single:
         require_file(path, "no such file", "check files in the config")
@@ -63,7 +63,7 @@ def _chosen(views: list[_View], scale: float, views_per_instance: int) -> Iterat
     views = sorted(views, key=lambda view: view_order(view[0]))
     for _, group in groupby(views, key=lambda view: instance_of(view[0])):
         of_instance = list(group)
-        # The end is left out: the turntable's last frame is the neighbour of its first.
+        # The end is left out: the turntable's last frame is the neighbor of its first.
         steps = np.linspace(0, len(of_instance), min(views_per_instance, len(of_instance)), endpoint=False)
         for step in steps.astype(int):
             name, read, subject = of_instance[step]

@@ -17,7 +17,7 @@ from gpca.io.names import SPLITS
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 
-FARTHEST = 1e3  # diameters from the target's centre; a registration may fail, but nothing lies so far away
+FARTHEST = 1e3  # diameters from the target's center; a registration may fail, but nothing lies so far away
 RIGID_TOLERANCE = 1e-2  # of a rotation's products with itself; datasets round their poses
 
 
@@ -34,7 +34,7 @@ class Registrations:
             ``points[offsets[i]:offsets[i + 1]]``.
         target_points, target_offsets: the clean target clouds (ΣQ, 3) float32, in the same frame and kept the same way.
         severity_noise, severity_rotation_rad, severity_translation, severity_crop: (S,) as drawn, 0 where not applied.
-        T_target_source_true, T_target_source_init, T_target_source_icp: (S, 4, 4), translations in metres.
+        T_target_source_true, T_target_source_init, T_target_source_icp: (S, 4, 4), translations in meters.
         fitness, inlier_rmse: (S,) of ICP.
         attached: arrays (S, …) from other files, for explainers that read them: ``embedding``, ``head_logits``, …
         axes: the source and the seed that they are of; None where they are of several.

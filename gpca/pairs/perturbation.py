@@ -73,7 +73,7 @@ def add_noise(points: np.ndarray, severities: Severities, random: np.random.Gene
 
 
 def misplace(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
-    """Rotate about a random axis through the object's centre and shift in a random direction."""
+    """Rotate about a random axis through the object's center and shift in a random direction."""
     angle_rad = np.deg2rad(random.uniform(*severities.rotation_deg))
     distance = random.uniform(*severities.translation)
     T_source_target = misplacement(angle_rad, distance, random)

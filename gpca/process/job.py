@@ -72,7 +72,11 @@ def run_step(snakemake: Any) -> None:
     names |= {"seed": int(names["seed"])} if "seed" in names else {}
     names["settings"] = json.loads(names.get("settings", "{}"))
     files = _paths(snakemake.input) | _paths(snakemake.output)
-    job = Job(**{"threads": threads, "folders": {}} | names | files)
+    folders = names.pop("folders", {})
+    job = Job(
+        **{"threads": threads, "data_dir": folders.get("data_dir"), "downloads": Path(folders.get("downloads") or "")},
+        **names | files,
+    )
     sys.exit(as_process(f"gpca {module}", lambda: call(module, job)))
 
 

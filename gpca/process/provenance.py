@@ -17,12 +17,12 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from gpca.code_files import ROOT
 from gpca.io.files import require_outputs, sha256_of_file, whole_file
 from gpca.process.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
 CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # JSON, the hash of each section: set by the Snakefile for its jobs
-_ROOT = Path(__file__).resolve().parent.parent  # of the checkout, or the site-packages that gpca is installed in
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def record_provenance(
         "config_sha256": json.loads(os.environ.get(CONFIG_VARIABLE, "null")),
         "inputs_sha256": {str(path): sha256_of_file(path) for path in inputs},
         "code": _code_version(),
-        "environment_lock_sha256": sha256_of_file(lock) if (lock := _ROOT / "environment.lock").is_file() else None,
+        "environment_lock_sha256": sha256_of_file(lock) if (lock := ROOT / "environment.lock").is_file() else None,
         "device": describe() | {"gpu": _gpu()},
         "python": platform.python_version(),
         "libraries": _library_versions(),
@@ -94,7 +94,7 @@ def _code_version() -> dict[str, object]:
 
 def _git(*arguments: str) -> str | None:
     """What git says about the folder of the package, or None where it fails."""
-    done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, check=False)
+    done = subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True, check=False)
     return None if done.returncode else done.stdout.strip()
 
 

@@ -21,7 +21,7 @@ from gpca.settings import require_arguments
 LOOSER = 2.0  # the broader search has so many times ICP's correspondence distance
 JUDGED = 8  # so many results of the search are compared with the shots
 MODEL_POINTS, CLOUD_POINTS = 512, 256
-BEHIND = (0.1, 0.25)  # the centre is tried so many diameters behind the middle of the measured side
+BEHIND = (0.1, 0.25)  # the center is tried so many diameters behind the middle of the measured side
 
 
 class Robot(Protocol):
@@ -126,15 +126,15 @@ def look_around(
     """Return viewpoints ``T_world_camera`` (n, 4, 4), and which of the model's points were and would be seen.
 
     The last two are those of :func:`gpca.frames.viewpoint.expected_surface`. The viewpoints surround what was measured,
-    since the estimated centre may be anywhere.
+    since the estimated center may be anywhere.
     """
     from gpca.frames.situations import coarse
     from gpca.frames.viewpoint import candidates, expected_surface
 
-    centre_m = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0)
+    center_m = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0)
     first = holding.shots[0]
-    distance_m = float(np.linalg.norm(centre_m - first.T_world_camera[:3, 3]))
-    poses_n = candidates(centre_m, distance_m, azimuths, elevations_deg)
+    distance_m = float(np.linalg.norm(center_m - first.T_world_camera[:3, 3]))
+    poses_n = candidates(center_m, distance_m, azimuths, elevations_deg)
     points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
     seen_Q, shown_n_Q = expected_surface(
         holding.shots,

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.recovery.policy import NOTHING, QUEUE, Decision
 
-INVERSE_REGULARISATION = 0.3  # chosen on failures of development seeds
+INVERSE_REGULARizATION = 0.3  # chosen on failures of development seeds
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Trial:
 
 
 class Chances:
-    """A logistic regression for each action, and one for doing nothing, on standardised numbers.
+    """A logistic regression for each action, and one for doing nothing, on standardized numbers.
 
     What always or never helped in the trials gets the rate of Laplace's rule of succession, whatever is known.
 
@@ -38,7 +38,7 @@ class Chances:
     """
 
     def __init__(
-        self, trials: Sequence[Trial], actions: Sequence[str], inverse_regularisation: float = INVERSE_REGULARISATION
+        self, trials: Sequence[Trial], actions: Sequence[str], inverse_regularisation: float = INVERSE_REGULARizATION
     ) -> None:
         self._models = {
             name: _fitted([trial for trial in trials if trial.action == name], inverse_regularisation)
@@ -60,12 +60,12 @@ def learn_utility(
 
 
 def _fitted(trials: Sequence[Trial], inverse_regularisation: float) -> Any:
-    from baselines.concept_classifier import standardised_regression
+    from gpca.explainers.concept_classifier import standardized_regression
 
     right_N = np.array([trial.right for trial in trials], bool)
     if right_N.all() or not right_N.any():
         return float((right_N.sum() + 1) / (len(right_N) + 2))
-    return standardised_regression(inverse_regularisation).fit(np.array([trial.known_F for trial in trials]), right_N)
+    return standardized_regression(inverse_regularisation).fit(np.array([trial.known_F for trial in trials]), right_N)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeVar
 from gpca.io.structured_text import load_own_yaml
 from gpca.registry import load
 
-SUFFIXES = {"tables": ("md", "csv", "tex"), "figures": ("png", "pdf")}  # the files of each kind
+SUFFIXES = {"tables": ("md", "csv", "tex", "json"), "figures": ("png", "pdf")}  # the files of each kind
 Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values
 
 
@@ -47,6 +47,7 @@ class Result:
         only: name of a list -> those of its members that are shown.
         needs: names that must not be empty, besides those of the inputs.
         paper: it is a table or figure of the paper.
+        after: name of the result of another experiment below which it stands in their section.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Result:
     only: Mapping[str, tuple[str, ...]]
     needs: tuple[str, ...]
     paper: bool
+    after: str = ""
 
     @property
     def modules(self) -> list[str]:
@@ -95,7 +97,7 @@ class Result:
     def files(self, names: Names) -> dict[str, list[str] | str]:
         """Return the files of each input, a path where there can be but one; see :func:`input_name` for the keys."""
         return {
-            input_name(given.argument, keyword): _expand(patterns, self._shown(names))
+            input_name(given.argument, keyword): expand(patterns, self._shown(names))
             for given in self.inputs
             for keyword, patterns in given.files.items()
         }
@@ -150,7 +152,7 @@ InSection = TypeVar("InSection", bound=HasSection)
 def read_results(path: Path) -> list[tuple[str, list[Result]]]:
     """Return the sections of a file of the registry, each with its results."""
     return [
-        (section["section"], [_result(section["section"], entry) for entry in section["results"]])
+        (section["section"], [_result(section["section"], entry) for entry in section.get("results", ())])
         for section in load_own_yaml(path)
     ]
 
@@ -183,6 +185,17 @@ def by_section(results: Iterable[InSection]) -> dict[str, list[InSection]]:
 def input_name(argument: str, keyword: str) -> str:
     """Return what the files of an input are called: the argument, and the reader's keyword where it has several."""
     return f"{argument}_{keyword}" if keyword else argument
+
+
+def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
+    """Return the files of all combinations of the names in braces; a path where none of these is listed."""
+    files = []
+    listed = [name for name in _braced(patterns) if not isinstance(names[name], str)]
+    for pattern in patterns:
+        in_pattern = [name for name in _braced([pattern]) if name in listed]
+        for values in product(*(names[name] for name in in_pattern)):
+            files.append(pattern.format(**{**names, **dict(zip(in_pattern, values, strict=True))}))
+    return files if listed or len(patterns) > 1 else files[0]
 
 
 def build(builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any], arguments: Mapping[str, Any]) -> Any:
@@ -219,6 +232,7 @@ def _result(section: str, entry: Mapping) -> Result:
         only={key: tuple(members) for key, members in entry.get("only", {}).items()},
         needs=tuple(entry.get("needs", ())),
         paper=entry.get("paper", False),
+        after=entry.get("after", ""),
     )
 
 
@@ -229,17 +243,6 @@ def _input(argument: str, given: str | Mapping) -> Input:
     of_key = files if isinstance(files, Mapping) else {"": files}
     patterns = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in of_key.items()}
     return Input(argument, patterns, given.get("read", ""))
-
-
-def _expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
-    """Return the files of all combinations of the listed names; a path where nothing is listed."""
-    files = []
-    listed = [name for name in _braced(patterns) if not isinstance(names[name], str)]
-    for pattern in patterns:
-        in_pattern = [name for name in _braced([pattern]) if name in listed]
-        for values in product(*(names[name] for name in in_pattern)):
-            files.append(pattern.format(**{**names, **dict(zip(in_pattern, values, strict=True))}))
-    return files if listed or len(patterns) > 1 else files[0]
 
 
 def _braced(patterns: Iterable[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 _LINEMOD = (
     *("ape", "benchvise", "bowl", "camera", "can", "cat", "cup", "driller", "duck", "eggbox", "glue", "holepuncher"),
@@ -31,6 +32,12 @@ BOP_TITLES = {
 def plural(count: int | str, noun: str) -> str:
     """Return e.g. ``1 seed``, ``5 seeds`` or ``2 to 3 seeds``."""
     return f"{count} {noun}" if str(count) == "1" else f"{count} {noun}s"
+
+
+def span(numbers: Iterable[float]) -> str:
+    """Return the least and the largest of some whole numbers, such as ``15 to 200``, or the one that all are."""
+    distinct = sorted({int(number) for number in numbers})
+    return str(distinct[0]) if len(distinct) == 1 else f"{distinct[0]} to {distinct[-1]}"
 
 
 def dataset_in_words(name: str) -> str:

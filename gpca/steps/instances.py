@@ -17,11 +17,11 @@ def run(job: Job) -> None:
     """Read models and frames, back-project the masks and find the initial poses."""
     datasets = datasets_of(
         job.settings.get("datasets"),
-        job.folders.get("data_dir"),
-        Path(job.folders.get("downloads", "")),
+        job.data_dir,
+        job.downloads,
         job.get("scenes"),
     )
-    inputs = files_behind(job.settings.get("datasets"), job.folders.get("data_dir"), job.get("scenes"))
+    inputs = files_behind(job.settings.get("datasets"), job.data_dir, job.get("scenes"))
     initial_pose = InitialPoseSettings(**job.settings.get("initial_pose", {}))
     declared = {**job.settings, "surface_points": job.surface_points}
     with record_provenance([job.instances, job.objects], inputs, declared):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from gpca.objects.canonical import write_objects
 from gpca.objects.source import data_files, resolve, surfaces
 from gpca.process.job import Job
@@ -12,7 +10,7 @@ from gpca.process.provenance import record_provenance
 
 def run(job: Job) -> None:
     """Read the source's surfaces, sample them and write the canonical clouds."""
-    entry = resolve(job.settings, job.folders.get("data_dir"))
+    entry = resolve(job.settings, job.data_dir)
     declared = {"entry": entry, "surface_points": job.surface_points}
     with record_provenance([job.out], data_files(entry), declared):
-        write_objects(surfaces(entry, Path(job.folders.get("downloads", ""))), job.source, job.out, job.surface_points)
+        write_objects(surfaces(entry, job.downloads), job.source, job.out, job.surface_points)

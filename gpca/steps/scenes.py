@@ -21,7 +21,7 @@ def run(job: Job) -> None:
     given = dict(job.settings)
     datasets = given.pop("datasets", None)
     settings = SceneSettings.from_dict(given)
-    inputs = files_behind(datasets, job.folders.get("data_dir"), None) if datasets else []
+    inputs = files_behind(datasets, job.data_dir, None) if datasets else []
     with record_provenance([job.out], inputs, job.settings, folders=True):
         if datasets:
             write_scenes(_models(job, datasets), job.source, replace(settings, families=()), job.out)
@@ -39,7 +39,7 @@ def _models(job: Job, datasets: dict[str, dict]) -> list[Surface]:
         InputError: none is left.
     """
     models = []
-    found = datasets_of(datasets, job.folders.get("data_dir"), Path(job.folders.get("downloads", "")), None)
+    found = datasets_of(datasets, job.data_dir, job.downloads, None)
     for surface in distinct_surfaces(models_of(found)):
         try:
             model = simplified(surface)

@@ -20,7 +20,7 @@ from gpca.uncertainty.conditions import CONDITIONS, CORNERS, LATIN, SALTELLI, Re
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
 from gpca.uncertainty.remedies import RemedyRuns
 from gpca.uncertainty.settings import UncertaintySettings
-from gpca.uncertainty.spread import Outcome
+from gpca.uncertainty.spread import Spread
 
 STEP = 0.1  # a local derivative takes this step, in the knob's range
 KNOB_RANGE = np.subtract(UPPER, UNTOUCHED)
@@ -47,14 +47,14 @@ class Design:
         oracle: needs to know what was perturbed.
     """
 
-    evaluate: Callable[[Pair, np.ndarray, UncertaintySettings, np.random.Generator], list[Outcome]]
+    evaluate: Callable[[RegisteredRow, np.ndarray, UncertaintySettings, np.random.Generator], list[Spread]]
     conditions: tuple[str, ...]
     reference: int = 0
     splits: tuple[str, ...] = ("test",)
     oracle: bool = False
 
 
-class Pair:
+class RegisteredRow:
     """The clouds of one registration, in units of the diameter; the target's points come in random order."""
 
     def __init__(self, registrations: Registrations, row: int) -> None:
@@ -89,35 +89,35 @@ class Pair:
 
 
 def _additive(
-    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Outcome]:
+    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Spread]:
     runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
     return [runs(knobs) for knobs in ADDITIVE_KNOBS]
 
 
 def _sweep(
-    kind: str, pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Outcome]:
+    kind: str, pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Spread]:
     runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
     return [runs(Knobs(*knobs)) for knobs in (UNTOUCHED, *sample_knobs(kind))]
 
 
 def _observed(
-    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Outcome]:
+    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Spread]:
     return [KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)(UNTOUCHED)]
 
 
 def _removal(
-    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Outcome]:
+    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Spread]:
     runs = RemedyRuns(pair.source, pair.target, pair.T_init, pair.T_icp, xi_n_6, settings, random)
     return [runs(Remedies(*switches)) for switches in CORNERS]
 
 
 def _oracle(
-    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Outcome]:
+    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Spread]:
     runs = KnobRuns(*pair.clean(settings.icp_points), xi_n_6, settings, random)
     true = pair.true_knobs(settings)
     corners = [Knobs(*np.where(switches, true, UNTOUCHED)) for switches in CORNERS]
@@ -126,8 +126,8 @@ def _oracle(
 
 
 def _causal(
-    pair: Pair, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Outcome]:
+    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+) -> list[Spread]:
     n = settings.icp_points
     pairs = (pair.clean(n, 1), pair.clean(n, 2), pair.observed(n, random))
     return [KnobRuns(*clouds, xi_n_6, settings, random)(UNTOUCHED) for clouds in pairs]

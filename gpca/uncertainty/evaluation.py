@@ -9,7 +9,7 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
-from gpca.uncertainty.designs import DESIGNS, Pair
+from gpca.uncertainty.designs import DESIGNS, RegisteredRow
 from gpca.uncertainty.outcomes import Outcomes
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence
@@ -53,7 +53,7 @@ def evaluate_design(
     for i in progress(range(len(observed)), f"uncertainty ({design}) of {source}, seed {seed}"):
         axes = (source, seed, "uncertainty", observed.split[i], observed.sample[i])
         xi_n_6 = generator(*axes, "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
-        rows.append(entry.evaluate(Pair(observed, i), xi_n_6, settings, generator(*axes, "clouds")))
+        rows.append(entry.evaluate(RegisteredRow(observed, i), xi_n_6, settings, generator(*axes, "clouds")))
     columns = {
         name: np.array([[getattr(outcome, name) for outcome in row] for row in rows])
         for name in ("covariance", "residual", "degenerate", "icp_calls", "seconds", "icp_seconds")

@@ -19,7 +19,7 @@ from gpca.alignment.rigid import random_direction
 from gpca.errors import InputError
 from gpca.pairs.perturbation import within_half_space
 from gpca.uncertainty.settings import UncertaintySettings
-from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarise_runs
+from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_runs
 
 
 class Knobs(NamedTuple):
@@ -96,9 +96,9 @@ class KnobRuns:
         self._T_ref = T_ref
         self._settings = settings
         self._icp = BatchedICP(target, settings.icp)
-        self._seen: dict[Knobs, Outcome] = {}
+        self._seen: dict[Knobs, Spread] = {}
 
-    def __call__(self, knobs: Knobs) -> Outcome:
+    def __call__(self, knobs: Knobs) -> Spread:
         """Evaluate one setting; the outcome of one seen before costs nothing.
 
         Raises:
@@ -109,10 +109,10 @@ class KnobRuns:
         self._seen[knobs] = self._evaluate(knobs)
         return self._seen[knobs]
 
-    def _evaluate(self, knobs: Knobs) -> Outcome:
+    def _evaluate(self, knobs: Knobs) -> Spread:
         started = perf_counter()
         runs, source = self.runs(knobs)
-        return summarise_runs(runs, cKDTree(source), self._target, self._T_ref, self._settings, started)
+        return summarize_runs(runs, cKDTree(source), self._target, self._T_ref, self._settings, started)
 
     def runs(self, knobs: Knobs) -> tuple[Runs, np.ndarray]:
         """Run ICP from all starts under one setting, seen before or not; return the runs and the source (N, 3).

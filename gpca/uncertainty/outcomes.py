@@ -11,7 +11,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.axes import Axes
-from gpca.io.csv_file import numbers, read_csv, write_csv
+from gpca.io.csv_file import read_numbers, write_csv
 from gpca.pairs.dataset import Registrations
 
 
@@ -67,21 +67,12 @@ class Outcomes:
         """Read the npz; `axes` are the source and the seed that it has to be of.
 
         Raises:
-            InputError: the file is missing, damaged, of another source or seed, holds wrong shapes, NaN, or no samples.
+            InputError: the file is missing, damaged, of another source or seed, or holds wrong shapes or NaN.
         """
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys((field.name for field in fields(cls)), ("S", "K"))
         shapes |= {"sample": ("S",), "split": ("S",), "covariance": ("S", "K", 6, 6)}
         kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT, "icp_calls": WHOLE, "degenerate": "b"}
         arrays = load_arrays(path, shapes, "python -m gpca uncertainty", kinds, axes)
-        remedy = "regenerate it with 'python -m gpca uncertainty'"
-        if len(arrays["sample"]) == 0:
-            raise InputError(path, "has no samples", remedy)
-        for name, values in {
-            "covariance": np.diagonal(arrays["covariance"], axis1=2, axis2=3),
-            "icp_calls": arrays["icp_calls"],
-        }.items():
-            if (values < 0).any():
-                raise InputError(path, f"'{name}' contains impossible values", remedy)
         return cls(**{name: arrays[name] for name in shapes})
 
 
@@ -100,19 +91,13 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
     """Return seconds (S, K) and seconds inside ICP (S, K).
 
     Raises:
-        InputError: missing or damaged file, missing column, or other samples and conditions than the outcomes'.
+        InputError: missing or damaged file, or other samples than the outcomes'.
     """
-    rows = read_csv(path, ("sample", "split", "condition", "seconds", "icp_seconds"))
+    columns = ("sample", "split", "condition", "seconds", "icp_seconds")
+    rows = read_numbers(path, columns, ("seconds", "icp_seconds"))
     shape = outcomes.uncertainty.shape
-    remedy = "regenerate it with 'python -m gpca uncertainty'"
-    if len(rows) != np.prod(shape):
-        raise InputError(path, f"has {len(rows)} rows, not {shape[0]} samples × {shape[1]} conditions", remedy)
-    expected = {"sample": outcomes.sample[:, None], "split": outcomes.split[:, None], "condition": np.arange(shape[1])}
-    for name, values in expected.items():
-        found = (rows[name] if name == "split" else numbers(path, rows, name)).to_numpy().reshape(shape)
-        if not (found == values).all():
-            raise InputError(path, "its samples or conditions differ from those of the outcomes", remedy)
-    seconds, icp_seconds = (
-        numbers(path, rows, name, least=0).to_numpy().reshape(shape) for name in ("seconds", "icp_seconds")
-    )
-    return seconds, icp_seconds
+    of = {name: np.repeat(getattr(outcomes, name).astype(str), shape[1]) for name in ("sample", "split")}
+    if not all(np.array_equal(rows[name], values) for name, values in of.items()):
+        remedy = "regenerate it with 'python -m gpca uncertainty'"
+        raise InputError(path, "its samples differ from those of the outcomes", remedy)
+    return rows["seconds"].to_numpy().reshape(shape), rows["icp_seconds"].to_numpy().reshape(shape)

@@ -16,10 +16,10 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import transform
 from gpca.uncertainty.conditions import Remedies
 from gpca.uncertainty.settings import UncertaintySettings
-from gpca.uncertainty.spread import Outcome, Runs, run_from_starts, summarise_runs
+from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_runs
 
-NEIGHBOURS = 24  # so many span the plane that a point is moved to
-OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbour distance
+NEIGHBORS = 24  # so many span the plane that a point is moved to
+OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbor distance
 BROADER = 3.75  # spread of the restarts, in that of the other starts: the middle of the pose severities
 RESTARTS = 5  # the one with the lowest cost counts
 FEWEST_POINTS = 16  # where a trimmed target would have fewer, nothing is trimmed
@@ -52,7 +52,7 @@ class RemedyRuns:
         self._source = source[random.permutation(len(source))]
         self._target = target
 
-    def __call__(self, remedies: Remedies) -> Outcome:
+    def __call__(self, remedies: Remedies) -> Spread:
         """Evaluate one combination; what several share is worked out, and charged, once."""
         started = perf_counter()
         tree, points = self._denoised if remedies.denoise else self._observed
@@ -60,8 +60,8 @@ class RemedyRuns:
         xi_n_6 = BROADER * self._xi_n_6 if remedies.restart else self._xi_n_6
         runs = run_from_starts(icp, points[: self._settings.icp_points], self._T_init, xi_n_6)
         if remedies.restart:
-            runs = best_of_neighbours(runs, self._settings.icp.correspondence_distance)
-        return summarise_runs(runs, tree, target, self._T_icp, self._settings, started)
+            runs = best_of_neighbors(runs, self._settings.icp.correspondence_distance)
+        return summarize_runs(runs, tree, target, self._T_icp, self._settings, started)
 
     @cached_property
     def _observed(self) -> tuple[cKDTree, np.ndarray]:
@@ -84,19 +84,19 @@ class RemedyRuns:
 
 
 def denoise(points: np.ndarray) -> np.ndarray:
-    """Remove statistical outliers (Rusu et al. 2008) and move every other point onto the plane of its neighbours.
+    """Remove statistical outliers (Rusu et al. 2008) and move every other point onto the plane of its neighbors.
 
     The plane is that of least squares, moving least squares of order one (Alexa et al. 2003).
     """
-    neighbours = min(NEIGHBOURS, len(points))
-    distances, rows = cKDTree(points).query(points, neighbours)
+    neighbors = min(NEIGHBORS, len(points))
+    distances, rows = cKDTree(points).query(points, neighbors)
     mean_N = distances.mean(axis=1)
     kept = mean_N <= mean_N.mean() + OUTLIER_RATIO * mean_N.std()
     around_N_k_3 = points[rows[kept]]
-    centre_N_3 = around_N_k_3.mean(axis=1)
-    offset_N_k_3 = around_N_k_3 - centre_N_3[:, None]
+    center_N_3 = around_N_k_3.mean(axis=1)
+    offset_N_k_3 = around_N_k_3 - center_N_3[:, None]
     normal_N_3 = np.linalg.eigh(np.swapaxes(offset_N_k_3, 1, 2) @ offset_N_k_3)[1][:, :, 0]
-    height_N = np.einsum("ni,ni->n", points[kept] - centre_N_3, normal_N_3)
+    height_N = np.einsum("ni,ni->n", points[kept] - center_N_3, normal_N_3)
     return points[kept] - height_N[:, None] * normal_N_3
 
 
@@ -106,7 +106,7 @@ def trim(target: np.ndarray, aligned_source: np.ndarray, distance: float) -> np.
     return target[kept] if kept.sum() >= FEWEST_POINTS else target
 
 
-def best_of_neighbours(runs: Runs, distance: float) -> Runs:
+def best_of_neighbors(runs: Runs, distance: float) -> Runs:
     """Replace every run by the best of itself and the next ones, as if each result had come from `RESTARTS` starts."""
     cost_n = runs.cost_n(distance)
     rows_n_k = (np.arange(len(cost_n))[:, None] + np.arange(RESTARTS)) % len(cost_n)

@@ -72,7 +72,7 @@ def run_from_starts(icp: BatchedICP, source: np.ndarray, T_target_source_init: n
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Spread:
     """What is kept of one condition, e.g. one setting of the knobs.
 
     Attributes:
@@ -90,15 +90,15 @@ class Outcome:
     seconds: float
 
 
-def summarise_runs(
+def summarize_runs(
     runs: Runs,
     source_tree: cKDTree,
     target: np.ndarray,
     T_ref: np.ndarray,
     settings: UncertaintySettings,
     started: float,
-) -> Outcome:
-    """Summarise the runs of one condition.
+) -> Spread:
+    """Summarize the runs of one condition.
 
     Args:
         source_tree: of the source's points, in its own frame. target: (Q, 3) points whose residual counts.
@@ -106,7 +106,7 @@ def summarise_runs(
         started: the ``perf_counter`` at which the condition's work began.
     """
     best = runs.T_target_source_n[runs.cost_n(settings.icp.correspondence_distance).argmin()]
-    return Outcome(
+    return Spread(
         covariance=runs.covariance(T_ref),
         residual=log_residual(transform(inverse(best), target), source_tree),
         degenerate=runs.degenerate(settings.floor),

@@ -25,7 +25,7 @@ def make_pool(n=40, seed=0, **given):
         "h_N_d": random.normal(size=(n, 4)).astype(np.float32),
         "scores_N_C": random.dirichlet(np.ones(3), n),
         "bald_N": random.uniform(size=n),
-        "h_labelled_L_d": random.normal(size=(5, 4)).astype(np.float32),
+        "h_labeled_L_d": random.normal(size=(5, 4)).astype(np.float32),
         "truth_N": np.array(["noise", "pose", "overlap"])[np.arange(n) % 3],
     }
     return Pool(**columns | given)
@@ -35,10 +35,10 @@ def selected(name, pool, batch, seed=1):
     return select(name, pool, batch, np.random.default_rng(seed)).tolist()
 
 
-def around(centres, each, seed=0):
-    """Tight clusters of `each` points, the points of a centre together."""
-    centres = np.repeat(np.asarray(centres, float), each, axis=0)
-    return centres + 0.01 * np.random.default_rng(seed).normal(size=centres.shape)
+def around(centers, each, seed=0):
+    """Tight clusters of `each` points, the points of a center together."""
+    centers = np.repeat(np.asarray(centers, float), each, axis=0)
+    return centers + 0.01 * np.random.default_rng(seed).normal(size=centers.shape)
 
 
 @every_strategy
@@ -65,20 +65,20 @@ def test_a_pool_no_larger_than_the_batch_is_taken_whole(name, n):
     assert sorted(selected(name, make_pool(n), 4)) == list(range(n))
 
 
-def identical_samples(labelled):
+def identical_samples(labeled):
     return make_pool(
         h_N_d=np.ones((40, 4)),
         scores_N_C=np.full((40, 3), 1 / 3),
         bald_N=np.zeros(40),
-        h_labelled_L_d=np.full((5, 4), labelled),
+        h_labeled_L_d=np.full((5, 4), labeled),
     )
 
 
 @every_strategy
-@pytest.mark.parametrize("labelled", [0.0, 1.0], ids=["labelled elsewhere", "labelled the same"])
+@pytest.mark.parametrize("labeled", [0.0, 1.0], ids=["labeled elsewhere", "labeled the same"])
 @pytest.mark.filterwarnings("ignore:Number of distinct clusters")
-def test_identical_samples_still_give_different_rows(name, labelled):
-    assert len(set(selected(name, identical_samples(labelled), 4))) == 4
+def test_identical_samples_still_give_different_rows(name, labeled):
+    assert len(set(selected(name, identical_samples(labeled), 4))) == 4
 
 
 def test_an_unknown_strategy_is_named_with_the_known():
@@ -120,16 +120,16 @@ def test_the_most_uncertain_are_taken_most_uncertain_first(name, best_first):
 @pytest.mark.parametrize("batch", [2, 3, 5])
 @pytest.mark.parametrize("seed", range(3))
 def test_bald_kmeans_takes_the_middle_of_each_cluster_of_uncertain_samples(batch, seed):
-    centres = 20 * np.eye(6)[:batch]
-    uncertain, certain = around(centres, EXPANSION, seed), around(-20 * np.eye(6), 5)
+    centers = 20 * np.eye(6)[:batch]
+    uncertain, certain = around(centers, EXPANSION, seed), around(-20 * np.eye(6), 5)
     random = np.random.default_rng(seed)
     order = random.permutation(len(uncertain) + len(certain))
     h = np.concatenate([uncertain, certain])[order]
     high = np.concatenate([np.ones(len(uncertain)), np.zeros(len(certain))])[order]
     pool = make_pool(len(h), h_N_d=h, bald_N=high + 0.1 * random.uniform(size=len(h)))
     expected = set()
-    for centre in centres:
-        members = np.flatnonzero(np.linalg.norm(h - centre, axis=1) < 1)
+    for center in centers:
+        members = np.flatnonzero(np.linalg.norm(h - center, axis=1) < 1)
         expected.add(int(members[np.linalg.norm(h[members] - h[members].mean(axis=0), axis=1).argmin()]))
     assert set(selected("bald_kmeans", pool, batch, seed)) == expected
 
@@ -164,9 +164,9 @@ def test_random_stratified_takes_more_of_the_others_where_a_class_runs_out():
     assert counts == {"noise": 4, "pose": 4, "overlap": 1}
 
 
-def test_coreset_takes_the_point_farthest_from_all_labelled_then_from_that_too():
+def test_coreset_takes_the_point_farthest_from_all_labeled_then_from_that_too():
     h = around([[0, 0], [5, 0], [0, 9]], 10)
-    pool = make_pool(30, h_N_d=h, h_labelled_L_d=np.zeros((2, 2)))
+    pool = make_pool(30, h_N_d=h, h_labeled_L_d=np.zeros((2, 2)))
     rows = selected("coreset", pool, 2)
     assert rows[0] == np.linalg.norm(h, axis=1).argmax()
     assert rows[1] in range(10, 20)
@@ -174,7 +174,7 @@ def test_coreset_takes_the_point_farthest_from_all_labelled_then_from_that_too()
 
 def test_typiclust_takes_typical_samples_of_the_largest_clusters_without_a_label():
     h = around([[0, 0], [30, 0], [0, 30], [30, 30]], 12)[:42]  # the last cluster is the smallest
-    pool = make_pool(42, h_N_d=h, h_labelled_L_d=around([[0, 0], [30, 0]], 1))
+    pool = make_pool(42, h_N_d=h, h_labeled_L_d=around([[0, 0], [30, 0]], 1))
     chosen = [selected("typiclust", pool, 2, seed) for seed in range(20)]
     # k-means starts anywhere, so it does not find the four every time.
     blocks = Counter(row // 12 for rows in chosen for row in rows)

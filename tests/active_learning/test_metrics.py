@@ -55,12 +55,12 @@ def test_the_area_is_the_mean_accuracy_over_the_budget(accuracies, area):
 
 
 def test_the_delay_counts_from_the_first_arrival_of_the_new_concept():
-    # Recognised at 10 already, by chance, before any of it was there.
+    # Recognized at 10 already, by chance, before any of it was there.
     metrics = stream_metrics(frame(stream_curve(0.0, 0.6, 0.1, 0.4, 0.5, 0.2)))
     assert (metrics["delay"], metrics["recognised"], metrics["labels"]) == (20, 1, 5)
 
 
-def test_a_concept_that_is_never_recognised_has_the_rest_of_the_stream_as_its_delay():
+def test_a_concept_that_is_never_recognized_has_the_rest_of_the_stream_as_its_delay():
     metrics = stream_metrics(frame(stream_curve(0.0, 0.9, 0.1, 0.4)))
     assert (metrics["delay"], metrics["recognised"]) == (10, 0)
 
@@ -108,10 +108,6 @@ def test_metrics_are_tidy_and_gains_are_paired_with_random_of_the_same_start(fil
         (
             "setting,held_out,labels,accuracy,accuracy_new\na,b,0,x,1\n",
             r"'accuracy' contains values that are not finite",
-        ),
-        (
-            "setting,held_out,labels,accuracy,accuracy_new\na,b,0,inf,1\n",
-            r"'accuracy' contains values that are not fin",
         ),
     ],
 )

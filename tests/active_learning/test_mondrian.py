@@ -3,12 +3,12 @@ import pytest
 
 from gpca.active_learning.mondrian import MondrianForest
 
-CENTRES = np.array([[0.0, 0], [4, 0], [0, 4]])
+CENTERS = np.array([[0.0, 0], [4, 0], [0, 4]])
 
 
 def blobs(n, seed):
     label_N = np.arange(n) % 3
-    return CENTRES[label_N] + np.random.default_rng(seed).normal(size=(n, 2)), label_N
+    return CENTERS[label_N] + np.random.default_rng(seed).normal(size=(n, 2)), label_N
 
 
 def forest(x_N_D, label_N, order=None, seed=0, trees=20, first=None):

@@ -20,9 +20,9 @@ TIMES = ("select_s", "retrain_s")
 def embedded(registrations):
     """The registrations, with an embedding that tells their concepts apart."""
     random = np.random.default_rng(0)
-    centres = 4 * random.normal(size=(3, 8))
+    centers = 4 * random.normal(size=(3, 8))
     concept_S = [CONCEPTS.index(concept) for concept in registrations.concept]
-    embedding = centres[concept_S] + random.normal(size=(len(registrations), 8))
+    embedding = centers[concept_S] + random.normal(size=(len(registrations), 8))
     return dataclasses.replace(registrations, attached={"embedding": embedding})
 
 
@@ -36,7 +36,7 @@ def task(embedded, gpc):
     return make_task(embedded, "overlap", SETTINGS, "tiny", 0).project(gpc)
 
 
-def learnt(task, gpc, strategy="bald_kmeans", **changed):
+def learned(task, gpc, strategy="bald_kmeans", **changed):
     """The steps of a run as a column per key, without the times."""
     steps = run_rounds(task, gpc, strategy, dataclasses.replace(SETTINGS, **changed), "tiny", 0)
     return {name: [step[name] for step in steps] for name in steps[0] if name not in TIMES}
@@ -141,12 +141,12 @@ def test_the_first_classifier_knows_two_concepts_of_three(task, gpc):
     ],
 )
 def test_labels_are_spent_by_the_batch_up_to_the_budget_or_the_pools_end(task, gpc, labels, batch, expected):
-    assert learnt(task, gpc, "random", labels=labels, batch=batch)["labels"] == expected
+    assert learned(task, gpc, "random", labels=labels, batch=batch)["labels"] == expected
 
 
 @pytest.mark.parametrize("strategy", ["random", "bald_kmeans", "coreset"])
-def test_the_concept_held_out_is_learnt(task, gpc, strategy):
-    steps = learnt(task, gpc, strategy)
+def test_the_concept_held_out_is_learned(task, gpc, strategy):
+    steps = learned(task, gpc, strategy)
     assert (steps["accuracy_new"][0], steps["accuracy_new"][-1]) == (0.0, 1.0)
     assert steps["accuracy"][-1] > 0.9
     assert steps["epochs"][0] == 0
@@ -155,7 +155,7 @@ def test_the_concept_held_out_is_learnt(task, gpc, strategy):
 
 def test_learning_the_whole_pool_does_not_depend_on_its_order(task, gpc):
     one, other = (
-        learnt(task, gpc, strategy, labels=24, tolerance=1e-8, iterations=500) for strategy in ("random", "bald")
+        learned(task, gpc, strategy, labels=24, tolerance=1e-8, iterations=500) for strategy in ("random", "bald")
     )
     for name in ("labels", "new_labels", "accuracy", "accuracy_new"):
         assert one[name][-1] == other[name][-1]
@@ -163,13 +163,13 @@ def test_learning_the_whole_pool_does_not_depend_on_its_order(task, gpc):
 
 def test_the_classifier_given_is_left_as_it_was(task, gpc):
     before = [array.tobytes() for array in gpc.attribute(task.test.h)]
-    learnt(task, gpc)
+    learned(task, gpc)
     assert [array.tobytes() for array in gpc.attribute(task.test.h)] == before
 
 
 @pytest.mark.parametrize("strategy", ["random", "bald_stochastic", "badge", "typiclust"])
 def test_the_same_axes_give_the_same_curve(task, gpc, strategy):
-    assert learnt(task, gpc, strategy) == learnt(task, gpc, strategy)
+    assert learned(task, gpc, strategy) == learned(task, gpc, strategy)
 
 
 def recorded_queries(monkeypatch):
@@ -187,26 +187,26 @@ def recorded_queries(monkeypatch):
 
 def test_new_labels_are_those_of_the_concept_held_out(monkeypatch, task, gpc):
     queries = recorded_queries(monkeypatch)
-    steps = learnt(task, gpc, "random", labels=24, batch=3)
+    steps = learned(task, gpc, "random", labels=24, batch=3)
     new = [int(np.sum(pool.truth_N[rows] == "overlap")) for pool, rows in queries]
     assert steps["new_labels"] == [0, *np.cumsum(new)]
     assert steps["new_labels"][-1] == 12
 
 
-def test_what_was_asked_about_leaves_the_pool_and_joins_the_labelled(monkeypatch, task, gpc):
+def test_what_was_asked_about_leaves_the_pool_and_joins_the_labeled(monkeypatch, task, gpc):
     queries = recorded_queries(monkeypatch)
-    learnt(task, gpc, "bald")
+    learned(task, gpc, "bald")
     assert [len(pool.h_N_d) for pool, _ in queries] == [24, 20, 16]
-    assert [len(pool.h_labelled_L_d) for pool, _ in queries] == [12, 16, 20]
+    assert [len(pool.h_labeled_L_d) for pool, _ in queries] == [12, 16, 20]
     for (pool, rows), (later, _) in pairwise(queries):
-        assert np.array_equal(later.h_labelled_L_d[-4:], pool.h_N_d[rows])
+        assert np.array_equal(later.h_labeled_L_d[-4:], pool.h_N_d[rows])
         assert np.array_equal(later.h_N_d, np.delete(pool.h_N_d, rows, axis=0))
         assert np.array_equal(later.truth_N, np.delete(pool.truth_N, rows))
 
 
 def test_a_strategy_is_shown_what_the_classifier_makes_of_the_pool(monkeypatch, task, gpc):
     queries = recorded_queries(monkeypatch)
-    learnt(task, gpc, "bald", labels=4)
+    learned(task, gpc, "bald", labels=4)
     scores, _, bald = gpc.attribute(task.pool.h)
     assert np.array_equal(queries[0][0].scores_N_C, scores)
     assert np.array_equal(queries[0][0].bald_N, bald)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.active_learning.acquisition import STREAMS
-from gpca.active_learning.rounds import Samples, Task, initial_gpc
+from gpca.active_learning.rounds import LabelingTask, Samples, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream import arrival_order, run_stream
 from gpca.classifier.settings import GPCSettings
@@ -14,21 +14,21 @@ from gpca.pairs.perturbation import CONCEPTS
 QUICK = GPCSettings(learning_rate=0.05, iterations=30, inducing=12, draws=100)
 SETTINGS = ActiveLearningSettings(gpc=QUICK)
 STREAM = StreamSettings(arrivals=90, quiet=30, budget=0.2, window=20, every=15)
-CENTRES = 4 * np.random.default_rng(0).normal(size=(3, 8))
+CENTERS = 4 * np.random.default_rng(0).normal(size=(3, 8))
 
 both = pytest.mark.parametrize("strategy", ["stream_random", "stream_bald"])
 
 
 def blobs(n, seed, concepts=CONCEPTS):
     concept_N = np.array(concepts)[np.arange(n) % len(concepts)]
-    centres_N_d = CENTRES[[CONCEPTS.index(concept) for concept in concept_N]]
-    return Samples(centres_N_d + np.random.default_rng(seed).normal(size=(n, 8)), concept_N)
+    centers_N_d = CENTERS[[CONCEPTS.index(concept) for concept in concept_N]]
+    return Samples(centers_N_d + np.random.default_rng(seed).normal(size=(n, 8)), concept_N)
 
 
 @pytest.fixture(scope="module")
 def plain():
     """120 samples of known concepts and 60 of the new one to arrive."""
-    return Task("overlap", blobs(40, 1, ("noise", "pose")), blobs(180, 2), blobs(60, 3))
+    return LabelingTask("overlap", blobs(40, 1, ("noise", "pose")), blobs(180, 2), blobs(60, 3))
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def test_the_same_axes_give_the_same_rows(task, gpc, strategy):
 
 
 @pytest.mark.parametrize("strategy", sorted(STREAMS.keys() - {"stream_random"}))
-def test_the_new_concept_is_recognised_once_it_was_asked_about(task, gpc, strategy):
+def test_the_new_concept_is_recognized_once_it_was_asked_about(task, gpc, strategy):
     rows = run(task, gpc, strategy)
     assert rows["new_labels"][:3] == [0, 0, 0]
     assert 0 < rows["new_labels"][-1] < rows["labels"][-1]
@@ -119,7 +119,7 @@ def test_the_new_concept_is_recognised_once_it_was_asked_about(task, gpc, strate
     assert rows["accuracy"][-1] > 0.9
 
 
-def test_the_running_accuracy_falls_as_the_new_concept_arrives_and_rises_as_it_is_learnt(task, gpc):
+def test_the_running_accuracy_falls_as_the_new_concept_arrives_and_rises_as_it_is_learned(task, gpc):
     running = run(task, gpc, "stream_bald", every=10)["running"]
     assert running[3] == 1.0  # at the end of the quiet
     assert min(running[4:7]) < 0.9
@@ -135,7 +135,7 @@ def test_the_running_accuracy_is_that_of_the_last_window(task, gpc):
     )
 
 
-def test_where_nothing_is_asked_nothing_is_learnt(task, gpc):
+def test_where_nothing_is_asked_nothing_is_learned(task, gpc):
     rows = run(task, gpc, "stream_random", budget=1e-9)
     for name, value in (("labels", 0), ("new_labels", 0), ("accuracy_new", 0.0), ("accuracy", rows["accuracy"][0])):
         assert rows[name] == [value] * 7

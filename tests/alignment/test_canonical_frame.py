@@ -13,7 +13,7 @@ BOX[:2] = (0, 0, 0), (0.3, 0.4, 1.2)
 
 def test_origin_and_unit_are_those_of_the_training():
     frame = CanonicalFrame.of(BOX + 5)
-    np.testing.assert_allclose(frame.centre_3, 5 + np.array([0.15, 0.2, 0.6]))
+    np.testing.assert_allclose(frame.center_3, 5 + np.array([0.15, 0.2, 0.6]))
     assert frame.diameter == pytest.approx(1.3)
     inside = frame.coordinates(BOX + 5)
     np.testing.assert_allclose(inside.min(axis=0), -inside.max(axis=0))

@@ -113,7 +113,7 @@ def test_what_the_suite_writes_is_collected(tmp_path):
     assert value(metrics, "icp_calls") == 3.5
 
 
-def test_a_swapped_predictor_is_right_once_relabelled():
+def test_a_swapped_predictor_is_right_once_relabeled():
     true = np.array([*["noise"] * 10, *["pose"] * 12, *["overlap"] * 8])
     turned = np.select([true == "noise", true == "pose"], ["pose", "overlap"], "noise")
     for predicted, plain, permuted in ((true, 1, 1), (turned, 0, 1)):

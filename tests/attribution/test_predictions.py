@@ -81,70 +81,34 @@ def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("sample,split,icp_seconds\n3,test,0.5\n", "column 'seconds' is missing"),
-        (
-            "sample,split,seconds,icp_seconds\n3,test,soon,0.5\n",
-            "'seconds' contains values that are not finite numbers",
-        ),
-        ("sample,split,seconds,icp_seconds\n3,test,0.5,\n", "'icp_seconds' contains values that are not finite"),
-    ],
-)
-def test_faulty_timings_are_refused_in_one_line(tmp_path, text, expected):
-    path = tmp_path / "seed0.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=expected) as caught:
-        read_timings(path, SimpleNamespace(sample=np.array([3]), split=np.array(["test"])))
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
     ("columns", "expected"),
     [
-        ({"concept_true": "dust"}, "unknown concept 'dust' in 'concept_true'"),
-        ({"concept_predicted": ""}, "unknown concept ''"),
-        ({"abstained": "perhaps"}, "'abstained'"),
-        ({"split": "validation"}, "'split'"),
+        ({"concept_true": "dust"}, "unknown concept 'dust'"),
         ({"sample": 7}, "sample twice"),
-        ({"score_pose": "high"}, "'score_pose'"),
         ({"score_pose": np.nan}, "'score_pose'"),
         ({"variance_pose": "wide"}, "'variance_pose'"),
         ({"icp_calls": "many"}, "'icp_calls'"),
-        ({"icp_calls": np.nan}, "'icp_calls'"),
-        ({"icp_calls": -1}, "'icp_calls' contains numbers below 0"),
-        ({"variance_pose": -0.1}, "'variance_pose' contains numbers below 0"),
-        ({"score_pose": np.inf}, "'score_pose'"),
+        ({"score": 0.5}, "column 'score' is unknown"),
     ],
 )
 def test_faulty_predictions_are_refused(tmp_path, columns, expected):
     path = prediction_file(tmp_path / "seed0.csv", **columns)
     with pytest.raises(InputError, match=expected) as caught:
         read_predictions(path)
-    assert str(path) in str(caught.value)
+    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
 
 
 def test_a_variance_may_be_empty_and_an_abstained_sample_needs_neither_concept_nor_scores(tmp_path):
     path = prediction_file(
         tmp_path / "seed0.csv",
         concept_predicted=["", *["pose"] * 4],
-        abstained=["True", "False", "0", "0", "false"],
+        abstained=["True", *["False"] * 4],
         score_noise=["", 0.1, 0.1, 0.1, 0.1],
         variance_noise=[np.nan, 0.1, 0.1, 0.1, 0.1],
     )
     rows = read_predictions(path)
     assert rows["abstained"].tolist() == [True, False, False, False, False]
     assert rows["score_noise"].isna().tolist() == rows["variance_noise"].isna().tolist() == rows["abstained"].tolist()
-
-
-@pytest.mark.parametrize(
-    "column", ["sample", "split", "object", "concept_true", "concept_predicted", "abstained", "icp_calls"]
-)
-def test_a_missing_column_is_named(tmp_path, column):
-    path = prediction_file(tmp_path / "seed0.csv")
-    pd.read_csv(path).drop(columns=column).to_csv(path, index=False)
-    with pytest.raises(InputError, match=f"column '{column}' is missing"):
-        read_predictions(path)
 
 
 @pytest.mark.parametrize(
@@ -168,23 +132,6 @@ def test_unreadable_files_are_refused_in_one_line(tmp_path, content, expected):
     with pytest.raises(InputError, match=expected) as caught:
         read_csv(path, ("sample", "seconds"))
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("columns", "expected"),
-    [
-        ({"object": ["cat", "cat", "", "cat", "cat"]}, "line 4: column 'object' contains an empty name"),
-        ({"object": ["cat", "cat", "c\nat", "cat", "cat"]}, "column 'object' contains a line break"),
-        ({"split": "tset"}, "line 2: column 'split' contains a split that is neither"),
-        ({"score": 0.5}, "column 'score' is unknown"),
-        ({"score_": 0.5}, "column 'score_' is unknown"),
-    ],
-)
-def test_predictions_that_no_explainer_makes_are_refused(tmp_path, columns, expected):
-    path = prediction_file(tmp_path / "seed0.csv", **columns)
-    with pytest.raises(InputError, match=expected) as caught:
-        read_predictions(path)
-    assert str(caught.value).endswith("regenerate it")
 
 
 def test_a_file_may_have_further_columns_where_its_reader_knows_them(tmp_path):

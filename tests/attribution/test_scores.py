@@ -3,21 +3,21 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gpca.attribution.scores import Attribution, entropy, summarise_draws, summarise_marginals
+from gpca.attribution.scores import Attribution, entropy, summarize_draws, summarize_marginals
 from gpca.pairs.perturbation import CONCEPTS
 
 
 def attribution(n, seed=0, **changed):
     random = np.random.default_rng(seed)
-    scores, variances, bald = summarise_draws(random.normal(size=(50, n, 3)))
+    scores, variances, bald = summarize_draws(random.normal(size=(50, n, 3)))
     zeros = np.zeros(n)
     made = Attribution(CONCEPTS, scores, variances, bald, zeros.astype(bool), zeros.astype(int), zeros, zeros)
     return dataclasses.replace(made, **changed)
 
 
-def test_draws_are_summarised_as_the_paper_writes():
+def test_draws_are_summarized_as_the_paper_writes():
     logits_M_N_C = np.random.default_rng(0).normal(scale=3, size=(40, 5, 3))
-    scores, variances, bald = summarise_draws(logits_M_N_C)
+    scores, variances, bald = summarize_draws(logits_M_N_C)
     for n in range(5):
         draws = []
         for m in range(40):  # Eq. 2
@@ -34,13 +34,13 @@ def test_draws_are_summarised_as_the_paper_writes():
 
 @pytest.mark.parametrize("logits", [[0.0, 0.0, 0.0], [2.0, -1.0, 0.5], [900.0, 0.0, -900.0]])
 def test_draws_that_agree_leave_no_epistemic_uncertainty(logits):
-    _, variances, bald = summarise_draws(np.tile(logits, (60, 2, 1)))
+    _, variances, bald = summarize_draws(np.tile(logits, (60, 2, 1)))
     assert np.abs(variances).max() < 1e-12
     assert np.abs(bald).max() < 1e-12
 
 
 def test_draws_that_disagree_confidently_have_bald_of_log_c():
-    scores, variances, bald = summarise_draws(1000.0 * np.eye(3)[np.arange(60) % 3][:, None])
+    scores, variances, bald = summarize_draws(1000.0 * np.eye(3)[np.arange(60) % 3][:, None])
     assert scores[0] == pytest.approx(1 / 3)
     assert variances[0] == pytest.approx(1 / 3 * 2 / 3)
     assert bald[0] == pytest.approx(np.log(3))
@@ -48,7 +48,7 @@ def test_draws_that_disagree_confidently_have_bald_of_log_c():
 
 def test_a_constant_added_to_all_logits_changes_nothing():
     logits = np.random.default_rng(0).normal(size=(10, 4, 3))
-    for one, other in zip(summarise_draws(logits), summarise_draws(logits + 1e4), strict=True):
+    for one, other in zip(summarize_draws(logits), summarize_draws(logits + 1e4), strict=True):
         assert np.allclose(one, other, atol=1e-9)
 
 
@@ -62,7 +62,7 @@ def test_the_largest_score_names_the_concept_and_ties_go_to_the_first():
     assert made.predicted_N.tolist() == ["overlap", "noise", "pose", "noise", ""]
 
 
-def test_entropy_is_that_of_the_normalised_scores():
+def test_entropy_is_that_of_the_normalized_scores():
     made = attribution(2, scores_N_C=np.array([[2.0, 2.0, 0.0], [5.0, 0.0, 0.0]]))
     assert made.entropy_N == pytest.approx([np.log(2), 0])
 
@@ -73,11 +73,11 @@ def marginals(n, seed=0):
 
 
 @pytest.mark.parametrize("block", [1, 7, 1000])
-def test_marginals_are_summarised_as_the_draws_they_stand_for(block):
+def test_marginals_are_summarized_as_the_draws_they_stand_for(block):
     mean, deviation, normal = marginals(20)
     draws = mean + deviation * normal[:, None]
     for of_draws, of_marginals in zip(
-        summarise_draws(draws), summarise_marginals(mean, deviation, normal, block), strict=True
+        summarize_draws(draws), summarize_marginals(mean, deviation, normal, block), strict=True
     ):
         assert of_marginals.shape == of_draws.shape
         assert np.abs(of_marginals - of_draws).max() < 1e-12
@@ -85,19 +85,19 @@ def test_marginals_are_summarised_as_the_draws_they_stand_for(block):
 
 @pytest.mark.parametrize("block", [2, 7, 1000])
 def test_the_block_size_changes_no_bit(block):
-    whole, parts = summarise_marginals(*marginals(20)), summarise_marginals(*marginals(20), block)
+    whole, parts = summarize_marginals(*marginals(20)), summarize_marginals(*marginals(20), block)
     for one, other in zip(whole, parts, strict=True):
         assert np.array_equal(one, other)
 
 
 def test_no_points_have_an_empty_summary():
-    shapes = [summary.shape for summary in summarise_marginals(*marginals(0))]
+    shapes = [summary.shape for summary in summarize_marginals(*marginals(0))]
     assert shapes == [(0, 3), (0, 3), (0,)]
 
 
 def test_marginals_without_deviation_have_the_softmax_of_their_mean_and_no_bald():
     mean, deviation, normal = marginals(20)
-    scores, variances, bald = summarise_marginals(mean, 0 * deviation, normal)
+    scores, variances, bald = summarize_marginals(mean, 0 * deviation, normal)
     assert scores == pytest.approx(np.exp(mean) / np.exp(mean).sum(axis=1, keepdims=True))
     assert np.abs(variances).max() < 1e-12
     assert np.abs(bald).max() < 1e-12

@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 from baselines.analytical import AnalyticalGPC
-from baselines.registry import explainer_entry
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.settings import check_settings
+from gpca.explainers.registry import explainer_entry, require_settings
 
 QUICK = {"learning_rate": 0.1, "iterations": 60, "inducing": 16, "draws": 200, "shape_points": 64}
 NAMES = ("analytical_gpc", "analytical_gpc_no_counts")
@@ -45,11 +44,11 @@ def test_the_points_drawn_are_named_by_split_and_sample(registrations):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_config_may_set_what_the_classifier_and_the_features_take(name):
-    check_settings({"shape_points": 64, "neighbours": 8, **vars(GPCSettings())}, "explainers", name)
+    require_settings(name, {"shape_points": 64, "neighbours": 8, **vars(GPCSettings())})
     for fault, message in (
-        ({"neighbours": 2}, "setting neighbours: 2 is less than the minimum"),
+        ({"neighbours": 2}, "setting neighbours: 2 should be greater than or equal to 4"),
         ({"kernel": "linear"}, "setting kernel"),
         ({"point_counts": True}, "setting point_counts: unknown"),
     ):
         with pytest.raises(InputError, match=message):
-            check_settings(fault, "explainers", name)
+            require_settings(name, fault)

@@ -3,12 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry
 from baselines.residuals import FLOOR, features, log_residual
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.pairs.dataset import ragged
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.settings import check_settings
 from gpca.uncertainty.spread import SMALLEST_RESIDUAL
 
 RIVALS = ("residuals_logistic", "residuals_forest", "residuals_rules")
@@ -104,8 +103,8 @@ def test_a_covariance_of_nan_or_none_at_all_is_refused(attached):
 
 
 def test_the_config_may_set_what_they_take():
-    check_settings({"inverse_regularisation": 0.1, "floor": 1e-5}, "explainers", "residuals_logistic")
-    check_settings({"trees": 20, "floor": 1e-5}, "explainers", "residuals_forest")
-    check_settings({"depth": 2, "smallest_leaf": 0.1, "floor": 1e-5}, "explainers", "residuals_rules")
+    require_settings("residuals_logistic", {"inverse_regularisation": 0.1, "floor": 1e-5})
+    require_settings("residuals_forest", {"trees": 20, "floor": 1e-5})
+    require_settings("residuals_rules", {"depth": 2, "smallest_leaf": 0.1, "floor": 1e-5})
     with pytest.raises(InputError, match="setting floor"):
-        check_settings({"floor": 0}, "explainers", "residuals_forest")
+        require_settings("residuals_forest", {"floor": 0})

@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry
 from baselines.rules import ResidualRules
 from gpca.errors import InputError
-from gpca.settings import check_settings
+from gpca.explainers.registry import explainer_entry, require_settings
 
 
 @pytest.fixture(scope="module")
@@ -58,4 +57,4 @@ def test_it_reads_the_observed_pair_alone_so_that_controls_can_run_it():
 @pytest.mark.parametrize("wrong", [{"depth": 0}, {"smallest_leaf": 0.6}, {"smallest_leaf": 0}, {"leaves": 3}])
 def test_a_tree_that_cannot_be_is_refused(wrong):
     with pytest.raises(InputError, match="setting"):
-        check_settings(wrong, "explainers", "residuals_rules")
+        require_settings("residuals_rules", wrong)

@@ -31,17 +31,17 @@ class LatentGPs(gpytorch.models.ApproximateGP):
 
 
 def fit(kernel, inducing_M_d, inputs_N_d, targets_N, iterations, learning_rate):
-    """Maximise the ELBO with Adam from torch's global generator; return the model and the losses."""
+    """Maximize the ELBO with Adam from torch's global generator; return the model and the losses."""
     model = LatentGPs(kernel, inducing_M_d)
     likelihood = Softmax(num_classes=model.covar_module.batch_shape[0], mixing_weights=False)
     elbo = gpytorch.mlls.VariationalELBO(likelihood, model, num_data=len(targets_N))
-    optimiser = torch.optim.Adam(model.parameters(), lr=learning_rate)
+    optimizer = torch.optim.Adam(model.parameters(), lr=learning_rate)
     model.train()
     losses = []
     for _ in range(iterations):
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         loss = -elbo(model(inputs_N_d), targets_N)
         loss.backward()
-        optimiser.step()
+        optimizer.step()
         losses.append(loss.item())
     return model.eval(), losses

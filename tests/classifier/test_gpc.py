@@ -12,13 +12,13 @@ from gpca.errors import InputError
 
 CLASSES = ("noise", "pose", "overlap")
 QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)
-CENTRES = 3 * np.random.default_rng(0).normal(size=(3, 16))
+CENTERS = 3 * np.random.default_rng(0).normal(size=(3, 16))
 
 
 def blobs(n, seed):
     """Three Gaussian blobs in 16 dimensions, and the blob of each point."""
     blob = np.arange(n) % 3
-    return CENTRES[blob] + np.random.default_rng(seed).normal(size=(n, 16)), np.array(CLASSES)[blob]
+    return CENTERS[blob] + np.random.default_rng(seed).normal(size=(n, 16)), np.array(CLASSES)[blob]
 
 
 def fitted(h, labels, settings=QUICK, seed=0):
@@ -39,7 +39,7 @@ def gpc():
 
 
 @pytest.mark.parametrize("kernel", COVARIANCES)
-def test_separated_blobs_are_learnt(kernel):
+def test_separated_blobs_are_learned(kernel):
     settings = GPCSettings(kernel, learning_rate=0.05, iterations=40, inducing=12, draws=200)
     assert np.mean(predicted(fitted(H, LABELS, settings), H_TEST) == LABELS_TEST) > 0.95
 
@@ -69,7 +69,7 @@ def test_scores_alone_are_those_of_the_attribution(gpc):
 
 
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0]])
-def test_one_labelled_sample_of_each_class_is_enough_to_tell_them_apart(order):
+def test_one_labeled_sample_of_each_class_is_enough_to_tell_them_apart(order):
     # As many samples as classes: gpytorch's own likelihood would read them transposed.
     labels = np.array(CLASSES)[order]
     assert predicted(fitted(H[:3], labels), H[:3]).tolist() == labels.tolist()
@@ -154,7 +154,7 @@ def accuracy(gpc, h, labels):
 
 
 @pytest.mark.parametrize("kernel", COVARIANCES)
-def test_labels_of_the_missing_class_make_it_recognised(kernel):
+def test_labels_of_the_missing_class_make_it_recognized(kernel):
     gpc = fitted_without_overlap(GPCSettings(kernel, learning_rate=0.05, iterations=40, inducing=12, draws=200))
     assert "overlap" not in predicted(gpc, H_TEST)
     gpc.level()
@@ -202,7 +202,7 @@ def test_what_changes_a_classifier_leaves_an_earlier_copy_as_it_was(change):
 
 
 @pytest.mark.parametrize("kernel", COVARIANCES)
-def test_a_class_added_later_costs_the_others_nothing_and_is_learnt(kernel):
+def test_a_class_added_later_costs_the_others_nothing_and_is_learned(kernel):
     fourth = np.full(16, 3.0) * np.random.default_rng(4).choice([-1, 1], size=16)
     h_new = fourth + np.random.default_rng(5).normal(size=(30, 16))
     settings = GPCSettings(kernel, learning_rate=0.05, iterations=40, inducing=16, draws=200)
@@ -270,10 +270,10 @@ def test_the_kernel_of_an_added_class_is_the_mean_of_the_others(gpc):
 
 
 def test_inducing_inputs_lie_around_the_embeddings_named():
-    def nearest_centres(gpc):
+    def nearest_centers(gpc):
         inducing = gpc._prior.inducing_M_d.numpy() * gpc._scaler.scale_d + gpc._scaler.mean_d
-        return np.linalg.norm(inducing[:, None] - CENTRES, axis=2).argmin(axis=1)
+        return np.linalg.norm(inducing[:, None] - CENTERS, axis=2).argmin(axis=1)
 
-    of_labelled = GPC(CLASSES, QUICK, "blobs", 0).fit(H[SEEN], LABELS[SEEN])
-    assert set(nearest_centres(of_labelled)) == {0, 1}
-    assert set(nearest_centres(fitted_without_overlap())) == {0, 1, 2}
+    of_labeled = GPC(CLASSES, QUICK, "blobs", 0).fit(H[SEEN], LABELS[SEEN])
+    assert set(nearest_centers(of_labeled)) == {0, 1}
+    assert set(nearest_centers(fitted_without_overlap())) == {0, 1, 2}

@@ -20,9 +20,9 @@ MANY_POINTS_C = norm.ppf(qmc.Sobol(3, rng=5).random_base2(12))  # for expectatio
 
 
 def blobs(n, seed):
-    centres = 3 * np.random.default_rng(0).normal(size=(3, 16))
+    centers = 3 * np.random.default_rng(0).normal(size=(3, 16))
     blob = np.arange(n) % 3
-    return centres[blob] + np.random.default_rng(seed).normal(size=(n, 16)), blob
+    return centers[blob] + np.random.default_rng(seed).normal(size=(n, 16)), blob
 
 
 H, TARGETS = blobs(60, seed=1)

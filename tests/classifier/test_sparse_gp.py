@@ -7,20 +7,20 @@ from gpca.classifier.sparse_gp import SparseGPs
 
 from .gpytorch_form import fit
 
-CENTRES = torch.randn(3, 16, generator=torch.Generator().manual_seed(0))
+CENTERS = torch.randn(3, 16, generator=torch.Generator().manual_seed(0))
 TARGETS = torch.arange(90) % 3
-INPUTS = CENTRES[TARGETS] + 0.7 * torch.randn(90, 16, generator=torch.Generator().manual_seed(1))
+INPUTS = CENTERS[TARGETS] + 0.7 * torch.randn(90, 16, generator=torch.Generator().manual_seed(1))
 
 
 def fitted(name, iterations, learning_rate=0.05, inputs=INPUTS, targets=TARGETS):
     model = SparseGPs(make_covariance(name, 3, 4.0), inputs[:9], torch.Generator().manual_seed(5))
-    optimiser = torch.optim.Adam(model.parameters(), lr=learning_rate)
+    optimizer = torch.optim.Adam(model.parameters(), lr=learning_rate)
     losses = []
     for _ in range(iterations):
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         loss = -model.elbo(inputs, targets)
         loss.backward()
-        optimiser.step()
+        optimizer.step()
         losses.append(loss.item())
     return model, losses
 

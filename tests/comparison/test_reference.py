@@ -268,7 +268,7 @@ def test_settings_replace_the_configs(folders, capsys):
     assert check(folders, "--settings", '{"tolerances": {"shares": 1}}') == 2
     assert "setting tolerances.shares: unknown; did you mean share?" in one_line(capsys)
     assert check(folders, "--settings", '{"tolerances": {}}') == 2
-    assert "config key reference.tolerances: has no kind" in one_line(capsys)
+    assert "setting tolerances.correlation: is missing" in one_line(capsys)
 
 
 def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, capsys, tmp_path, monkeypatch):
@@ -287,8 +287,8 @@ def test_the_config_is_that_of_the_working_directory_or_the_one_named(folders, c
         ("seeds: [0]", "has no section 'reference'"),
         ("- a list", "has no keys at its top level"),
         ("a: b: c", "is neither YAML nor JSON"),
-        ("reference: {tolerances: {}}", "lacks one of tolerances, half_widths, flipped, deviations, ratio"),
-        ("reference: 3", "lacks one of tolerances, half_widths, flipped, deviations, ratio"),
+        ("reference: {tolerances: {}}", "setting tolerances.correlation: is missing"),
+        ("reference: 3", "has no section 'reference'"),
     ],
 )
 def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_path, content, message):

@@ -6,9 +6,8 @@ import yaml
 from snakemake.utils import update_config
 
 from gpca.config.layers import DEFAULTS
-from gpca.settings import SCHEMA
 
-CONFIG = SCHEMA.parents[2] / "config"
+CONFIG = DEFAULTS[0].parent
 MISSING = object()
 
 

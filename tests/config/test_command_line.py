@@ -43,4 +43,4 @@ def test_what_the_command_line_did_not_give_stays_as_it_is():
 def test_a_number_in_place_of_a_list_is_one_line_that_says_how():
     with pytest.raises(InputError) as caught:
         check(given(seeds=0))
-    assert str(caught.value) == "config key seeds: 0 is not of type 'array'; give a list: [0]"
+    assert str(caught.value) == "config key seeds: 0 should be a valid array; give a list: [0]"

@@ -79,10 +79,10 @@ def test_virtual_frames_stay_while_a_dataset_does():
         ("estimators.gauss", "estimators: no estimator 'gauss'; choose one of bayesian_icp, "),
         ("methods.icp", "methods: no registration method 'icp'; choose one of fgr, "),
         ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; choose one of pointnet, "),
-        ("sources.ycb", "exchange.sources: source 'ycb' is left out; choose one of coffee_cup, linemod"),
+        ("sources.ycb", "recovery.objects: source 'ycb' is left out; choose one of coffee_cup, linemod"),
         ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; choose one of linemod, ycb"),
         ("recovery.actions.denoise", "recovery.treatments.noise: action 'denoise' is left out; choose one of reinit"),
-        ("uncertainty.causal", "uncertainty: 'causal' is a required property"),
+        ("uncertainty.causal", "uncertainty.causal: is missing; add it"),
         # Names of nothing.
         ("explainers.shap_orcale", "explainers: no explainer 'shap_orcale'; choose one of "),
         ("learners.learner_tree", "learners: no learner 'learner_tree'; choose one of "),
@@ -108,5 +108,5 @@ def test_a_switch_is_true_or_false(value):
 def test_nothing_is_left():
     config = load()
     config["explainers"] = dict.fromkeys(config["explainers"], False)
-    with pytest.raises(InputError, match=r"^config key explainers: \{\} should be non-empty"):
+    with pytest.raises(InputError, match=r"^config key explainers: \{\} should have at least 1 item"):
         check(config)

@@ -81,7 +81,7 @@ def test_parameters_are_counted_once_each():
 
 
 @pytest.mark.parametrize("change", [lambda p: p + 0.2, lambda p: 1.3 * p, lambda p: p.roll(1, dims=-1)])
-def test_no_normalisation_hides_a_shift_a_scale_or_a_rotation(encoder, change):
+def test_no_normalization_hides_a_shift_a_scale_or_a_rotation(encoder, change):
     assert (encoder(change(clouds())) - encoder(clouds())).abs().max() > 1e-2
 
 
@@ -121,7 +121,7 @@ def easy(objects):
 
 
 @backbones
-def test_concepts_are_learnt_and_embeddings_repeat(easy, backbone):
+def test_concepts_are_learned_and_embeddings_repeat(easy, backbone):
     settings = EncoderSettings(backbone, draw_points=64, draws=1, epochs=12, batch_size=12, options=SMALL[backbone])
     model, curve = train_encoder(easy, "tiny", 0, settings)
     assert curve[-1]["loss"] < 0.7 * curve[0]["loss"]

@@ -44,7 +44,7 @@ def test_a_cloud_does_not_depend_on_the_others_of_its_batch(encoder):
 
 
 @pytest.mark.parametrize("change", [lambda p: p + 0.2, lambda p: 1.3 * p, lambda p: p.roll(1, dims=-1)])
-def test_no_normalisation_hides_a_shift_a_scale_or_a_rotation(encoder, change):
+def test_no_normalization_hides_a_shift_a_scale_or_a_rotation(encoder, change):
     assert (encoder(change(clouds())) - encoder(clouds())).abs().max() > 1e-2
 
 

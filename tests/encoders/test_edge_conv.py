@@ -84,7 +84,7 @@ def test_gradient_check_in_double_precision(monkeypatch):
     assert torch.autograd.gradcheck(lambda x: layer(x), (x,), atol=1e-6)
 
 
-def test_neighbours_are_the_nearest():
+def test_neighbors_are_the_nearest():
     x = torch.randn(3, 50, 4)
     expected = torch.cdist(x, x).topk(7, largest=False).indices.sort().values
     assert torch.equal(knn_indices(x, 7).long().sort().values, expected)

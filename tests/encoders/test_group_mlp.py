@@ -11,7 +11,7 @@ TOLERANCE = {"atol": 1e-4, "rtol": 1e-4}
 
 
 def layers(in_features=5, widths=(16, 24, 32), last_relu=True):
-    """With gammas of both signs, so that the maximum over normalised slots is not that over the slots."""
+    """With gammas of both signs, so that the maximum over normalized slots is not that over the slots."""
     torch.manual_seed(0)
     made = GroupMLP(in_features, widths, last_relu)
     for norm in made.norms:
@@ -25,12 +25,12 @@ def inputs(in_features=5, batch=4, n=60, offset=0.0):
     return torch.rand(batch, n, 3) - 0.5 + offset, torch.randn(batch, n, in_features)
 
 
-def balls(points, n_centres=20, radius=0.3, k=8):
+def balls(points, n_centers=20, radius=0.3, k=8):
     """Some of them full, most of them padded."""
-    centres = take(points, farthest_points(points, n_centres))
-    neighbours, counts = ball_query(points, centres, radius, k)
+    centers = take(points, farthest_points(points, n_centers))
+    neighbours, counts = ball_query(points, centers, radius, k)
     assert counts.min() < k == counts.max()
-    return Groups(centres, neighbours, counts, radius)
+    return Groups(centers, neighbours, counts, radius)
 
 
 def in_training(evaluate, made, points, x, groups):
@@ -102,7 +102,7 @@ def test_the_order_of_the_points_does_not_matter():
     torch.testing.assert_close(made(points[:, order], x[:, order], Groups.whole(points)), whole, **TOLERANCE)
 
 
-def test_a_copy_keeps_what_was_learnt():
+def test_a_copy_keeps_what_was_learned():
     made = layers()
     points, x = inputs()
     made(points, x, balls(points))

@@ -14,16 +14,16 @@ def clouds(batch=3, n=80, seed=0):
     return torch.rand(batch, n, 3, generator=torch.Generator().manual_seed(seed)) - 0.5
 
 
-def farthest_by_a_loop(points_N_3, n_centres):
+def farthest_by_a_loop(points_N_3, n_centers):
     chosen = [0]
-    while len(chosen) < n_centres:
+    while len(chosen) < n_centers:
         distances = [min(np.sum((p - points_N_3[c]) ** 2) for c in chosen) for p in points_N_3]
         chosen.append(int(np.argmax(distances)))
     return chosen
 
 
-def in_ball_by_a_loop(points_N_3, centre_3, radius, k):
-    found = [i for i, p in enumerate(points_N_3) if np.linalg.norm(p - centre_3) <= radius][:k]
+def in_ball_by_a_loop(points_N_3, center_3, radius, k):
+    found = [i for i, p in enumerate(points_N_3) if np.linalg.norm(p - center_3) <= radius][:k]
     return found + found[:1] * (k - len(found)), len(found)
 
 
@@ -34,7 +34,7 @@ def test_farthest_points_are_those_of_a_plain_loop(sample):
     assert sample(points, 20).tolist() == expected
 
 
-def test_of_a_small_cloud_every_point_is_a_centre():
+def test_of_a_small_cloud_every_point_is_a_center():
     assert farthest_points(clouds(2, 5), 8).tolist() == [[0, 1, 2, 3, 4]] * 2
 
 
@@ -48,11 +48,11 @@ def test_points_that_coincide_are_chosen_only_when_no_other_is_left():
 @pytest.mark.parametrize(("radius", "k"), [(0.05, 4), (0.3, 8), (0.3, 64), (2.0, 8)])
 def test_a_ball_holds_the_first_points_within_its_radius(query, radius, k):
     points = clouds()
-    centres = take(points, farthest_points(points, 10))
-    neighbours, counts = query(points, centres, radius, k)
-    for cloud, found, of_cloud, centres_M_3 in zip(points, neighbours, counts, centres, strict=True):
-        for indices, count, centre in zip(found, of_cloud, centres_M_3, strict=True):
-            assert (indices.tolist(), int(count)) == in_ball_by_a_loop(cloud.numpy(), centre.numpy(), radius, k)
+    centers = take(points, farthest_points(points, 10))
+    neighbours, counts = query(points, centers, radius, k)
+    for cloud, found, of_cloud, centers_M_3 in zip(points, neighbours, counts, centers, strict=True):
+        for indices, count, center in zip(found, of_cloud, centers_M_3, strict=True):
+            assert (indices.tolist(), int(count)) == in_ball_by_a_loop(cloud.numpy(), center.numpy(), radius, k)
 
 
 def test_a_ball_holds_no_more_points_than_the_cloud():
@@ -72,9 +72,9 @@ def test_rows_are_taken_from_their_own_cloud():
 def test_a_whole_cloud_is_one_group_around_the_origin():
     groups = Groups.whole(clouds(4, 9))
     assert groups.is_whole
-    assert groups.neighbours_B_M_k.tolist() == [[list(range(9))]] * 4
+    assert groups.neighbors_B_M_k.tolist() == [[list(range(9))]] * 4
     assert groups.counts_B_M.tolist() == [[9]] * 4
-    assert not groups.centres_B_M_3.any()
+    assert not groups.centers_B_M_3.any()
     points = clouds(4, 9)
     assert not Groups(points, *ball_query(points, points, 0.1, 4)).is_whole
 
@@ -88,8 +88,8 @@ from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
 torch.manual_seed(0)
 points, layers = torch.rand(6, 90, 3), GroupMLP(3, (16, 32))
 x = points.clone().requires_grad_()
-centres = take(points, farthest_points(points, 30))
-out = layers(points, x, Groups(centres, *ball_query(points, centres, 0.3, 12)))
+centers = take(points, farthest_points(points, 30))
+out = layers(points, x, Groups(centers, *ball_query(points, centers, 0.3, 12)))
 out.square().sum().backward()
 parts = [out.detach(), x.grad, *(p.grad for p in layers.parameters()), *(b.float() for b in layers.buffers())]
 print(hashlib.sha256(b"".join(part.numpy().tobytes() for part in parts)).hexdigest())

@@ -20,8 +20,8 @@ every = pytest.mark.parametrize("name", SMALL)
 def embeddings(n, d=24, seed=0):
     """Three clusters on a plane of 5 dimensions, with units that differ from number to number."""
     random = np.random.default_rng(seed)
-    centres_3_5, plane_5_d = (np.random.default_rng(9).normal(size=shape) for shape in ((3, 5), (5, d)))
-    codes_N_5 = 3 * centres_3_5[np.arange(n) % 3] + random.normal(size=(n, 5))
+    centers_3_5, plane_5_d = (np.random.default_rng(9).normal(size=shape) for shape in ((3, 5), (5, d)))
+    codes_N_5 = 3 * centers_3_5[np.arange(n) % 3] + random.normal(size=(n, 5))
     return ((codes_N_5 @ plane_5_d + 0.1 * random.normal(size=(n, d))) * np.geomspace(0.1, 10, d)).astype(np.float32)
 
 

@@ -56,7 +56,7 @@ def interrupted(registrations, checkpoint, after, settings=SETTINGS):
     assert checkpoint.is_file()
 
 
-def test_the_loss_falls_and_the_concepts_are_learnt(objects):
+def test_the_loss_falls_and_the_concepts_are_learned(objects):
     severe = Severities(noise=(0.06, 0.08), rotation_deg=(60, 120), translation=(0.4, 0.6), crop=(0.5, 0.7))
     easy, _ = make_registrations(objects, "tiny", 0, RegistrationSettings(48, 3, 256, severe))
     encoder, curve = train(easy)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import baselines
-from baselines.registry import explainer_entry, explainers
 from gpca.errors import InputError
 from gpca.explainers.gpca import GPCA
+from gpca.explainers.registry import explainer_entry, explainers
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import DESIGNS
 
@@ -18,9 +18,9 @@ QUICK = {"learning_rate": 0.05, "iterations": 30, "inducing": 12, "draws": 100}
 @pytest.fixture(scope="module")
 def embedded(registrations):
     """Registrations whose embedding tells the concept, as a trained encoder's does."""
-    centres = 3 * np.random.default_rng(0).normal(size=(3, 8))
+    centers = 3 * np.random.default_rng(0).normal(size=(3, 8))
     concept_S = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
-    h = centres[concept_S] + np.random.default_rng(1).normal(size=(len(concept_S), 8))
+    h = centers[concept_S] + np.random.default_rng(1).normal(size=(len(concept_S), 8))
     return dataclasses.replace(registrations, attached={"embedding": h})
 
 

@@ -65,7 +65,7 @@ def test_colour_may_be_jpeg(damaged):
     for path in (damaged / SCENE / "rgb").iterdir():
         Image.open(path).save(path.with_suffix(".jpg"))
         path.unlink()
-    assert {frame.colour.suffix for frame in read_frames([damaged])} == {".png", ".jpg"}
+    assert {frame.color.suffix for frame in read_frames([damaged])} == {".png", ".jpg"}
 
 
 def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, damaged, tmp_path, capsys):

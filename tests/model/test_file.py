@@ -62,7 +62,7 @@ def test_a_file_that_holds_it_four_times_says_the_same_and_is_written_smaller(mo
     assert (tmp_path / "small.pt").read_bytes() == path.read_bytes()
     features = np.random.default_rng(1).normal(size=(4, len(model.diagnoser.error_weights) - 1))
     expected, actual = (
-        made.classifier.judge(made.classifier.normalised(features))
+        made.classifier.judge(made.classifier.normalized(features))
         for made in (model.diagnoser, Model.load(tmp_path / "small.pt").diagnoser)
     )
     np.testing.assert_array_equal(actual.failure_N, expected.failure_N)

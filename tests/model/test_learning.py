@@ -68,7 +68,7 @@ def test_failures_are_told_from_what_is_fine_and_the_uncertainty_is_of_unseen_fa
     assert len(bald_N) == (given.unseen_N & (given.label_N != "nominal")).sum()
     new = lessons(30, 1)
     classifier = diagnoser.classifier
-    alarm_N = classifier.judge(classifier.normalised(new.features_N_F)).failure_N >= diagnoser.threshold
+    alarm_N = classifier.judge(classifier.normalized(new.features_N_F)).failure_N >= diagnoser.threshold
     np.testing.assert_array_equal(alarm_N, new.label_N != "nominal")
     assert diagnoser.points == causes.points[1]
     assert diagnoser.runs.starts == causes.starts

@@ -35,7 +35,7 @@ def test_a_mesh_is_sampled_in_its_own_frame_and_measured_by_its_vertices(tmp_pat
     box.export(tmp_path / f"box.{suffix}")
     points, frame = read_points(tmp_path / f"box.{suffix}", "mm")
     assert len(points) > 10_000
-    np.testing.assert_allclose(frame.centre_3, (500, 0, 0), atol=1e-3)
+    np.testing.assert_allclose(frame.center_3, (500, 0, 0), atol=1e-3)
     assert frame.diameter == pytest.approx(130)
     np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], box.bounds, atol=0.05)
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.objects.mesh_folder import SUFFIXES, files_in, from_entry, metres_per, surfaces
+from gpca.objects.mesh_folder import SUFFIXES, files_in, from_entry, meters_per, surfaces
 
 BOX = trimesh.creation.box((10.0, 20.0, 30.0))
 XYZ = "property float x\nproperty float y\nproperty float z\n"
@@ -141,7 +141,7 @@ def test_missing_and_empty_folder_and_unit(tmp_path):
         files_in(tmp_path / "nowhere", None, SUFFIXES)
     with pytest.raises(InputError, match=f"{tmp_path}: the folder has none of"):
         from_entry({"unit": "m"}, tmp_path)
-    assert (metres_per("m"), metres_per("cm"), metres_per("mm")) == (1, 0.01, 0.001)
+    assert (meters_per("m"), meters_per("cm"), meters_per("mm")) == (1, 0.01, 0.001)
     for unit in ("inch", None):
         with pytest.raises(InputError, match="set unit"):
-            metres_per(unit)
+            meters_per(unit)

@@ -8,6 +8,7 @@ import pytest
 from gpca.page.page import write_page
 from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.style import save_figure, use_style
+from gpca.reporting.registry import SUFFIXES
 from gpca.reporting.tables.table import Cell, Column, Table
 from tests.page.small_run import FIGURES, TABLES, Page, run_of
 from tests.page.test_comparison import HEAD, LINES
@@ -30,9 +31,8 @@ def folder(registrations, predicted, tmp_path_factory):
             compared=([(0, "gpca"), (0, "shap")],),
             footnotes=("A footnote.",),
         )
-        files = [folder / f"tables/{name}.{suffix}" for suffix in ("csv", "md", "tex")]
-        with record_provenance(files, [], {}):
-            table.write(*files)
+        with record_provenance([folder / f"tables/{name}.{suffix}" for suffix in SUFFIXES["tables"]], [], {}):
+            table.write(folder / f"tables/{name}")
     use_style()
     import matplotlib.pyplot as plt
 

@@ -10,7 +10,7 @@ from gpca.errors import InputError
 from gpca.experiments.method.concepts import source_before_icp
 from gpca.page.samples import OF_EACH_CONCEPT, POINTS, first_of_each_concept, page_samples, severity_words
 from gpca.pairs.perturbation import CONCEPTS
-from tests.reporting.conftest import write_uncertainties
+from tests.figures import write_uncertainties
 
 SOURCE = {"title": "Bricks", "stand_in": True}
 

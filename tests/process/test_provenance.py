@@ -33,7 +33,7 @@ def test_the_sidecar_says_where_a_result_comes_from(record, tmp_path):
     assert record["settings"] == {"points": 5, "options": {"k": 3}}
     assert record["settings_sha256"] == sha256_of_settings({"options": {"k": 3}, "points": 5})
     assert (record["seed"], record["config_sha256"]) == (4, {"seeds": "c0ffee"})
-    lock = (provenance._ROOT / "environment.lock").read_bytes()
+    lock = (provenance.ROOT / "environment.lock").read_bytes()
     assert record["environment_lock_sha256"] == hashlib.sha256(lock).hexdigest()
     assert record["python"] == platform.python_version()
     assert {"numpy", "torch", "open3d-cpu", "gpytorch"} <= set(record["libraries"])
@@ -67,7 +67,7 @@ def git_at(monkeypatch):
         identity = ["-c", "user.name=A", "-c", "user.email=a@b.org"]
         for command in (["init"], ["add", "--", *kept], [*identity, "commit", "--allow-empty", "-m", "first"]):
             subprocess.run(["git", "-C", repository, *command], check=True, capture_output=True)
-        monkeypatch.setattr(provenance, "_ROOT", package)
+        monkeypatch.setattr(provenance, "ROOT", package)
 
     return make
 
@@ -86,7 +86,7 @@ UNKNOWN = {"version": __version__, "commit": None, "dirty": None}
 
 
 def test_no_checkout_and_no_git_are_no_fault(tmp_path, monkeypatch):
-    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
     assert provenance._code_version() == UNKNOWN
     monkeypatch.setenv("PATH", str(tmp_path))
     assert provenance._code_version() == UNKNOWN
@@ -99,7 +99,7 @@ def test_a_checkout_of_something_else_around_the_package_is_not_its_own(git_at, 
 
 
 def test_a_package_without_a_lock_beside_it_has_no_hash_of_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
     with record_provenance([tmp_path / "out.csv"], [], {}):
         pass
     record = json.loads((tmp_path / "out.csv.provenance.json").read_text())

@@ -6,9 +6,9 @@ from gpca.errors import InputError
 from gpca.experiments.recovery.cases import RobotIn, register_after, register_held
 from gpca.recovery import actions
 from gpca.recovery.actions import ACTIONS, action_of, best_start
+from tests.failures import LOOP
 
 from ..documents import block
-from .conftest import LOOP
 
 ICP = LOOP.icp
 
@@ -60,7 +60,7 @@ def test_the_pose_that_explains_the_shots_is_started_from(start):
 
 @pytest.mark.parametrize(
     ("name", "given", "fault"),
-    [("pray", {}, "unknown; choose one of reinitialize"), ("denoise", {"framse": 3}, "unexpected keyword argument")],
+    [("pray", {}, "unknown; choose one of reinitialize"), ("denoise", {"framse": 3}, "did you mean frames")],
 )
 def test_unknown_actions_and_settings_are_refused(name, given, fault):
     with pytest.raises(InputError, match=fault):

@@ -40,14 +40,14 @@ def test_scores_without_uncertainty_are_followed():
     assert made("softmax_head")(case(scores=[[0.8, 0.1, 0.1]], bald=[np.nan])).action == "denoise"
 
 
-def test_the_learnt_policy_decides_by_what_is_known_and_done():
+def test_the_learned_policy_decides_by_what_is_known_and_done():
     trials = [Trial(np.zeros(1), action, action == "new_view") for action in ACTIONS for _ in range(8)]
     utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.01))
     assert made("utility", utility)(case(known=np.zeros(1))).action == "new_view"
     assert made("utility", utility)(case(("new_view",), known=np.zeros(1))).action != "new_view"
 
 
-def test_the_learnt_policy_leaves_alone_what_seems_right_unless_it_is_alarmed():
+def test_the_learned_policy_leaves_alone_what_seems_right_unless_it_is_alarmed():
     trials = [Trial(np.zeros(1), NOTHING, True)] * 30 + [Trial(np.zeros(1), "denoise", True)] * 8
     utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.05))
     assert made("utility", utility)(case(known=np.zeros(1))).action == NOTHING

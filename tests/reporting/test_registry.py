@@ -26,9 +26,8 @@ def given(pattern, **fields):
 @pytest.mark.parametrize("name", ENTRIES)
 def test_every_builder_and_reader_takes_what_its_entry_gives(name):
     entry = ENTRIES[name]
-    paths = {"pdf_path", "png_path"} if entry.kind == "figures" else set()
     builder = inspect.signature(load(entry.builder))
-    builder.bind(**dict.fromkeys({each.argument for each in entry.inputs} | set(entry.settings) | paths))
+    builder.bind(**dict.fromkeys({each.argument for each in entry.inputs} | set(entry.settings)))
     for each in entry.inputs:
         if each.read:
             keywords = {key: None for key in each.files if key}
@@ -64,7 +63,7 @@ def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
 
 
 def test_the_files_of_a_result_are_those_of_its_kind():
-    assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "tex")]
+    assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "tex", "json")]
     assert result(kind="figures", name="fig").all_files == ["figures/fig.png", "figures/fig.pdf"]
     assert result().main_file == "tables/table9_mine.md"
 

@@ -33,7 +33,7 @@ def given_files():
                 yield step, option, name
 
 
-def relabelled(path, source, seed):
+def relabeled(path, source, seed):
     """Say in a file that it is of another source and seed."""
     if path.suffix == ".pt":
         return write_tensors(path, torch.load(path, weights_only=True) | {"source": source, "seed": seed})
@@ -53,7 +53,7 @@ def unlabelled(path):
 def test_a_file_of_another_source_or_seed_is_refused(folder, capsys, step, option, name):
     own = "another" + name  # under a name of its own, so that the step's other options still give the right file
     (folder / own).write_bytes((folder / name).read_bytes())
-    relabelled(folder / own, *ELSEWHERE)
+    relabeled(folder / own, *ELSEWHERE)
     changes = {own: [], option: None} if option == name else {option: own}
     # Of two files that do not fit together, the step may name the other one.
     files = "|".join(re.escape(each) for each in (own, *map(str, STEP_OPTIONS[step].values())) if "." in each)
@@ -69,7 +69,7 @@ def test_a_file_of_another_source_or_seed_is_refused(folder, capsys, step, optio
         ("train", "registrations.npz", "array 'source' is missing; regenerate it with"),
         ("reduce", "embeddings.npz", "array 'source' is missing; regenerate it with 'python -m gpca embed'"),
         ("describe", "causes.npz", "array 'source' is missing"),
-        ("embed", "weights.pt", "does not say of which source and seed it is.*; regenerate them with"),
+        ("embed", "weights.pt", "or damaged; regenerate them with"),
     ],
 )
 def test_a_file_of_ours_that_does_not_say_of_what_it_is_has_to_be_made_anew(folder, capsys, step, name, fault):

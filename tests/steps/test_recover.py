@@ -4,11 +4,9 @@ import json
 
 import pandas as pd
 import pytest
-import yaml
 
 from gpca.__main__ import main
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.settings import SCHEMA
 
 from ..config.test_check import load
 from ..frames.tiny import surfaces
@@ -91,8 +89,3 @@ def test_a_missing_section_is_named(tmp_path, capsys):
     del given["scenes"]
     assert call(tmp_path, json.dumps(given)) == 2
     assert "has no section 'scenes'" in capsys.readouterr().err
-
-
-def test_the_schema_knows_every_setting_of_the_shipped_section():
-    known = yaml.safe_load(SCHEMA.read_text())["properties"]["recovery"]
-    assert set(load()["recovery"]) == set(known["required"]) == set(known["properties"])

@@ -7,7 +7,7 @@ from gpca.alignment.rigid import transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.conditions import CONDITIONS, CORNERS, LATIN, SALTELLI
-from gpca.uncertainty.designs import DESIGNS, KNOB_RANGE, STEP, Pair, sample_knobs
+from gpca.uncertainty.designs import DESIGNS, KNOB_RANGE, STEP, RegisteredRow, sample_knobs
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -16,7 +16,7 @@ XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()
 
 
 def outcomes(design, registrations, row, settings=SETTINGS):
-    return DESIGNS[design].evaluate(Pair(registrations, row), XI, settings, np.random.default_rng(row))
+    return DESIGNS[design].evaluate(RegisteredRow(registrations, row), XI, settings, np.random.default_rng(row))
 
 
 def numbers(made):
@@ -165,14 +165,14 @@ def test_the_true_knobs_are_the_severities(registrations, noise, rotation_deg, t
         severity_translation=np.array([translation]),
         severity_crop=np.array([crop]),
     )
-    assert Pair(one, 0).true_knobs(SETTINGS) == pytest.approx(expected)
+    assert RegisteredRow(one, 0).true_knobs(SETTINGS) == pytest.approx(expected)
     wider = UncertaintySettings(start_rotation_deg=20.0, start_translation=0.1)
-    assert Pair(one, 0).true_knobs(wider).spread == pytest.approx(max(1.0, expected[1] / 2))
+    assert RegisteredRow(one, 0).true_knobs(wider).spread == pytest.approx(max(1.0, expected[1] / 2))
 
 
 def test_true_knobs_lie_within_the_ranges_and_move_one_knob(registrations):
     for row in range(len(registrations)):
-        knobs = Pair(registrations, row).true_knobs(SETTINGS)
+        knobs = RegisteredRow(registrations, row).true_knobs(SETTINGS)
         moved = [name for name, value, rest in zip(CONCEPTS, knobs, UNTOUCHED, strict=True) if value != rest]
         assert moved == [registrations.concept[row]]
         assert (np.array(knobs) <= np.array(UPPER) + 1e-12).all()
@@ -180,7 +180,7 @@ def test_true_knobs_lie_within_the_ranges_and_move_one_knob(registrations):
 
 def test_a_pair_is_the_source_in_its_own_frame(registrations):
     for row in range(0, len(registrations), 7):
-        pair = Pair(registrations, row)
+        pair = RegisteredRow(registrations, row)
         assert np.allclose(transform(pair.T_icp, pair.source), registrations.cloud(row), atol=1e-6)
         assert np.array_equal(pair.target, registrations.target(row))
         translation_m = registrations.T_target_source_icp[row][:3, 3]
@@ -188,7 +188,7 @@ def test_a_pair_is_the_source_in_its_own_frame(registrations):
 
 
 def test_observed_and_clean_pairs_hold_as_many_points_as_asked_for(registrations):
-    pair = Pair(registrations, 40)
+    pair = RegisteredRow(registrations, 40)
     source, target, T_init, T_ref = pair.observed(60, np.random.default_rng(0))
     assert len(source) == len(target) == 60
     assert len(np.unique(source, axis=0)) == 60 and np.isin(source, pair.source).all()

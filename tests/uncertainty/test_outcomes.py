@@ -46,58 +46,25 @@ def test_outcomes_survive_the_file_and_give_the_same_bytes(tmp_path):
     assert first == again != other
 
 
-def changed(array, index, value):
-    array = array.copy()
-    array[index] = value
-    return array
-
-
 @pytest.mark.parametrize(
     ("name", "damage", "expected"),
     [
-        *((name, lambda a: None, f"'{name}' is missing") for name in COLUMNS),
-        ("uncertainty", lambda a: changed(a, (2, 1), np.nan), "'uncertainty' contains NaN"),
-        ("covariance", lambda a: changed(a, (0, 0, 0, 0), np.inf), "'covariance' contains NaN or infinity"),
-        ("residual", lambda a: changed(a, 0, -np.inf), "'residual' contains NaN or infinity"),
-        ("covariance", lambda a: a[..., :5], "'covariance' is 6×4×6×5, not 6×4×6×6"),
+        ("split", None, "'split' is missing"),
+        ("uncertainty", lambda a: a * np.nan, "'uncertainty' contains NaN"),
         ("covariance", lambda a: a[:, 0], "'covariance' is 6×6×6, not 6×K×6×6"),
-        ("uncertainty", lambda a: a[:, :-1], "'uncertainty' is 6×3, not 6×4"),
-        ("residual", lambda a: a[:-1], "'residual' is 5×4, not 6×4"),
-        ("degenerate", lambda a: a[:, 0], "'degenerate' is 6, not 6×4"),
-        ("sample", lambda a: a[:-1], "is .*6.*, not .*5"),
-        ("split", lambda a: a.astype(object), "pickled"),
     ],
 )
 def test_faulty_files_are_refused_in_one_line_with_their_name(tmp_path, name, damage, expected):
     path = tmp_path / "seed0.npz"
     arrays = {column: getattr(made(), column) for column in COLUMNS}
-    arrays[name] = damage(arrays[name])
-    np.savez(path, **{key: array for key, array in arrays.items() if array is not None})
+    array = arrays.pop(name)
+    if damage:
+        arrays[name] = damage(array)
+    np.savez(path, **arrays)
     with pytest.raises(InputError, match=expected) as caught:
         Outcomes.load(path)
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
     assert "python -m gpca uncertainty" in str(caught.value)
-
-
-def test_a_missing_file_names_the_step_that_makes_it(tmp_path):
-    with pytest.raises(InputError, match="no such file; make it with 'python -m gpca uncertainty'"):
-        Outcomes.load(tmp_path / "nowhere.npz")
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
-def test_a_truncated_file_is_refused(tmp_path, share):
-    path = tmp_path / "seed0.npz"
-    made().save(path, ("tiny", 0))
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(InputError, match="not a readable npz" if share else "is empty"):
-        Outcomes.load(path)
-
-
-def test_a_file_of_no_samples_is_refused(tmp_path):
-    made([], np.array([], "U5")).save(tmp_path / "seed0.npz", ("tiny", 0))
-    with pytest.raises(InputError, match="has no samples"):
-        Outcomes.load(tmp_path / "seed0.npz")
 
 
 def test_the_table_has_a_column_for_every_condition(tmp_path):
@@ -191,33 +158,15 @@ def test_seconds_survive_the_file(tmp_path):
     ("damage", "expected"),
     [
         (lambda rows: rows.drop(columns="icp_seconds"), "column 'icp_seconds' is missing"),
-        (lambda rows: rows.drop(columns="condition"), "column 'condition' is missing"),
-        (lambda rows: rows[:-1], "has 23 rows, not 6 samples × 4 conditions"),
-        (lambda rows: rows[:0], "has no rows"),
         (lambda rows: rows.assign(seconds="soon"), "'seconds' contains values that are not finite numbers"),
-        (lambda rows: rows.assign(icp_seconds=np.inf), "'icp_seconds' contains values that are not finite numbers"),
-        (lambda rows: rows.assign(sample="three"), "'sample' contains values that are not finite numbers"),
-        (lambda rows: rows.assign(sample=rows["sample"] + 1), "samples or conditions differ"),
-        (lambda rows: rows.assign(split="test"), "samples or conditions differ"),
-        (lambda rows: rows[::-1], "samples or conditions differ"),
-        (lambda rows: rows.assign(condition=rows["condition"].to_numpy()[::-1]), "samples or conditions differ"),
-        (lambda rows: rows.sort_values(["condition", "sample"]), "samples or conditions differ"),
+        (lambda rows: rows[:-1], "its samples differ from those of the outcomes"),
+        (lambda rows: rows.assign(split="test"), "its samples differ from those of the outcomes"),
     ],
 )
-def test_faulty_seconds_are_refused_in_one_line_with_their_name(tmp_path, damage, expected):
+def test_faulty_seconds_are_refused(tmp_path, damage, expected):
     path = tmp_path / "seed0.csv"
     outcomes = made()
     write_seconds(path, outcomes, *seconds_of(outcomes))
     damage(pd.read_csv(path)).to_csv(path, index=False)
-    with pytest.raises(InputError, match=expected) as caught:
+    with pytest.raises(InputError, match=expected):
         read_seconds(path, outcomes)
-    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
-
-
-def test_missing_and_empty_files_of_seconds_are_refused(tmp_path):
-    path = tmp_path / "seed0.csv"
-    with pytest.raises(InputError, match="no such file"):
-        read_seconds(path, made())
-    path.write_text("")
-    with pytest.raises(InputError, match="is empty"):
-        read_seconds(path, made())

@@ -7,7 +7,7 @@ from gpca.alignment.twist import exp
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.uncertainty import remedies
 from gpca.uncertainty.conditions import CORNERS
-from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbours, denoise, trim
+from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbors, denoise, trim
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Runs
 
@@ -100,7 +100,7 @@ def runs(cost):
 
 def test_every_run_becomes_the_best_of_itself_and_the_next_ones():
     cost = np.random.default_rng(0).uniform(size=20)
-    best = best_of_neighbours(runs(cost), 0.1)
+    best = best_of_neighbors(runs(cost), 0.1)
     windows = [[(i + k) % 20 for k in range(RESTARTS)] for i in range(20)]
     expected = [min(window, key=lambda row: cost[row]) for window in windows]
     assert best.T_target_source_n[:, 0, 3].tolist() == expected
@@ -114,11 +114,11 @@ def test_a_run_of_few_close_points_is_not_the_best():
         runs(np.zeros(13)).T_target_source_n, np.where(np.arange(13) == 5, 0.1, 0.9), np.full(13, 0.02), 13, 0.0
     )
     made.inlier_rmse_n[5] = 0.001
-    assert 5 not in best_of_neighbours(made, 0.1).T_target_source_n[:, 0, 3]
+    assert 5 not in best_of_neighbors(made, 0.1).T_target_source_n[:, 0, 3]
 
 
 def test_equally_good_runs_are_left_as_they_are():
-    assert best_of_neighbours(runs(np.ones(13)), 0.1).T_target_source_n[:, 0, 3].tolist() == list(range(13))
+    assert best_of_neighbors(runs(np.ones(13)), 0.1).T_target_source_n[:, 0, 3].tolist() == list(range(13))
 
 
 # All together

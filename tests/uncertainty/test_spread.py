@@ -16,7 +16,7 @@ from gpca.uncertainty.spread import (
     divergence,
     log_determinant,
     run_from_starts,
-    summarise_runs,
+    summarize_runs,
 )
 
 SETTINGS = UncertaintySettings(starts=13)
@@ -225,7 +225,7 @@ def test_icp_runs_once_from_each_start_about_the_initial_pose():
 
 def result(made, source, target, T_ref=None):
     T_ref = np.eye(4) if T_ref is None else T_ref
-    return summarise_runs(made, cKDTree(source), target, T_ref, SETTINGS, perf_counter())
+    return summarize_runs(made, cKDTree(source), target, T_ref, SETTINGS, perf_counter())
 
 
 def test_the_residual_is_that_of_the_run_with_the_lowest_cost():

@@ -37,7 +37,7 @@ BAD = {
     ),
     "size that cannot be": (
         lambda project: ("--config", "registrations={train: 1000000000000}"),
-        "registrations.train: 1000000000000 is greater than the maximum of 1000000",
+        "registrations.train: 1000000000000 should be less than or equal to 1000000",
     ),
 }
 

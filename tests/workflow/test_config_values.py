@@ -13,4 +13,4 @@ def test_values_of_the_command_line_and_what_they_leave_out(project):
     assert planned.jobs["attribute"] == 3 * 22 + 3 + 3 * 4  # sources, others on frames, Table VI
     assert not any("/seed1" in path or "shap_oracle" in path or "badge" in path for path in planned.outputs)
     refused = project.plan("all", "--config", "seeds=0", check=False)
-    assert "gpca: config key seeds: 0 is not of type 'array'; give a list: [0]" in refused.stderr
+    assert "gpca: config key seeds: 0 should be a valid array; give a list: [0]" in refused.stderr

@@ -8,7 +8,7 @@ import pytest
 from gpca.experiments.results import registered
 from gpca.page.crate import NAME
 
-from ..reporting.test_crate import faults
+from ..page.test_crate import faults
 
 ENTRIES = {
     entry.name: entry

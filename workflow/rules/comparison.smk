@@ -7,11 +7,7 @@ from gpca.comparison.published import read_published
 from gpca.experiments.registry import experiments
 
 COLLECTED = [
-    *("metrics.csv", "timings.csv", "active_learning.csv", "real_world.csv"),
-    *("diagnostics.csv", "kernels.csv", "recovery.csv", "runtime.csv"),
-    *("registration_methods.csv", "estimators.csv", "controls.csv"),
-    *("readings.csv", "new_concepts.csv"),
-    *(experiment.tidy for experiment in experiments() if experiment.is_run(NAMES)),
+    tidy.file for each in experiments() if each.is_run(NAMES) for tidy in each.tidy
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

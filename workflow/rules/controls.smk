@@ -22,7 +22,9 @@ rule controls:
 rule train_control:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
-        code=code_files("gpca.experiments.controls.train_step", encoder_module(CONTROL_ENCODER)),
+        code=code_files(
+            "gpca.experiments.controls.train_step", encoder_module(CONTROL_ENCODER)
+        ),
     output:
         embeddings="<results>/control_embeddings/{control}/{source}/seed{seed}.npz",
         curve="<results>/control_embeddings/{control}/{source}/seed{seed}.csv",

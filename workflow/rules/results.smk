@@ -1,5 +1,6 @@
 # Every table and figure of the registry, gpca/reporting/results.yaml: a rule of its name for each.
 from gpca.experiments.results import results_of
+from gpca.reporting.registry import SUFFIXES
 
 RESULTS = results_of(NAMES)
 
@@ -16,73 +17,47 @@ def below_results(files):
     }
 
 
-def reported(result, suffix):
-    """Return the file as Snakemake's report shows it: by the paper's section, with title and caption."""
-    return report(
-        f"<results>/{result.file(suffix)}",
-        caption="../report/result.rst",
-        category=result.section,
-        labels={"result": result.title},
-    )
+def outputs(result):
+    """Return the files of a result by suffix; Snakemake's report shows one of them, by the paper's section."""
+    paths = {
+        suffix: f"<results>/{result.file(suffix)}" for suffix in SUFFIXES[result.kind]
+    }
+    shown = {"tables": "csv", "figures": "png"}[result.kind]
+    return paths | {
+        shown: report(
+            paths[shown],
+            caption="../report/result.rst",
+            category=result.section,
+            labels={"result": result.title},
+        )
+    }
 
 
-# Tables and figures have one each, since the path of a script is read when its job runs, after the loop.
 for result in RESULTS:
-    if result.kind == "tables":
 
-        rule:
-            name:
-                result.name
-            input:
-                **below_results(result.files(NAMES)),
-                code=code_files(*result.modules, "gpca.reporting.script"),
-            output:
-                csv=reported(result, "csv"),
-                md=f"<results>/{result.file('md')}",
-                tex=f"<results>/{result.file('tex')}",
-            log:
-                f"<logs>/tables/{result.name}.log",
-            benchmark:
-                f"<benchmarks>/tables/{result.name}.tsv"
-            localrule: True
-            conda:
-                "../envs/gpca.yaml"
-                    resources:
-                mem_mb=2000,
-                runtime=10,
-            params:
-                builder=result.builder,
-                readers=result.readers,
-                arguments=result.arguments(SHOWN),
-                caption=result.caption,
-            script:
-                "../scripts/table.py"
-
-    else:
-
-        rule:
-            name:
-                result.name
-            input:
-                **below_results(result.files(NAMES)),
-                code=code_files(*result.modules, "gpca.reporting.script"),
-            output:
-                pdf=f"<results>/{result.file('pdf')}",
-                png=reported(result, "png"),
-            log:
-                f"<logs>/figures/{result.name}.log",
-            benchmark:
-                f"<benchmarks>/figures/{result.name}.tsv"
-            localrule: True
-            conda:
-                "../envs/gpca.yaml"
-                    resources:
-                mem_mb=2000,
-                runtime=10,
-            params:
-                builder=result.builder,
-                readers=result.readers,
-                arguments=result.arguments(SHOWN),
-                caption=result.caption,
-            script:
-                "../scripts/figure.py"
+    rule:
+        name:
+            result.name
+        input:
+            **below_results(result.files(NAMES)),
+            code=code_files(*result.modules, "gpca.reporting.script"),
+        output:
+            **outputs(result),
+        log:
+            f"<logs>/{result.kind}/{result.name}.log",
+        benchmark:
+            f"<benchmarks>/{result.kind}/{result.name}.tsv"
+        localrule: True
+        conda:
+            "../envs/gpca.yaml"
+        resources:
+            mem_mb=2000,
+            runtime=10,
+        params:
+            kind=result.kind,
+            builder=result.builder,
+            readers=result.readers,
+            arguments=result.arguments(SHOWN),
+            caption=result.caption,
+        script:
+            "../scripts/result.py"

@@ -26,7 +26,7 @@ def align(
     iterations: int = 64,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
 ) -> Outcome:
-    """Minimise a robust cost over all matches that agree in triples.
+    """Minimize a robust cost over all matches that agree in triples.
 
     Args:
         feature_radius: of the features, in diameters.

@@ -25,7 +25,7 @@ LAST_STEP = 1e-4  # of small_gicp, radians and diameters
 def align(
     pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
 ) -> Outcome:
-    """Minimise the distances between small planes: the target's of its normals, the source's of its neighbours."""
+    """Minimize the distances between small planes: the target's of its normals, the source's of its neighbors."""
     return align_by_open3d(pair, "generalized", correspondence_distance, max_iterations)
 
 
@@ -35,10 +35,10 @@ def align_by_small_gicp(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Minimise the distances between small planes, each of so many neighbours.
+    """Minimize the distances between small planes, each of so many neighbors.
 
     Clouds and tree are made here: given plain arrays, small_gicp thins them to cells of 0.25 units, a quarter of an
-    object. Its limits on the last step are those of scans in metres, 1e-3 and 0.1 degrees; here they are smaller. On
+    object. Its limits on the last step are those of scans in meters, 1e-3 and 0.1 degrees; here they are smaller. On
     noisy clouds it never keeps to them, so whether it has come to rest is asked as of the others, by one step more.
     """
     package = import_module("small_gicp")

@@ -18,7 +18,7 @@ from gpca.alignment.normals import estimate_normals
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
 
-CORRESPONDENCE_DISTANCE = 0.10  # diameters: as far as ICP of the protocol looks for a neighbour
+CORRESPONDENCE_DISTANCE = 0.10  # diameters: as far as ICP of the protocol looks for a neighbor
 MAX_ITERATIONS = 50
 FEWEST = 3  # correspondences that determine a rigid motion
 
@@ -81,7 +81,7 @@ class Pair:
 
     @cached_property
     def target_tree(self) -> cKDTree:
-        """The target's points, sorted for nearest neighbours."""
+        """The target's points, sorted for nearest neighbors."""
         return cKDTree(self.target)
 
 
@@ -108,7 +108,7 @@ class Outcome:
 
     @classmethod
     def at(cls, pair: Pair, T_target_source: np.ndarray, distance: float, failure: str = "") -> Outcome:
-        """Measure a pose as Open3D does, whatever the method minimised; without any correspondence it is a failure."""
+        """Measure a pose as Open3D does, whatever the method minimized; without any correspondence it is a failure."""
         distance_N, _ = pair.target_tree.query(transform(T_target_source, pair.source))
         inlier_N = distance_N < distance
         if not inlier_N.any():

@@ -19,8 +19,8 @@ from gpca.alignment.rigid import rigid_motion
 
 # Diameters. On a development seed, the best of 0.02 to 0.13 for clouds of some 500 points; for 2000 it is 0.05.
 VOXEL = 0.08
-# Somewhat more than the package needs: it looks for three neighbours within three voxels, at each of the points left.
-NEAR, NEIGHBOURS, FEATURES = 2.0, 4, 10
+# Somewhat more than the package needs: it looks for three neighbors within three voxels, at each of the points left.
+NEAR, NEIGHBORS, FEATURES = 2.0, 4, 10
 
 
 def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = CORRESPONDENCE_DISTANCE) -> Outcome:
@@ -41,10 +41,10 @@ def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = COR
 
 
 def _has_features(points_N_3: np.ndarray, voxel: float) -> bool:
-    """Return whether enough points have neighbours enough for a normal: with none the package ends the process."""
+    """Return whether enough points have neighbors enough for a normal: with none the package ends the process."""
     voxels_M_3 = np.unique(np.floor(points_N_3 / max(voxel, 1e-6)), axis=0)
-    neighbours_M = cKDTree(voxels_M_3).query_ball_point(voxels_M_3, NEAR, return_length=True)
-    return int((neighbours_M > NEIGHBOURS).sum()) >= FEATURES
+    neighbors_M = cKDTree(voxels_M_3).query_ball_point(voxels_M_3, NEAR, return_length=True)
+    return int((neighbors_M > NEIGHBORS).sum()) >= FEATURES
 
 
 METHODS = {"kiss_matcher": MethodEntry("KISS-Matcher", align, is_global=True, package="kiss_matcher")}

@@ -22,7 +22,7 @@ SCALE = 0.05
 def align(
     pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
 ) -> Outcome:
-    """Minimise the distances to the planes of the target's normals."""
+    """Minimize the distances to the planes of the target's normals."""
     return align_by_open3d(pair, "point_to_plane", correspondence_distance, max_iterations)
 
 
@@ -33,7 +33,7 @@ def align_robust(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Minimise a robust kernel of these distances.
+    """Minimize a robust kernel of these distances.
 
     Args:
         kernel: its name in Open3D.

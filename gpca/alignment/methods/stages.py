@@ -1,4 +1,4 @@
-"""ICP as a row of stages that can be exchanged (Rusinkiewicz & Levoy 2001): select, match, reject, weigh, minimise."""
+"""ICP as a row of stages that can be exchanged (Rusinkiewicz & Levoy 2001): select, match, reject, weigh, minimize."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Stages:
         rows: of the source that take part, or None for all.
         reject: from matches to those that are kept.
         weigh: from matches to their weights (n,).
-        metric: what is minimised.
+        metric: what is minimized.
         distance: farther points are no match.
     """
 

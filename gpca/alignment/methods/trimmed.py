@@ -21,7 +21,7 @@ def align(
 ) -> Outcome:
     """Align the share `overlap` of the source that fits best; with 0, the share that fits best is searched too.
 
-    The search minimises ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. No distance is too large for a
+    The search minimizes ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. No distance is too large for a
     correspondence; `correspondence_distance` only measures the outcome.
     """
     if not overlap:

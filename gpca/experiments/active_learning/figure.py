@@ -11,24 +11,13 @@ import numpy as np
 from gpca.active_learning.curves import read_curves
 from gpca.attribution.metrics import mean_interval, source_method_seed
 from gpca.errors import InputError
-from gpca.reporting.figures.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY_BLUE,
-    TEXT_WIDTH_IN,
-    VERMILION,
-    save_figure,
-    use_style,
-    write_title,
-)
-from gpca.reporting.words import plural
+from gpca.reporting.figures.panels import legend_below, panels
+from gpca.reporting.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY_BLUE, VERMILION, write_title
+from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
 OVERLAP_ROWS = {**ROWS, "rare": "encoder saw all;\nthe new one is rare"}
@@ -54,52 +43,37 @@ def draw_learning_curves(
     sources: Mapping[str, str],
     strategies: Mapping[str, str],
     target: float,
-    pdf_path: str | Path,
-    png_path: str | Path,
     rows: Mapping[str, str] = ROWS,
     held_out: Collection[str] | None = None,
-) -> None:
+) -> Figure:
     """Draw the accuracy over labels: its mean over the concepts held out, then over the seeds.
 
     Args:
         curve_files: Files named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
-        sources, strategies: The title of each name, in order; those without curves are left out.
         target: The accuracy that counts as reached, which a dashed line marks.
-        pdf_path, png_path: The two files to write.
         rows: The settings that are shown, and what stands beside their panels.
         held_out: The concepts over which the mean is; all by default.
-
-    Raises:
-        InputError: an unusable file, or no curve of these.
     """
     means = mean_curves(curve_files, held_out)
     curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in means.items()}
-    draw_panels(curves, sources, rows, strategies, STYLES, target, pdf_path, png_path)
+    return draw_curves(curves, sources, rows, strategies, STYLES, target)
 
 
 def draw_overlap_curves(
-    curve_files: Iterable[str | Path],
-    sources: Mapping[str, str],
-    strategies: Mapping[str, str],
-    target: float,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+    curve_files: Iterable[str | Path], sources: Mapping[str, str], strategies: Mapping[str, str], target: float
+) -> Figure:
     """Draw the same of the paper's experiment alone: overlap is the new concept, common in the pool or rare."""
-    paths = pdf_path, png_path
-    draw_learning_curves(curve_files, sources, strategies, target, *paths, rows=OVERLAP_ROWS, held_out=("overlap",))
+    return draw_learning_curves(curve_files, sources, strategies, target, rows=OVERLAP_ROWS, held_out=("overlap",))
 
 
-def draw_panels(
+def draw_curves(
     curves: Mapping[tuple[str, str, str], pd.DataFrame],
     sources: Mapping[str, str],
     rows: Mapping[str, str],
     lines: Mapping[str, str],
     styles: Mapping[str, tuple],
     target: float,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+) -> Figure:
     """Draw curves as lines of panels; rows share an axis of labels where they have as many of them.
 
     The title says over how many seeds the means are.
@@ -109,30 +83,20 @@ def draw_panels(
         sources, rows, lines: The title of each name, in order; those without curves are left out.
         styles: Colour, dashes and width of a line; an interval is drawn where the width is above 1.
         target: The accuracy that a dashed line marks.
-        pdf_path, png_path: The two files to write.
-
-    Raises:
-        InputError: no curve of these.
     """
     shown = {key for key in curves if key[0] in sources and key[1] in rows and key[2] in lines}
     columns, down, across = ([name for name in part if any(key[i] == name for key in shown)]
                              for i, part in enumerate((sources, rows, lines)))  # fmt: skip
     if not shown:
         raise InputError("active learning", "has no curve of these sources and strategies", "run it first")
-    plt = use_style()
     longest = max(len(lines[line]) for line in across)
     beside = max(1, min(LEGEND_COLUMNS, LEGEND_LETTERS // (longest + LEGEND_LETTERS_OF_LINE)))
     below = -(-(len(across) + 1) // beside)
     height_in = 0.42 + 0.2 * below + 1.5 * len(down)
     aim = f"target ({100 * target:g} %)"
     alike = len({curves[key]["labels"].iloc[-1] for key in shown}) == 1
-    figure, axes = plt.subplots(
-        *(len(down), len(columns)),
-        figsize=(TEXT_WIDTH_IN, height_in),
-        sharex=True if alike else "row",
-        sharey=True,
-        squeeze=False,
-    )
+    sharex = True if alike else "row"
+    figure, axes = panels(len(down), len(columns), height_in, sharex=sharex, sharey=True)
     for row, name in enumerate(down):
         for column, source in enumerate(columns):
             panel = axes[row, column]
@@ -148,12 +112,10 @@ def draw_panels(
         axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}")
     handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
     ordered = [*(lines[line] for line in across), aim]
-    figure.legend([handles[title] for title in ordered], ordered, ncol=beside, loc="lower center", columnspacing=1.4)
+    legend_below(figure, [handles[title] for title in ordered], ordered, beside)
     seeds = {count for key in shown for count in curves[key]["seeds"]}
-    span = f"{min(seeds)} to {max(seeds)}" if len(seeds) > 1 else str(max(seeds))
-    write_title(figure, f"Means over {plural(span, 'seed')}")
-    figure.tight_layout(rect=(0, 0.2 * below / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8)
-    save_figure(figure, pdf_path, png_path)
+    write_title(figure, f"Means over {plural(span(seeds), 'seed')}")
+    return figure
 
 
 def mean_curves(
@@ -191,11 +153,5 @@ def _draw(axes, style: tuple, title: str, curve: pd.DataFrame) -> None:
     colour, line, width = style
     axes.plot(curve["labels"], curve["mean"], line, color=colour, linewidth=width, label=title)
     if width > 1:
-        axes.fill_between(
-            curve["labels"],
-            curve["low"].clip(0, 100),
-            curve["high"].clip(0, 100),
-            color=colour,
-            alpha=0.15,
-            linewidth=0,
-        )
+        bounds = curve["low"].clip(0, 100), curve["high"].clip(0, 100)
+        axes.fill_between(curve["labels"], *bounds, color=colour, alpha=0.15, linewidth=0)

@@ -1,13 +1,4 @@
-"""Makes the tables of active learning from the tidy metrics of :func:`gpca.active_learning.metrics.collect_curves`.
-
-All take the same arguments and raise the same error:
-
-    metrics: The tidy metrics.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
-    strategies: The title of each name, in the order in which they are shown.
-    conditions: The config's section ``active_learning``, and ``train`` and ``test`` of its ``registrations``.
-    InputError: The metrics hold none of these sources and strategies.
-"""
+"""Makes the tables of active learning; ``conditions`` are its section of the config, with train and test samples."""
 
 from __future__ import annotations
 
@@ -18,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.metrics import CENSORED_BY, TABLE
-from gpca.objects.title import title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -33,7 +24,6 @@ SETTINGS = {
 }
 COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
 _SHARES = ("reached", "area_under_curve", "area_gain")  # These and every accuracy lie in [0, 1] and are printed in %.
-_NOTHING = ("metrics", "have no results", "run its strategies first")  # The error of a table without rows says this.
 
 
 @dataclass(frozen=True)
@@ -61,11 +51,9 @@ def table3_active_learning(
         "epochs_bald_kmeans": Quantity("epochs_to_target", Column("Epochs", **COUNT), strategy="bald_kmeans"),
     }
     table = TableBuilder("table3_active_learning", {"source": "Dataset", "setting": "Encoder saw"})
-    for source, entry in sources.items():
-        for setting, title in SETTINGS.items():
-            of_row = rows_where(of_table, source=source, table=TABLE + setting)
-            table.add_row([(source, title_of(entry)), (setting, title)], _cells(of_row, quantities, conditions))
-    table.require_rows(*_NOTHING)
+    for (source, setting), labels in crossed(titles_of(sources), SETTINGS):
+        of_row = rows_where(of_table, source=source, table=TABLE + setting)
+        table.add_row(labels, _cells(of_row, quantities, conditions))
     table.compare_across(["labels_bald_kmeans", "labels_random"])
     return table.build(
         caption=f"Labels until a GPC that knew noise and pose reaches {conditions['target']:.0%} on all concepts"
@@ -104,15 +92,11 @@ def table3_extended(
         "area_gain": Quantity("area_gain", Column("Gain (%)", limits=(-100, 100))),
     }
     table = TableBuilder("table3_extended", {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"})
-    for source, entry in sources.items():
-        for setting in ("pretrained", "unseen"):
-            for strategy, title in strategies.items():
-                if strategy in STRATEGIES:
-                    labels = [(source, title_of(entry)), (setting, SETTINGS[setting]), (strategy, title)]
-                    of_row = rows_where(metrics, source=source, table=TABLE + setting, method=strategy)
-                    cells = _cells(of_row, quantities, conditions)
-                    table.add_row(labels, cells, rival=not STRATEGIES[strategy].oracle)
-    table.require_rows(*_NOTHING)
+    settings = {name: SETTINGS[name] for name in ("pretrained", "unseen")}
+    of_pool = {name: title for name, title in strategies.items() if name in STRATEGIES}
+    for (source, setting, strategy), labels in crossed(titles_of(sources), settings, of_pool):
+        of_row = rows_where(metrics, source=source, table=TABLE + setting, method=strategy)
+        table.add_row(labels, _cells(of_row, quantities, conditions), rival=not STRATEGIES[strategy].oracle)
     table.compare_down([key for key in quantities if key != "reached"], same=2)
     return table.build(
         caption=f"Active learning of a held-out concept by every strategy, to {conditions['target']:.0%}"
@@ -145,12 +129,10 @@ def table3_stream(
         "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),
     }
     table = TableBuilder("table3_stream", {"source": "Dataset", "strategy": "Strategy"})
-    for source, entry in sources.items():
-        for strategy, title in strategies.items():
-            if strategy in STREAMS:
-                of_row = rows_where(metrics, source=source, table=TABLE + "pretrained", method=strategy)
-                table.add_row([(source, title_of(entry)), (strategy, title)], _cells(of_row, quantities, conditions))
-    table.require_rows(*_NOTHING)
+    of_stream = {name: title for name, title in strategies.items() if name in STREAMS}
+    for (source, strategy), labels in crossed(titles_of(sources), of_stream):
+        of_row = rows_where(metrics, source=source, table=TABLE + "pretrained", method=strategy)
+        table.add_row(labels, _cells(of_row, quantities, conditions))
     table.compare_down([key for key in quantities if "labels" not in key], same=1)
     return table.build(
         caption="A new concept in a stream of registrations" + table.stand_in_clause(sources, partly=False),

@@ -12,19 +12,12 @@ import numpy as np
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, read_metrics
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
-from gpca.reporting.figures.style import (
-    CONCEPT_COLOURS,
-    GREY,
-    LIGHT_GREY,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    blues,
-    save_figure,
-    use_style,
-)
+from gpca.reporting.figures.panels import draw_percentages
+from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, use_style
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 WIDEST_KEY = 3  # concepts fit into a line over the names of the explainers
 LABEL_IN = 1.45  # The explainers' titles are this wide.
@@ -41,12 +34,8 @@ GAP_OF_ROWS_IN = 0.1
 
 
 def draw_confusions_figure(
-    metrics_csv: str | Path,
-    sources: Mapping[str, str],
-    explainers: Mapping[str, str],
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+    metrics_csv: str | Path, sources: Mapping[str, str], explainers: Mapping[str, str]
+) -> Figure:
     """Draw two panels for each explainer (rows) and source (columns), pooled over the seeds.
 
     The matrix is the share in % of each true concept that is taken for each concept; what is missing to 100 is
@@ -55,8 +44,6 @@ def draw_confusions_figure(
 
     Args:
         metrics_csv: The file that :func:`gpca.attribution.metrics.collect` makes.
-        sources, explainers: The title of each name, in order; those without metrics are left out.
-        pdf_path, png_path: The two files to write.
 
     Raises:
         InputError: an unusable file, or one without metrics of these explainers and sources.
@@ -108,7 +95,7 @@ def draw_confusions_figure(
         of_bars_in = left_in + matrix_in + GAP_IN + bars_in / 2
         text(of_bars_in, 0.42, "of all (%)", ha="center", va="center", fontsize=SMALL_PT)
     text(0.04, 0.03, _key(next(iter(drawn.values())), abstained), ha="left", va="top", fontsize=SMALL_PT)
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
@@ -159,11 +146,7 @@ def draw_matrix(axes, confusion: pd.DataFrame, head: bool, numbers_pt: float = S
     """Draw the rows' shares; a concept without samples has none. Predicted concepts are named only at the `head`."""
     concepts = list(confusion.columns[:-1])
     _, shares_C_C = counts_and_shares(confusion)
-    axes.imshow(np.ma.masked_invalid(shares_C_C), cmap=blues(), vmin=0, vmax=1, aspect="auto")
-    for (row, column), share in np.ndenumerate(shares_C_C):
-        if np.isfinite(share):
-            style = {"fontsize": numbers_pt, "color": "white" if share > 0.65 else "black"}
-            axes.text(column, row, f"{100 * share:.0f}", ha="center", va="center_baseline", **style)
+    draw_percentages(axes, 100 * shares_C_C, "{:.0f}", va="center_baseline", fontsize=numbers_pt)
     names = letters(concepts)
     axes.set_yticks(range(len(names)), names)
     axes.set_xticks(range(len(names)), names if head else [])

@@ -1,12 +1,4 @@
-"""Makes the tables of explainers from tidy metrics: each function names its rows, its columns and its notes.
-
-All take the same arguments and raise the same error:
-
-    metrics: The tidy metrics that :mod:`gpca.attribution.metrics` collects.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
-    explainers: The ``{"title": str, "oracle": bool}`` of each name, in the order in which they are shown.
-    InputError: The metrics hold none of these sources and explainers.
-"""
+"""Makes the tables of explainers, of which each is ``{"title": str, "oracle": bool}`` here, from tidy metrics."""
 
 from __future__ import annotations
 
@@ -16,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.objects.title import title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where, span
+from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
+from gpca.reporting.words import span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +29,6 @@ EXTENDED = {  # Each of these metrics has a column in table1_extended.
 }
 _SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # These are printed in %.
 _LEAST_CAUSAL = 30  # causal samples of all seeds; the accuracy on fewer says nothing
-_NOTHING = ("metrics", "have no accuracy", "run its explainers first")  # The error of a table without rows says this.
 
 
 def table1_single_baselines(
@@ -45,9 +37,8 @@ def table1_single_baselines(
     """Return the accuracy of single-concept attribution (Table I): sources by those of `TABLE1` with predictions."""
     shown = [name for name in TABLE1 if name in explainers and (metrics["method"] == name).any()]
     table = TableBuilder("table1_single_baselines", {"source": "Dataset"})
-    for source, entry in sources.items():
-        table.add_row([(source, title_of(entry))], {name: _cell(metrics, source, name) for name in shown})
-    table.require_rows(*_NOTHING)
+    for (source,), labels in crossed(titles_of(sources)):
+        table.add_row(labels, {name: _cell(metrics, source, name) for name in shown})
     table.compare_across(shown)
     return table.build(
         caption="Mean accuracy of single-concept attribution (%)" + table.stand_in_clause(sources),
@@ -67,12 +58,9 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
     The best accuracy of a source is bold, oracles apart: they are told what the others have to find out.
     """
     table = TableBuilder("table1_extended", {"source": "Dataset", "explainer": "Explainer"})
-    for source, source_entry in sources.items():
-        for explainer, entry in explainers.items():
-            labels = [(source, title_of(source_entry)), (explainer, entry["title"])]
-            cells = {metric: _cell(metrics, source, explainer, metric=metric) for metric in EXTENDED}
-            table.add_row(labels, cells, rival=not entry["oracle"])
-    table.require_rows(*_NOTHING)
+    for (source, explainer), labels in crossed(titles_of(sources), _titles(explainers)):
+        cells = {metric: _cell(metrics, source, explainer, metric=metric) for metric in EXTENDED}
+        table.add_row(labels, cells, rival=not explainers[explainer]["oracle"])
     table.compare_down(["accuracy"], same=1)
     measured = {metric for _, metric in table.cells}
     apart = ", oracles apart" if any(entry["oracle"] for entry in explainers.values()) else ""
@@ -114,13 +102,10 @@ def table2_per_concept(
     The best concept of a row is bold, as in the paper.
     """
     concepts = [concept for concept in metrics["concept"].unique() if concept != ALL]
-    shown = {name: entry for name, entry in explainers.items() if name in GPCA_FORMS}
+    shown = {name: title for name, title in _titles(explainers).items() if name in GPCA_FORMS}
     table = TableBuilder("table2_per_concept", {"source": "Dataset", "explainer": "Explainer"})
-    for source, source_entry in sources.items():
-        for explainer, entry in shown.items():
-            labels = [(source, title_of(source_entry)), (explainer, entry["title"])]
-            table.add_row(labels, {c: _cell(metrics, source, explainer, c) for c in (*concepts, ALL)})
-    table.require_rows(*_NOTHING)
+    for (source, explainer), labels in crossed(titles_of(sources), shown):
+        table.add_row(labels, {c: _cell(metrics, source, explainer, c) for c in (*concepts, ALL)})
     table.compare_across(concepts)
     return table.build(
         caption="Mean accuracy per concept (%)" + table.stand_in_clause(sources),
@@ -131,6 +116,10 @@ def table2_per_concept(
             "Of the test samples that truly are of a concept, the share that is attributed to it.",
         ),
     )
+
+
+def _titles(explainers: Mapping[str, Mapping]) -> dict[str, str]:
+    return {name: entry["title"] for name, entry in explainers.items()}
 
 
 def _cell(

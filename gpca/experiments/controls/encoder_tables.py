@@ -7,13 +7,14 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.experiments.controls.settings import PAPER, SEEN, TRAININGS, TRANSFER, UNSEEN, trained_otherwise
-from gpca.experiments.controls.tables import ALL_TOGETHER, BOOTSTRAP, CHANGE, TITLES, cell_of
+from gpca.experiments.controls.tables import ALL_TOGETHER, BOOTSTRAP, CHANGE, TITLES, change_cell
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, plain_cell, rows_where, span
+from gpca.objects.title import stand_in_clause
+from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
-from gpca.reporting.words import plural
+from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,35 +25,25 @@ KNOWN = {PAPER: TITLES[PAPER], SEEN: "Objects that it learned from (%)", UNSEEN:
 
 
 def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
-    """Return the accuracy of GP-CA on encoders that are trained otherwise, on known and on unseen objects.
-
-    Args:
-        intervals, sources, explainers: As of :func:`gpca.experiments.controls.tables.table10_controls`.
-
-    Raises:
-        InputError: The intervals hold none of these.
-    """
+    """Return the accuracy of GP-CA on encoders that are trained otherwise, on known and on unseen objects."""
     table = TableBuilder("table10_encoders", {"source": "Dataset", "training": "Encoder"})
-    for source, title in (ALL_TOGETHER, *((name, title_of(entry)) for name, entry in sources.items())):
-        for explainer, words in explainers.items():
-            if explainer not in GPCA_FORMS:
-                continue
-            ways = {way: trained_otherwise(explainer, way) for way in TRAININGS}
-            of_ways = {
-                way: rows_where(intervals, source=source, method=name, metric="accuracy").set_index("control")
-                for way, name in {PAPER: explainer, **ways}.items()
-            }
-            for way, rows in of_ways.items():
-                found = {control: rows.loc[control] for control in KNOWN if control in rows.index}
-                cells = {control: cell_of(row) for control, row in found.items()}
-                if way != PAPER:
-                    cells |= {control + CHANGE: cell_of(row, "change") for control, row in found.items()}
-                label = words if way == PAPER else f"{words}, {TRAINED[way]}"
-                table.add_row([(source, title), (way, _with_seeds(label, found.values()))], cells)
-                if way == PAPER:
-                    of_same, same = _on_same_seeds(found, [of_ways[other] for other in TRAININGS])
-                    table.add_row([(source, title), (SAME_SEEDS, _with_seeds(words, of_same))], same)
-    table.require_rows("intervals", "have no GP-CA", "run the controls first")
+    forms = {name: words for name, words in explainers.items() if name in GPCA_FORMS}
+    for (source, explainer), (dataset, (_, words)) in crossed(ALL_TOGETHER | titles_of(sources), forms):
+        ways = {way: trained_otherwise(explainer, way) for way in TRAININGS}
+        of_ways = {
+            way: rows_where(intervals, source=source, method=name, metric="accuracy").set_index("control")
+            for way, name in {PAPER: explainer, **ways}.items()
+        }
+        for way, rows in of_ways.items():
+            of_control = {control: rows.loc[control] for control in KNOWN if control in rows.index}
+            cells = {control: interval_cell(row) for control, row in of_control.items()}
+            if way != PAPER:
+                cells |= {control + CHANGE: change_cell(row) for control, row in of_control.items()}
+            label = words if way == PAPER else f"{words}, {TRAINED[way]}"
+            table.add_row([dataset, (way, _with_seeds(label, of_control.values()))], cells)
+            if way == PAPER:
+                of_same, same = _on_same_seeds(of_control, [of_ways[other] for other in TRAININGS])
+                table.add_row([dataset, (SAME_SEEDS, _with_seeds(words, of_same))], same)
     return table.build(
         caption="Accuracy (%) on encoders that are trained otherwise" + stand_in_clause(sources.values()),
         column_head="objects",
@@ -80,7 +71,7 @@ def _on_same_seeds(
     Returns:
         the rows that it follows from; the cell of each control.
     """
-    found = {
+    of_control = {
         control: rows.loc[control]
         for rows in others
         for control in own
@@ -88,9 +79,9 @@ def _on_same_seeds(
     }
     cells: dict[str, Cell | None] = {
         control: plain_cell(100 * (row["value"] - row["change"]), int(row["seeds"]), int(row["samples"]))
-        for control, row in found.items()
+        for control, row in of_control.items()
     }
-    return list(found.values()), cells
+    return list(of_control.values()), cells
 
 
 def _with_seeds(words: str, rows: Iterable[pd.Series]) -> str:
@@ -104,11 +95,7 @@ def table10_costs(
     """Return what explainers that see the registrations themselves cost, beside what they gain.
 
     Args:
-        intervals, sources, explainers: As of :func:`gpca.experiments.controls.tables.table10_controls`.
         costs: What :func:`gpca.experiments.controls.costs.collect_costs` returned.
-
-    Raises:
-        InputError: The costs hold none of these.
     """
     table = TableBuilder("table10_costs", {"explainer": "Explainer"})
     gains = {name: TITLES[name] for name in (PAPER, UNSEEN, TRANSFER)}
@@ -121,9 +108,8 @@ def table10_costs(
         if cells["seconds"] is None:
             continue
         accuracy = rows_where(intervals, source=pooled, method=explainer, metric="accuracy").set_index("control")
-        cells |= {name: cell_of(accuracy.loc[name]) for name in gains if name in accuracy.index}
+        cells |= {name: interval_cell(accuracy.loc[name]) for name in gains if name in accuracy.index}
         table.add_row([(explainer, words)], cells)
-    table.require_rows("costs", "have no explainer", "run the controls first")
     return table.build(
         caption="What explainers of the pair cost and gain" + stand_in_clause(sources.values()),
         column_head="metric",

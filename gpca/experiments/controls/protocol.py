@@ -15,7 +15,7 @@ from gpca.experiments.controls.costs import ASKED, Costs
 from gpca.experiments.controls.rivals import Embed, Rival, described_for
 from gpca.experiments.controls.settings import (
     PAPER,
-    RELABELLED,
+    RELABELED,
     RETRAINED,
     SEEN,
     TRANSFER,
@@ -23,7 +23,7 @@ from gpca.experiments.controls.settings import (
     ControlSettings,
     trained_otherwise,
 )
-from gpca.experiments.controls.variants import left_out, relabelled, shows_known_object, variant
+from gpca.experiments.controls.variants import left_out, relabeled, shows_known_object, variant
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, Describing, Encoding
 from gpca.pairs.dataset import Registrations
@@ -40,7 +40,7 @@ Attach = Callable[[Registrations], Registrations]
 
 
 @dataclass(frozen=True)
-class Experiment:
+class ControlRun:
     """What all controls of one source and seed have in common.
 
     Attributes:
@@ -79,7 +79,7 @@ class Experiment:
         import pandas as pd
 
         plain = self._described(replace(registrations, attached=dict(self.embeddings[PAPER])), self.source)
-        embeds = self._learnt(PAPER, plain)
+        embeds = self._learned(PAPER, plain)
         plain = _attached(embeds, plain)
         tests = self._tests(PAPER, plain)
         admitted = [control for control in self.settings.controls if self._admits(control, registrations, others)]
@@ -119,9 +119,9 @@ class Experiment:
             changed = self._described(replace(changed, attached=dict(self.embeddings[control])), self.source)
         elif control == "reversed":
             return _attached(embeds, self._described(self._embedded(changed, self.source), self.source))
-        return _attached(self._learnt(control, changed), changed) if control in RETRAINED else changed
+        return _attached(self._learned(control, changed), changed) if control in RETRAINED else changed
 
-    def _learnt(self, control: str, registrations: Registrations) -> dict[str, Attach]:
+    def _learned(self, control: str, registrations: Registrations) -> dict[str, Attach]:
         """Return what attaches the embeddings by the rivals' own encoders, learned from the training samples."""
         train = registrations.subset(registrations.rows("train"))
         embeds = {}
@@ -174,15 +174,15 @@ class Experiment:
     def _explained(
         self,
         control: str,
-        learnt: Registrations,
+        learned: Registrations,
         tests: Mapping[tuple[str, str], Registrations],
         rivals: Mapping[str, Rival],
     ) -> Iterator[pd.DataFrame]:
         """Yield what each explainer says of the test samples after learning from the training samples."""
-        for train, asked in self._lessons(control, learnt.subset(learnt.rows("train")), tests):
+        for train, asked in self._lessons(control, learned.subset(learned.rows("train")), tests):
             for name, rival in rivals.items():
                 explainer = rival.make()
-                if control in RELABELLED and getattr(explainer, "trained_with_encoder", False):
+                if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
                     continue
                 with self.costs.learning(control, name):
                     explainer.fit(train)
@@ -202,14 +202,14 @@ class Experiment:
         Labels that say nothing make an explainer name a whole cluster of samples by chance. So they are shuffled in
         parts, of which each is learned from alone and asked about a part of the test samples.
         """
-        if control not in RELABELLED:
+        if control not in RELABELED:
             yield train, tests
         elif control != "shuffled":
-            yield relabelled(control, train, self.source, self.seed), tests
+            yield relabeled(control, train, self.source, self.seed), tests
         else:
             parts = max(1, min(PARTS, len(train) // FEWEST_OF_PART))
             for part in range(parts):
-                of_part = relabelled(control, _dealt(train, part, parts), self.source, self.seed, part)
+                of_part = relabeled(control, _dealt(train, part, parts), self.source, self.seed, part)
                 yield of_part, {name: _dealt(test, part, parts) for name, test in tests.items()}
 
 

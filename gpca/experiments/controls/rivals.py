@@ -8,11 +8,10 @@ from functools import partial
 
 import numpy as np
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.errors import InputError
 from gpca.explainers.interface import ConceptExplainer, Describing
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.pairs.dataset import Registrations
-from gpca.settings import check_settings
 
 Embed = Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]  # and the name of their source -> h and logits
 
@@ -42,7 +41,6 @@ def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> di
     rivals = {}
     for name, settings in explainers.items():
         require_settings(name, settings)
-        check_settings(dict(settings), "explainers", name)
         entry = explainer_entry(name)
         rivals[name] = Rival(partial(entry.make, source, seed, **settings), entry.reads, entry.observed_only)
     return rivals

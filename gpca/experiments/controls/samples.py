@@ -9,7 +9,6 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse
 from gpca.causes.subjects import read_subjects
-from gpca.errors import InputError
 from gpca.io.csv_file import read_numbers
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
@@ -47,12 +46,5 @@ def sample_table(registrations: Registrations, objects: ObjectClouds) -> pd.Data
 
 
 def read_samples(path: str | Path) -> pd.DataFrame:
-    """Read what :func:`sample_table` returned.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a value that is no finite number, a sample twice.
-    """
-    rows = read_numbers(path, COLUMNS, (*SEVERITIES, "error"), least=0)
-    if rows["sample"].duplicated().any():
-        raise InputError(path, "contains a sample twice", "regenerate it")
-    return rows
+    """Read what :func:`sample_table` returned; InputError for an unusable file."""
+    return read_numbers(path, COLUMNS, (*SEVERITIES, "error"))

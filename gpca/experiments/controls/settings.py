@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, PositiveShare
+from gpca.settings import Bounds, Count, Different, Distinct, PositiveShare
 
 PAPER = "paper"  # the protocol itself, which every control is compared with
 Control = Literal[
@@ -27,7 +27,7 @@ RETRAINED = ("density", UNSEEN)  # need an encoder of their own
 Training = Literal["random_draws", "two_layer_head"]
 TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
 WRONG_LABELS = {f"label_noise_{percent}": percent / 100 for percent in (5, 10, 20, 30)}  # share of the training labels
-RELABELLED = (*WRONG_LABELS, "shuffled")
+RELABELED = (*WRONG_LABELS, "shuffled")
 TRANSFER = "transfer"
 Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
 
@@ -47,8 +47,8 @@ class ControlSettings:
         bins: of each severity, equally wide.
     """
 
-    controls: tuple[Control, ...] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
-    encoders: Annotated[tuple[Training, ...], Bounds(minItems=0)] = ()
+    controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
+    encoders: Annotated[tuple[Training, ...], Different(fewest=0)] = ()
     encoder_seeds: Count = 1
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)

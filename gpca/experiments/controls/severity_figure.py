@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gpca.errors import InputError
 from gpca.experiments.controls.severity import REGISTRATION
-from gpca.reporting.figures.panels import in_lines
+from gpca.reporting.figures.panels import color_on_blue, in_lines, legend_below
 from gpca.reporting.figures.style import (
     BLACK,
     GREY,
@@ -24,13 +23,13 @@ from gpca.reporting.figures.style import (
     TEXT_WIDTH_IN,
     VERMILION,
     blues,
-    save_figure,
     use_style,
     write_title,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 CURVES = {"noise": "standard deviation (% of the diameter)", "overlap": "points cut off (%)"}
 # Explainers without a look of their own take the colors in turn, and after all of them the next line and marker.
@@ -40,45 +39,33 @@ WIDEST = 4  # panels of pose in a row
 SUCCEEDS = "registration succeeds"
 
 
-def draw_severity_curves(
-    severities: pd.DataFrame, explainers: Mapping[str, str], title: str, pdf_path: str | Path, png_path: str | Path
-) -> None:
+def draw_severity_curves(severities: pd.DataFrame, explainers: Mapping[str, str], title: str) -> Figure:
     """Draw curves for noise and overlap, and for pose a map of rotation by translation for each explainer.
 
     Args:
         severities: What :func:`gpca.experiments.controls.severity.collect` returned.
-        explainers: The title of each name, in order; those without numbers are left out.
-        title: What stands above.
-        pdf_path, png_path: The two files to write.
-
-    Raises:
-        InputError: the severities hold none of these.
     """
     shown = [name for name in explainers if (severities["method"] == name).any()]
     if not shown:
         raise InputError("severities", "have none of these explainers", "run the controls first")
     plt = use_style()
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
     maps = [REGISTRATION, *shown]
     lines = -(-len(maps) // WIDEST)
     heights_in = [2.6, *[1.62] * lines]
-    height_in = sum(heights_in) + 0.95
-    below_title = ConstrainedLayoutEngine(rect=(0, 0, 1, 1 - 0.2 / height_in))
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in), layout=below_title)
+    figure = plt.figure(figsize=(TEXT_WIDTH_IN, sum(heights_in) + 0.95), layout="constrained")
     grid = figure.add_gridspec(2, 1, height_ratios=[heights_in[0] + 0.55, sum(heights_in[1:]) + 0.2])
     upper, lower = figure.add_subfigure(grid[0]), figure.add_subfigure(grid[1])
-    panels = upper.subplots(1, len(CURVES), sharey=True)
+    curves = upper.subplots(1, len(CURVES), sharey=True)
     drawn = severities[severities["method"].isin(maps)]
     lowest = _below(drawn[drawn["concept"].isin(CURVES)]["value"])
-    for panel, (concept, label) in zip(panels, CURVES.items(), strict=True):
+    for panel, (concept, label) in zip(curves, CURVES.items(), strict=True):
         of_concept = severities[severities["concept"] == concept]
         _draw_curves(panel, of_concept, shown, explainers)
         limits = (100 * of_concept["low"].min(), 100 * of_concept["high"].max())
         panel.set(xlabel=label, title=concept, ylim=(lowest, 101), xlim=limits if len(of_concept) else None)
-    panels[0].set_ylabel("accuracy, success (%)")
-    handles, labels = panels[0].get_legend_handles_labels()
-    upper.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=SMALL_PT, columnspacing=1.2)
+    curves[0].set_ylabel("accuracy, success (%)")
+    handles, labels = curves[0].get_legend_handles_labels()
+    legend_below(upper, handles, labels, 3)
     of_pose = drawn[drawn["concept"] == "pose"]
     palest = _below(of_pose["value"])
     axes = lower.subplots(lines, WIDEST, sharex=True, sharey=True, squeeze=False)
@@ -92,7 +79,7 @@ def draw_severity_curves(
     lower.supylabel("translation (% of the diameter)", fontsize=8)
     lower.colorbar(image, ax=axes, shrink=0.8, pad=0.01, label="accuracy, success (%)")
     write_title(figure, title)
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def _draw_curves(panel, of_concept: pd.DataFrame, shown: list[str], explainers: Mapping[str, str]) -> None:
@@ -129,7 +116,7 @@ def _draw_map(panel, rows: pd.DataFrame, palest: float):
     for (row, column), share in np.ndenumerate(shares):
         if np.isfinite(share):
             place = ((edges[column] + edges[column + 1]) / 2, 50 * (others[row] + others[row + 1]))
-            colour = "white" if share - palest > 0.65 * (100 - palest) else "black"
-            panel.text(*place, f"{share:.0f}", ha="center", va="center", fontsize=SMALL_PT, color=colour)
+            color = color_on_blue((share - palest) / (100 - palest))
+            panel.text(*place, f"{share:.0f}", ha="center", va="center", fontsize=SMALL_PT, color=color)
     panel.tick_params(labelsize=SMALL_PT)
     return image

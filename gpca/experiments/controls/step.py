@@ -6,7 +6,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
-from gpca.experiments.controls.protocol import Experiment
+from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.samples import sample_table
 from gpca.experiments.controls.settings import PAPER, ControlSettings
@@ -38,7 +38,7 @@ def run(job: Job) -> None:
             if not left_out(control, registrations, settings, encoder.backbone):
                 changed = variant(control, registrations, job.source, job.seed, settings, icp)
                 embeddings[control] = read_embedding(path, changed, "train_control", logits=True)
-        experiment = Experiment(
+        experiment = ControlRun(
             source=job.source,
             seed=job.seed,
             settings=settings,

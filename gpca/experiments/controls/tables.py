@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import REPEATS
 from gpca.experiments.controls.settings import PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.experiments.diagnosis.judged import POOLED
-from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where, span
+from gpca.objects.title import stand_in_clause
+from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
+from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
-from gpca.reporting.words import plural
+from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +31,7 @@ TITLES = {
 CHANGE = "_change"  # behind a control's name: the key of the column of its differences
 WRONG = "_wrong"  # behind the key of an AUROC: the column of the answers that it has to find
 BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
-ALL_TOGETHER = (POOLED, "All together")
+ALL_TOGETHER = {POOLED: "All together"}
 
 
 def table10_controls(
@@ -40,20 +41,13 @@ def table10_controls(
 
     Args:
         intervals: What :func:`gpca.experiments.controls.intervals.collect` returned.
-        sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
-        explainers: The title of each name, in order.
         controls: The names of those that were run.
-
-    Raises:
-        InputError: The intervals hold none of these.
     """
     table = TableBuilder("table10_controls", {"source": "Dataset", "explainer": "Explainer"})
     names = [PAPER, *(name for name in TITLES if name in controls)]
-    for source, title in (ALL_TOGETHER, *((name, title_of(entry)) for name, entry in sources.items())):
-        for explainer, words in explainers.items():
-            rows = rows_where(intervals, source=source, method=explainer)
-            table.add_row([(source, title), (explainer, words)], _cells(rows, source, names))
-    table.require_rows("intervals", "have no controls", "run their explainers first")
+    for (source, explainer), labels in crossed(ALL_TOGETHER | titles_of(sources), explainers):
+        rows = rows_where(intervals, source=source, method=explainer)
+        table.add_row(labels, _cells(rows, source, names))
     table.compare_down([name for name in names if name != "shuffled"], same=1)
     columns = {name: Column(TITLES[name], interval=False) for name in names}
     columns |= {
@@ -113,26 +107,19 @@ def _cells(rows: pd.DataFrame, source: str, names: Sequence[str]) -> dict[str, C
         if "accuracy" not in of_control.index:
             continue
         accuracy = of_control.loc["accuracy"]
-        cells[name] = cell_of(accuracy)
-        cells[name + CHANGE] = cell_of(accuracy, "change") if name != PAPER else None
+        cells[name] = interval_cell(accuracy)
+        cells[name + CHANGE] = change_cell(accuracy) if name != PAPER else None
         if name in _AUROCS and "auroc_error" in of_control.index:
             key, samples = f"{name}_auroc", int(accuracy["samples"])
-            cells[key] = cell_of(of_control.loc["auroc_error"], scale=1)
+            cells[key] = interval_cell(of_control.loc["auroc_error"], factor=1)
             cells[key + WRONG] = plain_cell(round((1 - accuracy["value"]) * samples), int(accuracy["seeds"]), samples)
     return cells
 
 
 def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
-    """Return the accuracy of every explainer (rows, by the source that it learned from) on each source (columns).
-
-    Args:
-        intervals, sources, explainers: As of :func:`table10_controls`.
-
-    Raises:
-        InputError: The intervals hold none of these.
-    """
+    """Return the accuracy of every explainer (rows, by the source that it learned from) on each source (columns)."""
     table = TableBuilder("table10_transfer", {"explainer": "Explainer", "trained_on": "Learned from"})
-    titles = {name: title_of(entry) for name, entry in sources.items()}
+    titles = titles_of(sources)
     accuracy = rows_where(intervals, metric="accuracy")
     for explainer, words in explainers.items():
         of_explainer = rows_where(accuracy, method=explainer)
@@ -140,13 +127,12 @@ def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
             cells: dict[str, Cell | None] = {}
             for tested in titles:
                 control = PAPER if tested == trained_on else TRANSFER
-                found = rows_where(of_explainer, control=control, source=tested, trained_on=trained_on)
-                cells[tested] = cell_of(found.iloc[0]) if len(found) else None
+                rows = rows_where(of_explainer, control=control, source=tested, trained_on=trained_on)
+                cells[tested] = interval_cell(rows.iloc[0]) if len(rows) else None
             table.add_row([(explainer, words), (trained_on, title)], cells)
         elsewhere = rows_where(of_explainer, control=TRANSFER, trained_on=POOLED).set_index("source")
-        cells = {name: cell_of(elsewhere.loc[name]) for name in (*titles, POOLED) if name in elsewhere.index}
+        cells = {name: interval_cell(elsewhere.loc[name]) for name in (*titles, POOLED) if name in elsewhere.index}
         table.add_row([(explainer, words), (POOLED, "another (mean)")], cells)
-    table.require_rows("intervals", "have no transfer", "run the controls of two sources first")
     return table.build(
         caption="Accuracy (%) from each source to each other" + stand_in_clause(sources.values()),
         column_head="tested",
@@ -159,10 +145,6 @@ def table10_transfer(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
     )
 
 
-def cell_of(row: pd.Series, value: str = "value", scale: float = 100) -> Cell:
-    """Return a value, or the change, of a row of the intervals, in percent; without an interval where it has none."""
-    prefix = "change_" if value == "change" else ""
-    bounds = (scale * row[f"{prefix}low"], scale * row[f"{prefix}high"])
-    known = bounds if all(map(isfinite, bounds)) else None
-    half_width = (bounds[1] - bounds[0]) / 2
-    return Cell(scale * row[value], half_width, int(row["seeds"]), int(row["samples"]), bounds=known)
+def change_cell(row: pd.Series) -> Cell:
+    """Return the change of a row of the intervals against the paper's protocol, in points."""
+    return interval_cell(row, "change", ("change_low", "change_high"))

@@ -91,7 +91,7 @@ def shows_known_object(registrations: Registrations) -> np.ndarray:
     return np.isin(of_row, of_row[registrations.split == "train"])
 
 
-def relabelled(control: str, train: Registrations, *axes: object) -> Registrations:
+def relabeled(control: str, train: Registrations, *axes: object) -> Registrations:
     """Return training samples with labels that a control changes.
 
     Of label noise, that share of the labels names one of the other concepts. Where they are shuffled, each concept's

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,15 +20,17 @@ from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
-from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
+from gpca.reporting.figures.panels import color_on_blue, write_below
+from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, use_style, write_title
 from gpca.reporting.words import object_in_words
 from gpca.seeds import seed_of_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PANEL_IN = 1.02
 HEAD_IN = 0.3
 CAPTION_IN = 0.17
-LEFT_IN = 4 * PANEL_IN
-NAMES_IN = 1.75
 TRUTH = "measured share φ"
 ROW_IN = 0.19
 GAP = 0.5  # of a row, between what was measured and the scores, which are not shares
@@ -40,10 +43,8 @@ def draw_causes_example(
     settings: Mapping,
     explainers: Mapping[str, str],
     title: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
     dataset: str = "",
-) -> None:
+) -> Figure:
     """Draw the counterfactuals on the left, and on the right the measured shares and the scores of every explainer.
 
     Left is the observed cloud over the model after ICP with every subset of the causes, and the error v of each.
@@ -54,7 +55,6 @@ def draw_causes_example(
         objects_npz, causes_npz: Of the shown source and seed, which their paths name.
         predictions_csv: One file per explainer, of the same source and seed.
         settings: The config's section ``causes`` with ``icp``.
-        explainers: The title of each name, in order; those that name no cause are left out.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
@@ -67,34 +67,26 @@ def draw_causes_example(
     own = CauseSettings.from_dict({k: v for k, v in given.items() if k != "icp"}, given.get("icp"))
     shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
     names, scores_R_4 = _scores(causes, row, predictions_csv, explainers)
-    plt = use_style()
-    rows_in = ROW_IN * (len(names) + GAP)
-    height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), 0.35 + rows_in)
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
+    rows_in = 0.35 + ROW_IN * (len(names) + GAP)
+    height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), rows_in)
+    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, height_in), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=(4 * PANEL_IN, TEXT_WIDTH_IN - 4 * PANEL_IN))
     view = widest_views(shown.model)[0]
     everything = np.concatenate([shown.model @ view.T, *(cloud @ view.T for cloud in shown.observed)])
     corners = np.quantile(everything, (0.001, 0.999), axis=0)
-    line_in = (height_in - HEAD_IN) / 2
-    for place, subset in enumerate(sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset))):
-        line, column = divmod(place, 4)
-        bottom_in = height_in - HEAD_IN - (line + 1) * line_in + CAPTION_IN
-        bounds = (column * PANEL_IN / TEXT_WIDTH_IN, bottom_in / height_in)
-        panel = figure.add_axes((*bounds, PANEL_IN / TEXT_WIDTH_IN, (line_in - CAPTION_IN) / height_in))
+    subsets = sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset))
+    for panel, subset in zip(left.subplots(2, 4).flat, subsets, strict=True):
         draw_clouds(panel, shown.model @ view.T, shown.observed[subset] @ view.T, size=0.9, corners=corners)
         words = " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none"
-        error = f"{100 * causes.truth.error[row, subset]:.1f} %"
-        where = ((column + 0.5) * PANEL_IN / TEXT_WIDTH_IN, (bottom_in - 0.02) / height_in)
         words = "all three" if subset == ALL else words
-        figure.text(*where, f"{words}: {error}", ha="center", va="top", fontsize=SMALL_PT)
-    table_in = TEXT_WIDTH_IN - LEFT_IN - NAMES_IN - 0.1
-    left = (LEFT_IN + NAMES_IN) / TEXT_WIDTH_IN
-    bottom = (height_in - HEAD_IN - 0.2 - rows_in) / height_in
-    panel = figure.add_axes((left, bottom, table_in / TEXT_WIDTH_IN, rows_in / height_in))
-    _draw_scores(panel, names, scores_R_4)
+        write_below(panel, f"{words}: {100 * causes.truth.error[row, subset]:.1f} %", fontsize=SMALL_PT)
+    table, spare = right.subplots(2, 1, height_ratios=(rows_in, max(height_in - HEAD_IN - rows_in, 0.01)))
+    spare.set_axis_off()
+    _draw_scores(table, names, scores_R_4)
     object_name = object_in_words(causes.registrations.object_name[row], dataset)
     write_title(figure, f"{title}: {object_name}. Mean error in % of the diameter with each subset of the causes")
     legend_of_clouds(figure, "model", "observed", gap=0.2)
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def choose_sample(causes: Causes, path: str | Path) -> int:
@@ -138,18 +130,9 @@ def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray) -> None:
             panel.imshow(scores_R_4[rows], cmap=blues(), vmin=0, vmax=1, aspect="auto", extent=extent)
     panel.set(xlim=sides, ylim=(place_R[-1] + 0.5, -0.5))
     for (row, column), score in np.ndenumerate(scores_R_4):
-        weight = "bold" if score == scores_R_4[row].max() else "normal"
-        colour = "white" if score > 0.65 else "black"
-        panel.text(
-            column,
-            place_R[row],
-            f"{score:.2f}",
-            ha="center",
-            va="center_baseline",
-            fontsize=SMALL_PT,
-            color=colour,
-            weight=weight,
-        )
+        look = {"fontsize": SMALL_PT, "color": color_on_blue(score)}
+        look["weight"] = "bold" if score == scores_R_4[row].max() else "normal"
+        panel.text(column, place_R[row], f"{score:.2f}", ha="center", va="center_baseline", **look)
     panel.spines[:].set_visible(False)
     panel.set_yticks(place_R, names, fontsize=SMALL_PT)
     panel.set_xticks(range(len(LABELS)), LABELS, fontsize=SMALL_PT)

@@ -38,35 +38,35 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     - spearman_attribution, cosine_attribution: between scores and φ of a failed sample, mean.
     - deletion_gain: share of the error of a failed sample that goes when the cause named first is removed, mean.
     """
-    labelled_N = samples.label != BORDERLINE
-    failed_N = labelled_N & (samples.label != NOMINAL)
+    labeled_N = samples.label != BORDERLINE
+    failed_N = labeled_N & (samples.label != NOMINAL)
     measures = {
-        **_of_alarm(samples.alarm[labelled_N], failed_N[labelled_N], weights_B_N[:, labelled_N]),
+        **_of_alarm(samples.alarm[labeled_N], failed_N[labeled_N], weights_B_N[:, labeled_N]),
         "nominal_calibration": _calibration_error(
-            samples.nominal[labelled_N], samples.label[labelled_N] == NOMINAL, weights_B_N[:, labelled_N]
+            samples.nominal[labeled_N], samples.label[labeled_N] == NOMINAL, weights_B_N[:, labeled_N]
         ),
     }
     if samples.names_causes:
-        measures |= _of_causes(samples, labelled_N, failed_N, weights_B_N)
+        measures |= _of_causes(samples, labeled_N, failed_N, weights_B_N)
     return measures
 
 
 def counted(samples: Judged, metric: str) -> int:
     """Return how many samples a measure is taken over: those of a label, and of these the nominal or the failed."""
-    labelled_N, nominal_N = samples.label != BORDERLINE, samples.label == NOMINAL
+    labeled_N, nominal_N = samples.label != BORDERLINE, samples.label == NOMINAL
     if metric in OF_FAILED:
-        return int((labelled_N & ~nominal_N).sum())
-    return int((nominal_N if metric == "false_alarm_rate" else labelled_N).sum())
+        return int((labeled_N & ~nominal_N).sum())
+    return int((nominal_N if metric == "false_alarm_rate" else labeled_N).sum())
 
 
-def _of_causes(samples: Judged, labelled_N, failed_N, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     right_N = samples.named == samples.label
     recalls = [_mean(right_N[of], weights_B_N[:, of]) for of in (samples.label == label for label in LABELS)]
     first_N = samples.scores.argmax(axis=1)
     of_failed = weights_B_N[:, failed_N]
     scores_F_3, phi_F_3 = samples.scores[failed_N], samples.phi[failed_N]
     precisions = [
-        ranking(samples.scores[labelled_N, i], samples.causes[labelled_N, i], weights_B_N[:, labelled_N])["precision"]
+        ranking(samples.scores[labeled_N, i], samples.causes[labeled_N, i], weights_B_N[:, labeled_N])["precision"]
         for i in range(len(CONCEPTS))
     ]
     without_N = samples.error[np.arange(len(samples)), ALL ^ (1 << first_N)]

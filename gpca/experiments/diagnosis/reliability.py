@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,51 +11,72 @@ from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import Judged
 from gpca.experiments.diagnosis.measures import BINS as BINS_OF_NOMINAL
-from gpca.reporting.figures.panels import finish_panels, small_panels
-from gpca.reporting.figures.style import BLUE, GREY, LIGHT_GREY, SMALL_PT
+from gpca.reporting.figures.panels import label_outer, legend_below, panels_in_lines
+from gpca.reporting.figures.style import BLUE, GREY, LIGHT_GREY, SMALL_PT, write_title
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FEWEST = 5  # A bin with fewer samples has no point.
 HEADROOM = 2.0  # The axis of the numbers is so many times as high as the highest bar, on its scale.
 
 
 def draw_nominal_reliability(
-    judged: Mapping[tuple[str, str, int], Judged],
-    sources: Mapping[str, str],
-    explainers: Mapping[str, str],
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+    judged: Mapping[tuple[str, str, int], Judged], sources: Mapping[str, str], explainers: Mapping[str, str]
+) -> Figure:
     """Draw the share of nominal registrations over the score of "nominal", all sources and seeds together.
 
     Args:
         judged: what :func:`gpca.experiments.diagnosis.judged.read_judged` returns; borderline samples are left out.
-        sources: the title of each source, in order.
-        explainers: the title of each explainer, in order; those without predictions are left out.
-        pdf_path: the figure.
-        png_path: the same figure.
-
-    Raises:
-        InputError: no predictions of these sources and explainers.
     """
     parts = {
-        name: [samples for (source, own, _), samples in judged.items() if own == name and source in sources]
+        name: [of_seed for (source, own, _), of_seed in judged.items() if own == name and source in sources]
         for name in explainers
     }
     shown = [name for name in explainers if parts[name]]
     if not shown:
         raise InputError("diagnoses", "have no predictions of these sources and explainers", "run them first")
-    figure, panels = small_panels(len(shown), panel_height_in=1.85)
-    for panel, name in zip(panels, shown, strict=True):
-        label_S = np.concatenate([samples.label for samples in parts[name]])
-        score_S = np.concatenate([samples.nominal for samples in parts[name]])
+    samples = {}
+    for name in shown:
+        label_S = np.concatenate([of_seed.label for of_seed in parts[name]])
+        score_S = np.concatenate([of_seed.nominal for of_seed in parts[name]])
         clear_S = label_S != BORDERLINE
-        came_true_S = label_S[clear_S] == NOMINAL
-        gap = draw_reliability_panel(panel, score_S[clear_S], came_true_S, BINS_OF_NOMINAL, "share that is nominal")
-        panel.set_title(f"{explainers[name]}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
-    handles, labels = panels[0].get_legend_handles_labels()
+        samples[explainers[name]] = score_S[clear_S], label_S[clear_S] == NOMINAL
     drawn = {source for source, own, _ in judged if own in shown}
     title = ", ".join(title for name, title in sources.items() if name in drawn)
-    finish_panels(figure, panels, title, handles, labels, 'score of "nominal"', "share", pdf_path, png_path)
+    return reliability_figure(samples, title, BINS_OF_NOMINAL, 'score of "nominal"', "share", "share that is nominal")
+
+
+def reliability_figure(
+    samples: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    title: str,
+    bins: int,
+    across: str = "largest score",
+    up: str = "accuracy",
+    label: str = "accuracy",
+    least: float = 0.0,
+) -> Figure:
+    """Return a figure with a panel for each entry, and the calibration error of its samples in the panel's title.
+
+    Args:
+        samples: What stands above a panel -> the probability of each of its samples, and whether it came true.
+        title: That of the figure.
+        bins: How many each panel has.
+        across, up: What the axes are called.
+        label: That of the curves, in the legend.
+        least: The smallest probability that there can be.
+    """
+    figure, panels = panels_in_lines(len(samples), 1.85 if least == 0 else 1.55)
+    for panel, (words, (probability_S, true_S)) in zip(panels, samples.items(), strict=True):
+        gap = draw_reliability_panel(panel, probability_S, true_S, bins, label)
+        panel.set_title(f"{words}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
+        if least:
+            panel.set_xlim(least - 0.03, 1.02)
+            panel.set_xticks([0.4, 0.6, 0.8, 1.0], ["0.4", "0.6", "0.8", "1"])
+    label_outer(panels, across, up)
+    legend_below(figure, *panels[0].get_legend_handles_labels())
+    write_title(figure, title)
+    return figure
 
 
 def draw_reliability_panel(

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.registry import CAUSES, explainer_entry
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.causes.dataset import Causes
-from gpca.causes.labels import labelled
+from gpca.causes.labels import labeled
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.features.dataset import Descriptors
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
@@ -29,7 +29,7 @@ def run(job: Job) -> None:
         inputs = [causes_file, read, read_timing]
         with record_provenance([predictions, timings], inputs, job.settings, seed=seed):
             causes = Causes.load(causes_file, (job.source, seed))
-            registrations = with_what_it_reads(labelled(causes), entry, read)
+            registrations = with_what_it_reads(labeled(causes), entry, read)
             seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
             explainer.fit(registrations.subset(training_rows(registrations, causes_file)))
             attribution = explainer.explain(observed_only(registrations))

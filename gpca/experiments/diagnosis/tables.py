@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import REPEATS
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
-from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import title_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
+from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -38,6 +38,7 @@ SHOWN_OF_FRAMES = {
     **{key: SHOWN[key] for key in ("dominant_accuracy", "false_alarm_rate", "auroc_failed", "average_precision")},
     **{key: SHOWN[key] for key in ("spearman_attribution", "deletion_gain", "nominal_calibration", "samples")},
 }
+AGAIN = {CEILING: "Truth from other starts (ceiling)"}
 _SHARES = (  # These are printed in %.
     STATE,
     *("balanced_accuracy", "dominant_accuracy", "false_alarm_rate", "average_precision", "deletion_gain"),
@@ -49,20 +50,13 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
 
     Args:
         intervals: What :func:`gpca.experiments.diagnosis.intervals.collect` returned.
-        sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
-        explainers: The title of each name, in order.
-
-    Raises:
-        InputError: The intervals hold none of these.
     """
     stand_ins = any(entry["stand_in"] for entry in sources.values())
-    titles = {name: title_of(entry) for name, entry in sources.items()} | {POOLED: "All together"}
+    titles = titles_of(sources) | {POOLED: "All together"}
     table = TableBuilder("table9_causes", {"source": "Dataset", "explainer": "Explainer"})
-    for source, title in titles.items():
-        for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
-            rows = rows_where(intervals, source=source, method=explainer).set_index("metric")
-            table.add_row([(source, title), (explainer, words)], _cells(rows, SHOWN), rival=explainer != CEILING)
-    table.require_rows("intervals", "have no diagnosis", "run its explainers first")
+    for (source, explainer), labels in crossed(titles, {**explainers, **AGAIN}):
+        rows = rows_where(intervals, source=source, method=explainer).set_index("metric")
+        table.add_row(labels, _cells(rows, SHOWN), rival=explainer != CEILING)
     table.compare_down([key for key in SHOWN if key not in ("lead", "samples")], same=1)
     return table.build(
         caption="What is wrong with a registration, if anything: objects that no explainer was trained on"
@@ -91,19 +85,14 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
     Args:
         intervals: What :func:`gpca.experiments.frame_causes.metrics.collect` returned.
         frames: The ``{"title": str, "stand_in": bool}`` of the frames.
-        explainers: The title of each name, in order.
-
-    Raises:
-        InputError: The intervals hold none of these.
     """
     of_frames = rows_where(intervals, source=REAL_WORLD)
     table = TableBuilder("table9_frames", {"explainer": "Explainer"})
-    for explainer, words in {**explainers, CEILING: "Truth from other starts (ceiling)"}.items():
+    for (explainer,), labels in crossed({**explainers, **AGAIN}):
         rows = rows_where(of_frames, method=explainer).set_index("metric")
-        table.add_row([(explainer, words)], _cells(rows, SHOWN_OF_FRAMES), rival=explainer != CEILING)
+        table.add_row(labels, _cells(rows, SHOWN_OF_FRAMES), rival=explainer != CEILING)
     counted = rows_where(of_frames, method=TRUTH).set_index("metric")
-    if counted.empty or not table.rows:
-        raise InputError("intervals", "have no diagnosis of frames", "run the step frame_causes first")
+    table.require_rows()
     table.compare_down([key for key in SHOWN_OF_FRAMES if key != "samples"])
     of = {kind: int(counted["value"][f"count_{kind}"]) for kind in KINDS}
     failed = {concept: of[concept] for concept in CONCEPTS}
@@ -128,15 +117,15 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
 
 def _parts(intervals: pd.DataFrame, titles: Mapping[str, str]) -> str:
     """Return how many samples of each source are nominal and how many failed, in words."""
-    told = {}
+    parts = {}
     for source, title in titles.items():
         samples = rows_where(intervals, source=source).groupby("metric")["samples"].max()
         nominal, judged = samples.get("false_alarm_rate"), samples.max()
         if source != POOLED and nominal is not None:
-            told[title] = f"{nominal:.0f} are nominal and {judged - nominal:.0f} failed"
-    if len(told) > 1 and len(set(told.values())) == 1:
-        return f"{next(iter(told.values()))} on each dataset"
-    return "; ".join(f"{words} on {title}" for title, words in told.items())
+            parts[title] = f"{nominal:.0f} are nominal and {judged - nominal:.0f} failed"
+    if len(parts) > 1 and len(set(parts.values())) == 1:
+        return f"{next(iter(parts.values()))} on each dataset"
+    return "; ".join(f"{words} on {title}" for title, words in parts.items())
 
 
 def _list_of(failed: Mapping[str, int]) -> str:
@@ -148,15 +137,10 @@ def _cells(rows: pd.DataFrame, shown: Mapping[str, Column]) -> dict[str, Cell | 
     cells: dict[str, Cell | None] = {}
     for metric in (name for name in shown if name in rows.index):
         row, scale = rows.loc[metric], 100 if metric in _SHARES else 1
-        cells[metric] = _cell(row, "value", "low", "high", scale)
+        cells[metric] = interval_cell(row, factor=scale)
         if metric == "balanced_accuracy" and row["rival"] and "lead" in shown:
-            cells["lead"] = _cell(row, "difference", "difference_low", "difference_high", scale)
+            cells["lead"] = interval_cell(row, "difference", ("difference_low", "difference_high"), scale)
     if len(rows):
         judged = rows["samples"].max()
         cells["samples"] = plain_cell(judged, int(rows["seeds"].iloc[0]), int(judged))
     return cells
-
-
-def _cell(row: pd.Series, value: str, low: str, high: str, scale: float) -> Cell:
-    bounds = (scale * row[low], scale * row[high])
-    return Cell(scale * row[value], (bounds[1] - bounds[0]) / 2, int(row["seeds"]), int(row["samples"]), bounds=bounds)

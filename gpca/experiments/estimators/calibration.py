@@ -59,7 +59,7 @@ def measure(rows: pd.DataFrame) -> dict[str, float]:
     """Return the metrics of the registrations of one estimator; NaN where one is not defined.
 
     - kl_rotation, kl_translation: KL divergence of the estimate from the reference, nats, trimmed mean.
-    - nne: √ of the trimmed mean of |e|² / tr Σ, the normalised norm error; 1 is right, more is too sure.
+    - nne: √ of the trimmed mean of |e|² / tr Σ, the normalized norm error; 1 is right, more is too sure.
     - nees: trimmed mean of eᵀΣ⁻¹e / 6; 1 is right, more is too sure.
     - coverage: share whose eᵀΣ⁻¹e is within the 95 % quantile of χ² with six degrees.
     - auroc_failed: how well the predicted spread of the points tells failed registrations from the others.

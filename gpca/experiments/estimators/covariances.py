@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.metrics import source_method_seed
-from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.axes import Axes
 from gpca.io.csv_file import numbers, read_csv
@@ -44,19 +43,12 @@ def covariance_of(row: pd.Series) -> np.ndarray:
 def read_estimates(path: str | Path) -> pd.DataFrame:
     """Read a file of the step ``estimate``: `failed` as booleans, numbers as numbers, NaN where an estimate failed."""
     rows = read_csv(path, (*KNOWN, *JUDGED, *COVARIANCE))
-    rows["add_relative"] = numbers(path, rows, "add_relative", least=0)
-    told = rows["failure"] == ""
-    for name in JUDGED:
+    has_estimate = rows["failure"] == ""
+    for name in ("add_relative", *JUDGED, *COVARIANCE):
         # Where the reference itself has none, no estimate diverges from it by any number.
-        rows[name] = numbers(path, rows, name, needed=told & (rows[name] != ""), least=0)
-    for name in COVARIANCE:
-        rows[name] = numbers(path, rows, name, needed=told)
-    if not rows["failed"].isin(("True", "False")).all():
-        raise InputError(
-            path, "column 'failed' contains values other than True and False", f"regenerate it with '{MADE_BY}'"
-        )
-    rows["failed"] = rows["failed"] == "True"
-    return rows
+        needed = name == "add_relative" or has_estimate & ((rows[name] != "") | (name in COVARIANCE))
+        rows[name] = numbers(path, rows, name, needed)
+    return rows.assign(failed=rows["failed"] == "True")
 
 
 def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], pd.DataFrame]:
@@ -99,13 +91,4 @@ class ReferenceSamples:
             **{"sample": ("S",), "method": ("S",), "twists": ("N", 6), "offsets": ("O",), "true_twist": ("S", 6)}
         }
         kinds = {"sample": WHOLE, "method": TEXT, "twists": REAL, "offsets": WHOLE, "true_twist": REAL}
-        arrays = load_arrays(path, shapes, MADE_BY, kinds)
-        offsets = arrays["offsets"]
-        ends = (0, len(arrays["twists"]))
-        if (
-            len(offsets) != len(arrays["sample"]) + 1
-            or (offsets[0], offsets[-1]) != ends
-            or (np.diff(offsets) < 0).any()
-        ):
-            raise InputError(path, "'offsets' do not match 'twists' and 'sample'", f"regenerate it with '{MADE_BY}'")
-        return cls(**arrays)
+        return cls(**load_arrays(path, shapes, MADE_BY, kinds))

@@ -50,14 +50,16 @@ def ellipse(covariance_2_2: np.ndarray) -> np.ndarray:
     return radius * np.column_stack([np.cos(TURN), np.sin(TURN)]) * np.sqrt(np.maximum(values_2, 0)) @ axes_2_2.T
 
 
-def draw_ellipses(panel, samples: ReferenceSamples, place: int, said: Mapping, block: slice, factor: float) -> None:
+def draw_ellipses(
+    panel, samples: ReferenceSamples, place: int, estimates: Mapping, block: slice, factor: float
+) -> None:
     """Draw one registration in the plane in which the reference's results spread most.
 
     Args:
         panel: axes of matplotlib.
         samples: the reference's results.
         place: the registration's row in the samples.
-        said: estimator -> its row about the registration, None where it has none.
+        estimates: estimator -> its row about the registration, None where it has none.
         block: the numbers of a twist that are drawn, rotation or translation.
         factor: what turns them into the panel's unit.
     """
@@ -68,14 +70,14 @@ def draw_ellipses(panel, samples: ReferenceSamples, place: int, said: Mapping, b
     panel.scatter(*dots_n_2.T, s=1.2, color=LIGHT_GREY, linewidths=0, rasterized=True, zorder=1)
     reach = max(np.quantile(np.abs(dots_n_2), 0.985), 2.6 * np.sqrt(max(values_3[-1], 0)), *np.abs(true_2))
     most = WIDEST * reach
-    for name, row in said.items():
+    for name, row in estimates.items():
         if row is None:
             continue
         outline_n_2 = ellipse(factor**2 * plane_3_2.T @ covariance_of(row)[block, block] @ plane_3_2)
         reach = max(reach, min(np.abs(outline_n_2).max(), most))
-        colour, line = style_of(name)
+        color, line = style_of(name)
         look = {"linewidth": 1.8, "zorder": 2} if name == REFERENCE else {"linewidth": 0.9, "zorder": 3}
-        panel.plot(*outline_n_2.T, color=colour, linestyle=line, **look)
+        panel.plot(*outline_n_2.T, color=color, linestyle=line, **look)
     panel.plot(*true_2, marker="*", color=BLACK, markersize=7, markeredgecolor="white", markeredgewidth=0.5, zorder=4)
     panel.set(xlim=(-1.05 * reach, 1.05 * reach), ylim=(-1.05 * reach, 1.05 * reach), aspect="equal")
     panel.locator_params(nbins=4)

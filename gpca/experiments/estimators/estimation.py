@@ -21,8 +21,8 @@ from gpca.causes.dataset import Causes
 from gpca.errors import InputError
 from gpca.experiments.estimators.covariances import JUDGED, REFERENCE, ReferenceSamples, covariance_columns
 from gpca.experiments.estimators.examples import Moved, describe, example, true_twist
+from gpca.experiments.estimators.settings import EstimatorPairSettings
 from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.settings import EstimatorPairSettings
 from gpca.features.pair import observed_pair
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
@@ -38,7 +38,7 @@ MOVED: Moved = "model"  # onto what was observed, as the causes' track has it
 
 
 @dataclass(frozen=True)
-class Case:
+class EstimatedRow:
     """A test registration by one method.
 
     Attributes:
@@ -63,7 +63,7 @@ def try_estimators(
     seed: int,
     estimators: Mapping[str, Mapping],
     settings: EstimatorPairSettings,
-) -> tuple[dict[str, pd.DataFrame], list[Case]]:
+) -> tuple[dict[str, pd.DataFrame], list[EstimatedRow]]:
     """Return for each estimator, and for the reference, a row per registration; and the registrations.
 
     Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning.
@@ -106,7 +106,7 @@ def try_estimators(
     return {name: pd.DataFrame(of_estimator) for name, of_estimator in records.items()}, cases
 
 
-def reference_samples(cases: Sequence[Case]) -> ReferenceSamples:
+def reference_samples(cases: Sequence[EstimatedRow]) -> ReferenceSamples:
     """Return what the file of the reference's results holds of these registrations."""
     return ReferenceSamples(
         sample=np.array([case.known["sample"] for case in cases]),
@@ -127,7 +127,7 @@ class _Maker:
         self._settings = settings
         self._register = make_method(method)
 
-    def case(self, row: int) -> Case:
+    def case(self, row: int) -> EstimatedRow:
         """Return a test registration with the reference's results."""
         registered, T_true = self._registered(row)
         registrations, judge = self._causes.registrations, self._judges.of(self._causes.registrations, row)
@@ -146,7 +146,7 @@ class _Maker:
             "add_relative": errors["add_relative"],
             "failed": bool(errors["add_relative"] >= self._settings.failed or not registered.outcome.fitness),
         }
-        return Case(known, registered, true_twist(registered, T_true, judge, MOVED), twists_n_6, seconds)
+        return EstimatedRow(known, registered, true_twist(registered, T_true, judge, MOVED), twists_n_6, seconds)
 
     def example(self, row: int) -> Example:
         """Return a training registration with the results of a few starts."""
@@ -186,7 +186,7 @@ def predicted_spread(points_N_3: np.ndarray, covariance_6_6: np.ndarray) -> floa
     return float(np.sqrt(max(squares.mean(), 0.0)))
 
 
-def _judged(case: Case, said: Estimate, reference: Estimate, floor: float) -> dict[str, object]:
+def _judged(case: EstimatedRow, said: Estimate, reference: Estimate, floor: float) -> dict[str, object]:
     """Return the row of an estimate; numbers that it has not are NaN."""
     row = {**case.known, "failure": said.failure}
     numbers = dict.fromkeys(JUDGED, np.nan)
@@ -203,7 +203,7 @@ def _judged(case: Case, said: Estimate, reference: Estimate, floor: float) -> di
     return row | numbers | covariance_columns(said.covariance_6_6)
 
 
-def _reference(case: Case) -> Estimate:
+def _reference(case: EstimatedRow) -> Estimate:
     if not len(case.reference_twists):
         return Estimate(None, "too few of the reference's runs found a correspondence")
     return Estimate(np.cov(case.reference_twists, rowvar=False))

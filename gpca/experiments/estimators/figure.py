@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,20 +12,13 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.experiments.estimators.covariances import REFERENCE, ReferenceSamples
 from gpca.experiments.estimators.ellipses import draw_ellipses, style_of
-from gpca.reporting.figures.style import (
-    BLACK,
-    GREY,
-    LIGHT_GREY,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.panels import label_outer
+from gpca.reporting.figures.style import BLACK, GREY, LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, use_style, write_title
 from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 LEVELS = np.linspace(0.01, 0.99, 99)
 FEWEST_SAMPLES = 20  # of the reference, that a registration shows
@@ -36,9 +30,7 @@ def draw_estimators(
     estimators: Mapping[str, str],
     methods: Mapping[str, str],
     title: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+) -> Figure:
     """Draw two registrations above, and all of the first method below.
 
     Above stand the registration that failed and the one that did not whose error is the median of its kind.
@@ -46,7 +38,6 @@ def draw_estimators(
     Args:
         estimates: rows by source, estimator and seed; the reference is among the estimators.
         samples_npz: the reference's samples of the shown source and seed, which its path names.
-        estimators, methods: the title of each name, in order.
 
     Raises:
         InputError: an unusable file, or files that do not belong together.
@@ -59,32 +50,24 @@ def draw_estimators(
     shown = _chosen(of_shown[REFERENCE], samples, method, samples_npz)
     pooled = {name: _pooled(estimates, name, method) for name in titles}
     plt = use_style()
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, 5.35))
-    panels = figure.add_gridspec(1, 4, left=0.065, right=0.995, top=0.875, bottom=0.63, wspace=0.5)
-    for column, (kind, place) in enumerate(shown.items()):
-        for part, (block, unit, factor) in enumerate(
-            (("rotation", "degrees", np.rad2deg(1.0)), ("translation", "% of the diameter", 100.0))
-        ):
-            panel = figure.add_subplot(panels[0, 2 * column + part])
-            said = {name: _said(of_shown[name], samples.sample[place]) for name in titles}
-            axes = slice(0, 3) if block == "rotation" else slice(3, 6)
-            draw_ellipses(panel, samples, place, said, axes, factor)
-            panel.set_title(f"{kind}: {block}", fontsize=8, pad=3)
-            panel.set_xlabel(f"first axis ({unit})", fontsize=SMALL_PT, labelpad=1)
-            panel.set_ylabel(f"second axis ({unit})", fontsize=SMALL_PT, labelpad=0)
+    figure = plt.figure(figsize=(TEXT_WIDTH_IN, 5.35), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=(2.1, 3))
+    _draw_shown(upper.subplots(1, 2 * len(shown)), shown, samples, of_shown)
     names = [name for name in titles if len(pooled[name])]
-    told = [name for name in names if name != REFERENCE] or names
-    of_scatter = figure.add_gridspec(2, 4, left=0.065, right=0.675, top=0.545, bottom=0.075, wspace=0.1, hspace=0.2)
-    limits = _limits([pooled[name] for name in told])
-    for i, name in enumerate([REFERENCE, *(name for name in told if name != REFERENCE)][:8]):
-        panel = figure.add_subplot(of_scatter[i // 4, i % 4])
-        _draw_scatter(panel, pooled[name], titles[name], style_of(name)[0], limits, i % 4 == 0, i >= 4)
-        if i == 0:
-            _write(panel, (0.04, 0.97), "too confident")
-            _write(panel, (0.97, 0.03), "too cautious")
-    figure.text(0.37, 0.005, "predicted spread (% of the diameter)", ha="center", va="bottom", fontsize=SMALL_PT)
-    figure.text(0.003, 0.31, "error (% of the diameter)", ha="left", va="center", rotation=90, fontsize=SMALL_PT)
-    _draw_coverage(figure.add_axes((0.74, 0.075, 0.245, 0.47)), pooled, names)
+    informative = [REFERENCE, *(name for name in names if name != REFERENCE)][:8]
+    left, right = lower.subfigures(1, 2, width_ratios=(0.69, 0.31))
+    limits = _limits([pooled[name] for name in names if name != REFERENCE or len(names) == 1])
+    scatters = left.subplots(2, 4, sharex=True, sharey=True).flat
+    for panel, name in zip(scatters, informative, strict=False):
+        _draw_scatter(panel, pooled[name], titles[name], style_of(name)[0], limits)
+    for spare in left.axes[len(informative) :]:
+        spare.set_visible(False)
+    label_outer(left.axes[: len(informative)], "", "")
+    _write(left.axes[0], (0.04, 0.97), "too confident")
+    _write(left.axes[0], (0.97, 0.03), "too cautious")
+    left.supxlabel("predicted spread (% of the diameter)", fontsize=SMALL_PT)
+    left.supylabel("error (% of the diameter)", fontsize=SMALL_PT)
+    _draw_coverage(right.subplots(), pooled, names)
     handles = [plt.Line2D([], [], color=style_of(n)[0], linestyle=style_of(n)[1], label=titles[n]) for n in names]
     signs: list[tuple[str, str, dict[str, Any]]] = [
         ("the reference's results", ".", {"color": LIGHT_GREY}),
@@ -96,9 +79,25 @@ def draw_estimators(
         plt.Line2D([], [], **({"color": BLACK} | look), marker=marker, linestyle="", label=label)
         for label, marker, look in signs
     ]
-    figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 0.972), ncols=6, columnspacing=1.2)
+    upper.legend(handles=handles, loc="outside upper left", ncols=6, columnspacing=1.2)
     write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over the reference's results; below, all datasets")
-    save_figure(figure, pdf_path, png_path)
+    return figure
+
+
+def _draw_shown(panels, shown: Mapping[str, int], samples: ReferenceSamples, of_shown: Mapping) -> None:
+    """Draw the ellipses of each registration that is shown, in a plane of its rotation and one of its translation."""
+    parts = {
+        "rotation": (slice(0, 3), "degrees", np.rad2deg(1.0)),
+        "translation": (slice(3, 6), "% of the diameter", 100.0),
+    }
+    for panel, ((kind, place), (part, (axes, unit, factor))) in zip(
+        panels, product(shown.items(), parts.items()), strict=True
+    ):
+        estimates = {name: _estimate_of(rows, samples.sample[place]) for name, rows in of_shown.items()}
+        draw_ellipses(panel, samples, place, estimates, axes, factor)
+        panel.set_title(f"{kind}: {part}", fontsize=8, pad=3)
+        panel.set_xlabel(f"first axis ({unit})", fontsize=SMALL_PT, labelpad=1)
+        panel.set_ylabel(f"second axis ({unit})", fontsize=SMALL_PT, labelpad=0)
 
 
 def coverages(mahalanobis_S: np.ndarray) -> np.ndarray:
@@ -140,24 +139,24 @@ def _chosen(reference: pd.DataFrame, samples: ReferenceSamples, method: str, pat
     return shown
 
 
-def _said(rows: pd.DataFrame, sample: int) -> pd.Series | None:
-    told = rows[(rows["sample"] == str(sample)) & (rows["failure"] == "")]
-    return None if told.empty else told.iloc[0]
+def _estimate_of(rows: pd.DataFrame, sample: int) -> pd.Series | None:
+    of_sample = rows[(rows["sample"] == str(sample)) & (rows["failure"] == "")]
+    return None if of_sample.empty else of_sample.iloc[0]
 
 
-def _draw_scatter(panel, rows: pd.DataFrame, title: str, colour: str, limits, left: bool, below: bool) -> None:
+def _draw_scatter(panel, rows: pd.DataFrame, title: str, color: str, limits: tuple[float, float]) -> None:
     """Draw errors over predicted spreads; on the diagonal the prediction is right on average."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
     panel.plot(limits, limits, color=GREY, linewidth=0.6, zorder=1)
     for failed, marker in ((False, "o"), (True, "x")):
         of_kind = rows[rows["failed"] == failed]
-        face = {"facecolors": "none", "edgecolors": colour} if marker == "o" else {"color": colour}
+        face = {"facecolors": "none", "edgecolors": color} if marker == "o" else {"color": color}
         where = 100 * np.maximum(of_kind["spread"], 1e-5), 100 * of_kind["add_relative"]
         panel.scatter(*where, s=7, marker=marker, linewidths=0.5, **face)
     panel.set(xscale="log", yscale="log", xlim=limits, ylim=limits)
     panel.set_title(title, fontsize=SMALL_PT, pad=2)
-    panel.tick_params(which="both", pad=1.5, length=2, labelleft=left, labelbottom=below)
+    panel.tick_params(which="both", pad=1.5, length=2)
     decades = 10.0 ** np.arange(np.ceil(np.log10(limits[0])), np.floor(np.log10(limits[1])) + 1)
     for axis in (panel.xaxis, panel.yaxis):
         axis.set_major_locator(FixedLocator(decades.tolist()))

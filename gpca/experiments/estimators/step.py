@@ -5,8 +5,8 @@ from __future__ import annotations
 from gpca.alignment.methods.registry import require_local
 from gpca.causes.dataset import Causes
 from gpca.experiments.estimators.estimation import reference_samples, try_estimators
+from gpca.experiments.estimators.settings import EstimatorPairSettings
 from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.settings import EstimatorPairSettings
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.process.job import Job

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from gpca.experiments.estimators.covariances import REFERENCE
 from gpca.objects.title import stand_in_clause
-from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, interval_over
+from gpca.reporting.tables.builder import TableBuilder, interval_over
+from gpca.reporting.tables.cells import cell_over_sources
 from gpca.reporting.tables.table import Column, Table
 from gpca.reporting.words import plural
 
@@ -42,12 +43,7 @@ def table12_uncertainty(
     Args:
         metrics: The tidy metrics that :func:`gpca.experiments.estimators.calibration.collect_estimates` makes.
         seconds: The tidy seconds beside them.
-        sources: The ``{"title": str, "stand_in": bool}`` of each name.
-        estimators, methods: The title of each name, in the order in which they are shown.
         pairs: The config's section ``estimator_pairs``.
-
-    Raises:
-        InputError: The metrics hold none of these sources and estimators.
     """
     table = TableBuilder("table12_uncertainty", {"method": "Registered by", "estimator": "Estimator"})
     without: list[str] = []
@@ -65,7 +61,6 @@ def table12_uncertainty(
                 continue
             cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", method, 1e3)
             table.add_row([(method, method_title), (name, title)], cells, rival=name != REFERENCE)
-    table.require_rows("metrics", "have no estimator", "run the step estimate first")
     table.compare_down(_RANKED, same=1)
     numbers = {
         method: cell_over_sources(metrics, metrics, sources, REFERENCE, "no_estimate", method, 1) for method in methods

@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baselines.registry import CAUSES, explainer_entry
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes
-from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.frames import chosen_instances, measure_frames
-from gpca.causes.labels import LABELS, labelled
-from gpca.causes.settings import CauseSettings
+from gpca.causes.labels import LABELS, labeled
+from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
+from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.features.dataset import Descriptors, describe_all
 from gpca.features.settings import DescriptorSettings
 from gpca.frames.instances import Instances
@@ -43,7 +42,7 @@ def run(job: Job) -> None:
 
     # Of each source: causes, descriptors, encoder, embeddings.
     lessons = list(zip(job.causes, job.descriptors, job.encoders, job.embeddings, strict=True))
-    frames = files_behind(job.section("datasets"), job.folders.get("data_dir"), job.get("scenes"))
+    frames = files_behind(job.section("datasets"), job.data_dir, job.get("scenes"))
     inputs = [job.instances, job.objects, *frames, *(path for files in lessons for path in files)]
     outputs = [job.frame_causes, job.samples, job.predictions]
     with record_provenance(outputs, inputs, job.settings, seed=job.seed):
@@ -66,9 +65,7 @@ def _measure(job: Job) -> tuple[Causes, pd.DataFrame]:
     require_of_objects(instances, objects, job.instances)
     chosen = FrameCauseSettings(**job.section("frames"))
     rows = chosen_instances(instances, job.source, chosen)
-    datasets = datasets_of(
-        job.section("datasets"), job.folders.get("data_dir"), Path(job.folders.get("downloads", "")), job.get("scenes")
-    )
+    datasets = datasets_of(job.section("datasets"), job.data_dir, job.downloads, job.get("scenes"))
     meshes = meshes_of(models_of(datasets), objects, instances.object_index[rows].tolist())
     settings = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     return measure_frames(instances, rows, objects, meshes, job.source, job.seed, settings, chosen.points)
@@ -80,7 +77,7 @@ class _Asked:
     def __init__(
         self, causes: Causes, described: Descriptors, encoder: EncoderSettings, axes: tuple[str, int], lessons: list
     ) -> None:
-        self._registrations = observed_only(labelled(causes))
+        self._registrations = observed_only(labeled(causes))
         self._described = described
         self._encoder = encoder
         self._axes = axes
@@ -108,7 +105,7 @@ class _Asked:
             entry = explainer_entry("gpca_pair", CAUSES)
             parts = []
             for causes, descriptors, _, _ in self._lessons:
-                registrations = with_what_it_reads(labelled(Causes.load(causes)), entry, descriptors)
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, descriptors)
                 parts.append(registrations.subset(training_rows(registrations, causes)))
             asked = self._with(self._described.groups)
             self._of_descriptors = [(_joined(parts), asked)]
@@ -121,7 +118,7 @@ class _Asked:
 
             entry = explainer_entry("gpca", CAUSES)
             for causes, _, weights, embeddings in self._lessons:
-                registrations = with_what_it_reads(labelled(Causes.load(causes)), entry, embeddings)
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, embeddings)
                 model = load_model(weights, self._encoder, LABELS, registrations.axes, step="train_on_causes")
                 h_S_d, logits_S_C = embed(model, self._registrations, *self._axes, self._encoder)
                 lessons = registrations.subset(training_rows(registrations, causes))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from gpca.pairs.perturbation import Concept
-from gpca.settings import Bounds, Count, PositiveShare
+from gpca.settings import Bounds, Count, Distinct, PositiveShare
 
 PAIR = "pair"  # the embedding that is measurements of the pair, beside those by the backbones
 
@@ -18,17 +18,17 @@ class FrameLabelSettings:
     Attributes:
         seeds: the first so many of the run's.
         held_out: the new concepts, in turn.
-        initial: labelled samples of the known concepts before the first query, balanced.
+        initial: labeled samples of the known concepts before the first query, balanced.
         labels: L, the budget of queries.
         targets: accuracies on the test samples to which labels are counted.
         points: drawn from each cloud to describe a pair.
     """
 
     seeds: Count = 1
-    held_out: tuple[Concept, ...] = ("overlap",)
+    held_out: Distinct[Concept] = ("overlap",)
     initial: Annotated[int, Bounds(minimum=2)] = 60
     labels: Count = 80
-    targets: tuple[PositiveShare, ...] = (0.65, 0.7, 0.75)
+    targets: Distinct[PositiveShare] = (0.65, 0.7, 0.75)
     points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
 
 

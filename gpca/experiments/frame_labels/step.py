@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
-from gpca.active_learning.embedded import Embedded
-from gpca.active_learning.new_concepts import Experiment, run_experiment
+from gpca.active_learning.new_concepts import NewConceptTrial, run_trial
+from gpca.active_learning.rounds import Embedded
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.experiments.frame_labels.settings import PAIR, FrameLabelSettings
 from gpca.explainers.pair_classifier import NormalisedDescriptors
@@ -30,8 +30,8 @@ def run(job: Job) -> None:
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for name, samples in progress(_embedded(job, own.points), f"labels of {job.source}"):
             for concept in own.held_out:
-                experiment = Experiment(name, samples, concept, CONCEPTS)
-                learnt = run_experiment(experiment, job.strategies, settings, job.source, job.seed)
+                experiment = NewConceptTrial(name, samples, concept, CONCEPTS)
+                learnt = run_trial(experiment, job.strategies, settings, job.source, job.seed)
                 for setting, strategy, curve in learnt:
                     curves[strategy][setting, concept] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
@@ -51,5 +51,5 @@ def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:
     yield from zip(job.backbones, map(samples, of_backbones), strict=True)
     axes = (job.source, job.seed)
     measured_S_F = describe_registrations(registrations, *axes, points=points)["relations"]
-    normalised = NormalisedDescriptors(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
-    yield PAIR, samples(normalised(measured_S_F))
+    normalized = NormalisedDescriptors(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
+    yield PAIR, samples(normalized(measured_S_F))

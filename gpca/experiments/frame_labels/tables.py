@@ -12,7 +12,8 @@ from gpca.experiments.active_learning.tables import COUNT, Quantity, cell_of
 from gpca.experiments.frame_labels.metrics import VALIDATION, chosen_backbone
 from gpca.experiments.frame_labels.settings import PAIR, in_percent
 from gpca.frames.source import REAL_WORLD
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, mean_over
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -26,13 +27,9 @@ def table6_labels(metrics: pd.DataFrame, title: str, encoders: Mapping[str, str]
 
     Args:
         metrics: The tidy metrics (:func:`gpca.experiments.frame_labels.metrics.collect`).
-        title: The title of the frames.
         encoders: The title of each backbone, in order.
         conditions: The config's sections ``active_learning`` and ``frame_labels``, and ``train`` and ``test`` of its
             ``real_world``.
-
-    Raises:
-        InputError: The metrics hold no learning curve of these.
     """
     metrics = rows_where(metrics, source=REAL_WORLD)
     percents = [in_percent(target) for target in conditions["targets"]]
@@ -62,12 +59,12 @@ def table6_labels(metrics: pd.DataFrame, title: str, encoders: Mapping[str, str]
         if any(cells.values()):
             cells["validation"] = cell_of_repeats(100 * rows_where(validation, method=name)["value"].to_numpy(), 0)
         table.add_row([(name, f"{words} (chosen)" if name == chosen else words)], cells)
-    table.require_rows("metrics", "have no learning curve", "run frame_labels first")
     for percent in percents:
         table.compare_across([f"{strategy}_{percent}" for strategy in STRATEGIES])
     columns = {"validation": Column("Validation (%)", interval=False)}
     columns |= {key: quantity.column for key, (_, quantity) in labels.items()}
     columns |= {key: quantity.column for key, quantity in ends.items()}
+    table.require_rows()
     seeds = max(cell.seeds for (_, key), cell in table.cells.items() if key != "validation")
     return table.build(
         caption=f"Labels until a GPC to which {' or '.join(conditions['held_out'])} is new is as accurate on {title}",

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from gpca.encoders.registry import DIFFERENTIABLE
+from gpca.encoders.settings import DGCNNOptions, EncoderSettings
 from gpca.errors import InputError
-from gpca.experiments.experiment import Experiment
+from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.gradients.settings import GradientSettings
 
 
-def check(config: dict, _left_out: Callable[[str], set[str]]) -> None:
+def check(config: dict, _left_out: LeftOut) -> None:
     """Check that enough points are left for the encoder where most are deleted."""
-    from gpca.encoders.settings import DGCNNOptions, EncoderSettings  # they load numba
-
     encoder = EncoderSettings(**config["encoders"][config["embedding"]["encoder"]])
     if encoder.backbone != "dgcnn":
         return
-    share, neighbours = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
-    if round((1 - share) * encoder.draw_points) < neighbours:
-        fault = f"deleting {share:g} of {encoder.draw_points} points leaves fewer than the encoder's {neighbours}"
+    share, neighbors = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
+    if round((1 - share) * encoder.draw_points) < neighbors:
+        fault = f"deleting {share:g} of {encoder.draw_points} points leaves fewer than the encoder's {neighbors}"
         raise InputError("config key gradients.deleted", fault, "delete fewer")
 
 
@@ -33,8 +32,18 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="gradients",
     summary="registrations, encoder and embeddings -> what GP-CA's scores respond to: saliency maps and TCAV",
-    settings=GradientSettings,
-    tidy="gradients.csv",
+    sections={"gradients": GradientSettings},
+    tidy=(
+        Tidy(
+            "gradients.csv",
+            "gpca.experiments.gradients.metrics:collect",
+            {
+                "deletion_files": "saliency/{gradient_source}/seed{seed}.csv",
+                "tcav_files": "tcav/{gradient_source}/seed{seed}.csv",
+            },
+            rule="gradient_metrics",
+        ),
+    ),
     needs=("gradient_source",),
     names=names,
     shown=lambda config, _sources: {"gradients": config["gradients"]},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,25 +14,21 @@ from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
-from gpca.reporting.figures.style import LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, blues, save_figure, use_style, write_title
+from gpca.reporting.figures.panels import panels
+from gpca.reporting.figures.style import LIGHT_GREY, SMALL_PT, blues, write_title
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 HEIGHT_IN = 2.75
 PALEST = -0.25  # White, which no point has, is so far below the least rank.
 
 
-def draw_saliency(
-    registrations_npz: str | Path,
-    maps_npz: str | Path,
-    deletions_csv: str | Path,
-    title: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+def draw_saliency(registrations_npz: str | Path, maps_npz: str | Path, deletions_csv: str | Path, title: str) -> Figure:
     """Draw one sample of each concept: of those named right, the one with the median score.
 
     Args:
         registrations_npz, maps_npz, deletions_csv: Of one source and seed.
-        title: Of the source.
 
     Raises:
         InputError: an unusable file, or files that do not belong together.
@@ -48,13 +45,10 @@ def draw_saliency(
     shown = {concept: sample for concept, sample in chosen.items() if sample is not None}
     if not shown or set(shown.values()) - (set(test) & set(places)):
         raise InputError(maps_npz, f"its samples differ from those of {deletions_csv}", "regenerate both")
-    plt = use_style()
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    below_title = ConstrainedLayoutEngine(rect=(0, 0, 1, 1 - 0.2 / HEIGHT_IN))
-    figure, axes = plt.subplots(1, len(CONCEPTS), figsize=(TEXT_WIDTH_IN, HEIGHT_IN), layout=below_title)
+    figure, [axes] = panels(1, len(CONCEPTS), HEIGHT_IN)
     for panel, concept in zip(axes, CONCEPTS, strict=True):
         panel.set_axis_off()
         if concept in shown:
@@ -69,7 +63,7 @@ def draw_saliency(
     bar.set_label("rank of the point's saliency", fontsize=SMALL_PT)
     bar.ax.set_yticklabels(["least", "median", "most"], fontsize=SMALL_PT)
     write_title(figure, f"{title}: points that GP-CA's score reacts to")
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def _chosen(of_concept) -> int | None:

@@ -25,8 +25,8 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
-GRADIENT, CENTRE, LEAST, RANDOM = "gradient", "to_centre", "least_gradient", "random"
-ORDERS = (GRADIENT, CENTRE, LEAST, RANDOM)  # in which points are deleted
+GRADIENT, CENTER, LEAST, RANDOM = "gradient", "to_centre", "least_gradient", "random"
+ORDERS = (GRADIENT, CENTER, LEAST, RANDOM)  # in which points are deleted
 RANDOM_ORDERS = 4  # whose mean counts
 
 
@@ -56,14 +56,14 @@ def point_gradient(encoder: torch.nn.Module, gpc: GPC, cloud_1_N_3: torch.Tensor
 
 
 def saliencies(points_N_3: np.ndarray, gradient_N_3: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the saliency (N,) of each point: length of its gradient, and what moving it to the centre costs.
+    """Return the saliency (N,) of each point: length of its gradient, and what moving it to the center costs.
 
-    The centre is the median of the points.
+    The center is the median of the points.
     """
     outwards_N_3 = points_N_3 - np.median(points_N_3, axis=0)
     radius_N = np.linalg.norm(outwards_N_3, axis=1)
     falling_N = np.sum(gradient_N_3 * outwards_N_3, axis=1) * radius_N  # r² ∂/∂r, as ∂/∂r is along the unit vector
-    return {GRADIENT: np.linalg.norm(gradient_N_3, axis=1), CENTRE: falling_N}
+    return {GRADIENT: np.linalg.norm(gradient_N_3, axis=1), CENTER: falling_N}
 
 
 def orders(salient: Mapping[str, np.ndarray], *axes: object) -> dict[str, list[np.ndarray]]:
@@ -72,7 +72,7 @@ def orders(salient: Mapping[str, np.ndarray], *axes: object) -> dict[str, list[n
     n = len(by_length)
     return {
         GRADIENT: [by_length],
-        CENTRE: [np.argsort(-salient[CENTRE], kind="stable")],
+        CENTER: [np.argsort(-salient[CENTER], kind="stable")],
         LEAST: [by_length[::-1]],
         RANDOM: [generator(*axes, "deleted", again).permutation(n) for again in range(RANDOM_ORDERS)],
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from gpca.settings import Bounds, OpenShare
+from gpca.settings import Bounds, Distinct, OpenShare
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,6 @@ class GradientSettings:
     """
 
     samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 30
-    deleted: tuple[OpenShare, ...] = (0.05, 0.1, 0.25)
+    deleted: Distinct[OpenShare] = (0.05, 0.1, 0.25)
     vectors: Annotated[int, Bounds(minimum=2, maximum=1000)] = 20
     level: OpenShare = 0.05

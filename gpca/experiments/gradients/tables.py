@@ -1,12 +1,4 @@
-"""Makes the tables of gradients: what deleting salient points does, and TCAV's scores with their tests.
-
-Both take the same arguments and raise the same error:
-
-    metrics: What :func:`gpca.experiments.gradients.metrics.collect` returned.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
-    conditions: The config's section ``gradients``.
-    InputError: The metrics hold none of these sources.
-"""
+"""Makes the tables of gradients: what deleting salient points does, and TCAV's scores with their tests."""
 
 from __future__ import annotations
 
@@ -15,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from gpca.experiments.gradients.metrics import SALIENCY, TCAV, percent
 from gpca.objects.title import title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -28,7 +21,6 @@ ORDERS = {
     "random": "At random",
     "least_gradient": "Least salient first",
 }
-_NOTHING = ("metrics", "have no gradients", "run the step gradients first")
 
 
 def saliency_deletion(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:
@@ -43,15 +35,11 @@ def saliency_deletion(metrics: pd.DataFrame, sources: Mapping[str, Mapping], con
             f"beyond random, {words}", limits=(-100, 100), beside=f"drop_{percent(share)}"
         )
         columns[f"changed_{percent(share)}"] = Column(f"Named otherwise (%), {words}", interval=False)
-    samples = 0
-    for source, entry in sources.items():
-        for order, title in ORDERS.items():
-            rows = rows_where(of_table, source=source, method=order)
-            asked = int(rows_where(rows, metric="test_samples")["value"].sum())
-            samples = max(samples, asked)
-            cells = {name: cell_of_repeats(100 * rows_where(rows, metric=name)["value"], asked) for name in columns}
-            table.add_row([(source, title_of(entry)), (order, title)], cells)
-    table.require_rows(*_NOTHING)
+    for (source, order), labels in crossed(titles_of(sources), ORDERS):
+        rows = rows_where(of_table, source=source, method=order)
+        samples = int(rows_where(rows, metric="test_samples")["value"].sum())
+        cells = {name: cell_of_repeats(100 * rows_where(rows, metric=name)["value"], samples) for name in columns}
+        table.add_row(labels, cells)
     return table.build(
         caption="Fall of GP-CA's score without some of the points" + table.stand_in_clause(sources, partly=False),
         column_head="quantity",
@@ -88,7 +76,6 @@ def tcav(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapp
             probe_R = rows_where(rows, metric="probe").groupby("seed")["value"].mean()
             cells["probe"] = cell_of_repeats(100 * probe_R, 0)
             table.add_row([(source, title_of(entry)), (tested, tested)], cells)
-    table.require_rows(*_NOTHING)
     return table.build(
         caption="TCAV's scores for GP-CA" + table.stand_in_clause(sources, partly=False),
         column_head="quantity",

@@ -116,8 +116,8 @@ def _vector(scaled_N_d: np.ndarray, shown_N: np.ndarray | None, size: int, *axes
         shown_N = np.isin(np.arange(len(order_N)), order_N[: len(order_N) // 2])
         order_N = random.permutation(len(order_N))
     parts = [order_N[shown_N[order_N]], order_N[~shown_N[order_N]]]
-    learnt = np.concatenate([part[:size] for part in parts])
-    probe = LogisticRegression(max_iter=1000).fit(scaled_N_d[learnt], shown_N[learnt])
+    learned = np.concatenate([part[:size] for part in parts])
+    probe = LogisticRegression(max_iter=1000).fit(scaled_N_d[learned], shown_N[learned])
     others = [part[size:] for part in parts if len(part) > size]
     accuracy = np.mean([np.mean(probe.predict(scaled_N_d[part]) == shown_N[part]) for part in others]) if others else 1
     return probe.coef_[0] / max(float(np.linalg.norm(probe.coef_[0])), 1e-12), float(accuracy)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gpca.comparison.published import Number
 from gpca.errors import InputError
 from gpca.experiments.kernel_grid.tables import PRINTED, TITLES
-from gpca.reporting.figures.panels import in_lines
-from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GREY, ORANGE, save_figure, use_style
+from gpca.reporting.figures.panels import in_lines, legend_below, panels
+from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GREY, ORANGE
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 COLOURS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
 LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # The largest learning rate has the first.
@@ -24,36 +24,20 @@ BESIDE = dict(zip(COLOURS, (1.15, 1.32, 1.52), strict=True))  # Equal printed nu
 MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
 
 
-def draw_kernel_curves(
-    grid: pd.DataFrame,
-    sources: Mapping[str, str],
-    numbers: Iterable[Number],
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+def draw_kernel_curves(grid: pd.DataFrame, sources: Mapping[str, str], numbers: Iterable[Number]) -> Figure:
     """Draw means over the seeds; circles are the settings of Table IV, and filled symbols beside them what it prints.
 
     Args:
         grid: The frame that :func:`gpca.experiments.kernel_grid.grid.read_grids` returns.
-        sources: The title of each name, in order; those without a grid are left out.
-        numbers: What the paper prints.
-        pdf_path, png_path: The two files to write.
-
-    Raises:
-        InputError: The grid holds none of these sources.
     """
     shown = [name for name in sources if (grid["source"] == name).any()]
     if not shown:
         raise InputError("kernels", "have no results for these sources", "run them first")
-    plt = use_style()
     from matplotlib.lines import Line2D
     from matplotlib.ticker import NullLocator
 
-    height_in = 4.05
     numbers = list(numbers)
-    figure, axes = plt.subplots(
-        len(MEASURES), len(shown), figsize=(COLUMN_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
-    )
+    figure, axes = panels(len(MEASURES), len(shown), 4.05, COLUMN_WIDTH_IN, sharex=True, sharey=True)
     rates = sorted(grid["learning_rate"].unique(), reverse=True)
     ticks = sorted(grid["iterations"].unique())
     for column, source in enumerate(shown):
@@ -72,12 +56,9 @@ def draw_kernel_curves(
                     panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
             for (kernel, rate, iterations), value in printed_accuracies(numbers, source).items():
                 if measure == "accuracy" and (kernel, rate, iterations) in means.index:
-                    filled = {
-                        "marker": PRINTED_MARKERS[int(rate < rates[0])],
-                        "color": COLOURS[kernel],
-                        "markersize": 3.5,
-                    }
-                    panel.plot(BESIDE[kernel] * iterations, value, linestyle="", clip_on=False, **filled)
+                    symbol = PRINTED_MARKERS[int(rate < rates[0])]
+                    filled = {"color": COLOURS[kernel], "markersize": 3.5, "clip_on": False}
+                    panel.plot(BESIDE[kernel] * iterations, value, symbol, **filled)
             panel.set_xscale("log")
             panel.set_xticks(ticks, [f"{tick}" for tick in ticks])
             panel.xaxis.set_minor_locator(NullLocator())
@@ -100,9 +81,8 @@ def draw_kernel_curves(
     for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False):
         printed: dict[str, Any] = {"color": GREY, "marker": symbol, "linestyle": "", "markersize": 3.5}
         handles.append(Line2D([], [], label=f"paper, rate {rate:g}", **printed))
-    figure.legend(handles=handles, ncol=3, loc="lower center", columnspacing=1.2, handlelength=1.8)
-    figure.tight_layout(rect=(0, 0.48 / height_in, 1, 1), pad=0.4, h_pad=0.8)
-    save_figure(figure, pdf_path, png_path)
+    legend_below(figure, handles, columns=3)
+    return figure
 
 
 def printed_accuracies(numbers: Iterable[Number], source: str) -> dict[tuple[str, float, int], float]:

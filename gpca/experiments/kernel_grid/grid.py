@@ -14,7 +14,7 @@ from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.classifier.settings import Draws, Kernel, LearningRate
 from gpca.errors import InputError
 from gpca.io.csv_file import numbers, read_csv, write_csv
-from gpca.settings import Count
+from gpca.settings import Count, Distinct
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,9 +36,9 @@ class KernelGrid:
         inducing, draws: see :class:`gpca.classifier.gpc.GPCSettings`.
     """
 
-    kernels: tuple[Kernel, ...] = ("rbf", "matern32", "polynomial")
-    learning_rates: tuple[LearningRate, ...] = (0.01, 0.001)
-    iterations: tuple[Count, ...] = (10, 20, 50, 100, 200)
+    kernels: Distinct[Kernel] = ("rbf", "matern32", "polynomial")
+    learning_rates: Distinct[LearningRate] = (0.01, 0.001)
+    iterations: Distinct[Count] = (10, 20, 50, 100, 200)
     inducing: Count = 64
     draws: Draws = 1000
 

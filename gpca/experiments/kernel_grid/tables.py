@@ -1,12 +1,4 @@
-"""Makes the tables of kernels and schedules (Table IV) from the grids of :mod:`gpca.experiments.kernel_grid.grid`.
-
-Both take the same arguments and raise the same error:
-
-    grid: The frame that :func:`gpca.experiments.kernel_grid.grid.read_grids` returns.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order in which they are shown.
-    test: The number of test samples of each seed.
-    InputError: The grid holds none of the sources, or none of the rows.
-"""
+"""Makes the tables of kernels and schedules (Table IV) from :mod:`gpca.experiments.kernel_grid.grid`."""
 
 from __future__ import annotations
 
@@ -15,7 +7,8 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, mean_over
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -30,7 +23,6 @@ PRINTED = (  # The paper's table has these rows.
     ("polynomial", 0.001, 200),
 )
 _HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
-_NOTHING = ("kernels", "have no results", "run its sources and iterations first")  # An empty table says this.
 _MEASURES = {  # Each measure of the grid has a column, and a factor to the column's unit.
     "accuracy": (Column("Accuracy (%)"), 100),
     "confidence": (Column("Confidence (%)"), 100),
@@ -46,7 +38,6 @@ def table4_kernels(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int
     table = TableBuilder("table4_kernels", _HEADS)
     for setting in PRINTED:
         table.add_row(_labels(setting), {name: _cell(grid, name, setting, "accuracy", test) for name in shown})
-    table.require_rows(*_NOTHING)
     table.compare_down(shown)
     return table.build(
         caption="Accuracy of the GPC by kernel and schedule (%)" + stand_in_clause(shown.values(), partly=False),
@@ -68,7 +59,6 @@ def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -
         for setting in settings:
             cells = {measure: _cell(grid, name, setting, measure, test) for measure in _MEASURES}
             table.add_row([(name, title_of(entry)), *_labels(setting)], cells)
-    table.require_rows(*_NOTHING)
     table.compare_down(["accuracy", "nll"], same=1)
     return table.build(
         caption="The GPC by kernel, learning rate and iterations" + stand_in_clause(shown.values(), partly=False),

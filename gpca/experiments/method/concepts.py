@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,12 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import SEVERITIES_OF
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
-from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
+from gpca.reporting.figures.panels import panels, write_below
+from gpca.reporting.figures.style import TEXT_WIDTH_IN, write_title
 from gpca.reporting.words import object_in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
 
@@ -22,11 +27,9 @@ def draw_concepts_figure(
     objects_npz: str | Path,
     registrations_npz: str | Path,
     title: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
     object_name: str | None = None,
     dataset: str = "",
-) -> None:
+) -> Figure:
     """Draw target (vermilion) and perturbed source in its initial pose (blue) in one panel per concept.
 
     The figure shows test samples of one object: `object_name`, or the object whose samples come nearest to the medium
@@ -50,22 +53,18 @@ def draw_concepts_figure(
     target = objects.points(row)[:points_shown] / objects.diameters_m[row]
     view = choose_view(target, sources)
 
-    plt = use_style()
     clouds = {concept: (target @ view.T, source @ view.T) for concept, source in sources.items()}
     corners = np.concatenate([np.concatenate(pair) for pair in clouds.values()])
     low, high = corners.min(axis=0), corners.max(axis=0)
-    panel_in = TEXT_WIDTH_IN / len(clouds)
-    margin_in = 0.2  # The title takes it above the panels, and their captions below.
-    height_in = panel_in * (high[1] - low[1]) / (high[0] - low[0]) + margin_in + margin_in
-    figure, panels = plt.subplots(1, len(clouds), figsize=(TEXT_WIDTH_IN, height_in))
-    figure.subplots_adjust(left=0, right=1, bottom=margin_in / height_in, top=1 - margin_in / height_in, wspace=0)
-    for letter, panel, (concept, (target_view, source_view)) in zip("abc", panels, clouds.items(), strict=True):
+    height_in = TEXT_WIDTH_IN / len(clouds) * (high[1] - low[1]) / (high[0] - low[0]) + 0.45  # title and captions
+    figure, [drawn] = panels(1, len(clouds), height_in)
+    for letter, panel, (concept, (target_view, source_view)) in zip("abc", drawn, clouds.items(), strict=True):
         draw_clouds(panel, target_view, source_view, corners=(low, high))
         severity = severity_text(registrations, samples[concept], concept)
-        panel.set_title(f"({letter}) {TITLES[concept]}: {severity}", y=0, pad=-4, va="top")
+        write_below(panel, f"({letter}) {TITLES[concept]}: {severity}")
     legend_of_clouds(figure, "target", "perturbed source, before ICP", gap=0.2)
     write_title(figure, f"{title}: {object_in_words(name, dataset)}")
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def choose_samples(registrations: Registrations, path: str | Path, object_name: str | None = None) -> dict[str, int]:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.active_learning.acquisition import EXPANSION, select, top
-from gpca.active_learning.embedded import Embedded
-from gpca.active_learning.rounds import initial_gpc, make_task, pool_of
+from gpca.active_learning.rounds import Embedded, initial_gpc, make_task, pool_of
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.experiments.method.shown_sample import Stages
 from gpca.seeds import generator
@@ -30,7 +29,7 @@ class Round:
     """
 
     rows_N: np.ndarray
-    labelled: np.ndarray
+    labeled: np.ndarray
     map_S_2: np.ndarray
     bald_N: np.ndarray
     candidates: np.ndarray
@@ -55,7 +54,7 @@ def first_round(stages: Stages, held_out: str, settings: ActiveLearningSettings,
         for each in (row_S_1, stages.h_S_d)
     )
     gpc = initial_gpc(task, settings, source, seed, SETTING)
-    rows_N, labelled = of_rows.pool.h[:, 0], of_rows.initial.h[:, 0]
+    rows_N, labeled = of_rows.pool.h[:, 0], of_rows.initial.h[:, 0]
     pool = pool_of(task.project(gpc), gpc, np.arange(len(rows_N)), [])
     random = generator(source, seed, SETTING, "active_learning", held_out, STRATEGY)
     chosen = select(STRATEGY, pool, settings.batch, random)
@@ -63,4 +62,4 @@ def first_round(stages: Stages, held_out: str, settings: ActiveLearningSettings,
     scaler = StandardScaler().fit(stages.h_S_d[train])
     h_S_d = scaler.transform(stages.h_S_d)
     map_S_2 = PCA(2, svd_solver="full").fit(h_S_d[train]).transform(h_S_d)
-    return Round(rows_N, labelled, map_S_2, pool.bald_N, top(pool.bald_N, settings.batch * EXPANSION), chosen)
+    return Round(rows_N, labeled, map_S_2, pool.bald_N, top(pool.bald_N, settings.batch * EXPANSION), chosen)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,10 +22,12 @@ from gpca.reporting.figures.style import (
     LIGHT_GREY,
     SOURCE_COLOUR,
     TARGET_COLOUR,
-    save_figure,
     write_title,
 )
 from gpca.reporting.words import object_in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CONCEPT = "pose"  # The sample shown is of this concept, since before and after ICP differ to the eye.
 CAPTIONS = {"init": "initial", "icp": "aligned"}
@@ -39,10 +42,8 @@ def draw_overview(
     title: str,
     encoder: str,
     treatments: Mapping[str, str],
-    pdf_path: str | Path,
-    png_path: str | Path,
     dataset: str = "",
-) -> None:
+) -> Figure:
     """Draw what the stages make of one registration, from its clouds to what follows.
 
     The figure shows the clouds before and after ICP, the embedding, the scores ± their deviations, and BALD among all
@@ -54,10 +55,8 @@ def draw_overview(
             sample of the concept `CONCEPT` that :meth:`gpca.experiments.method.shown_sample.Stages.choose` returns.
         uncertainty_csv: The uncertainties of the design ``causal``.
         limits: Those of the errors that states are told apart by, from the config.
-        title: The title of the source.
         encoder: The name that the figure gives the encoder.
         treatments: The action of recovery for each concept.
-        pdf_path, png_path: The two files to write.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
@@ -105,7 +104,7 @@ def draw_overview(
     write_title(canvas.figure, f"{title}: {object_in_words(sample['object'], dataset)}")
     for x_in, colour, words in ((0.06, TARGET_COLOUR, "target"), (0.5, SOURCE_COLOUR, "source")):
         canvas.dot(x_in, 2.74, colour, words)
-    save_figure(canvas.figure, pdf_path, png_path)
+    return canvas.figure
 
 
 def _draw_bald(axes, bald_N: np.ndarray, of_sample: float) -> None:

@@ -29,13 +29,13 @@ from gpca.reporting.figures.style import (
     TARGET_COLOUR,
     TEXT_WIDTH_IN,
     blues,
-    save_figure,
     write_title,
 )
 from gpca.reporting.words import object_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 # Above stands a sample of the first of these of which a registration failed, below the first that was held out.
 ORDER = ("overlap", "pose", "noise")
@@ -53,10 +53,8 @@ def draw_pipeline(
     title: str,
     encoder: str,
     active_learning: Mapping,
-    pdf_path: str | Path,
-    png_path: str | Path,
     dataset: str = "",
-) -> None:
+) -> Figure:
     """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
 
     Args:
@@ -66,14 +64,9 @@ def draw_pipeline(
         limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
             :func:`gpca.experiments.active_learning.figure.draw_learning_curves`.
-        title: The title of the source.
         encoder: The name that the figure gives the encoder.
         active_learning: The config's section; the figure repeats the first round of the run.
-        pdf_path, png_path: The two files to write.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
-
-    Raises:
-        InputError: an unusable file, files of different samples, or no curve of a strategy in `TITLES`.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])
@@ -93,7 +86,7 @@ def draw_pipeline(
     write_title(canvas.figure, f"{title}: {object_in_words(stages.predictions['object'][row], dataset)}")
     canvas.dot(6.15, 3.4, TARGET_COLOUR, r"target $\mathcal{Q}$", gap_in=0.05)
     canvas.dot(6.63, 3.4, SOURCE_COLOUR, r"source $\mathcal{P}$", gap_in=0.05)
-    save_figure(canvas.figure, pdf_path, png_path)
+    return canvas.figure
 
 
 def _curves(files: list[str | Path]) -> tuple[str, dict[str, pd.DataFrame]]:
@@ -167,7 +160,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     bald_N = asked.bald_N
     points_N_2 = asked.map_S_2[asked.rows_N]
     order = np.argsort(bald_N, kind="stable")
-    panel.scatter(*asked.map_S_2[asked.labelled].T, s=5, marker="x", color=GREY, linewidths=0.5)
+    panel.scatter(*asked.map_S_2[asked.labeled].T, s=5, marker="x", color=GREY, linewidths=0.5)
     panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GREY, linewidths=0.3)
     panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
     panel.set_axis_off()

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from gpca.experiments.active_learning.figure import draw_panels, mean_curves
+from gpca.experiments.active_learning.figure import draw_curves, mean_curves
 from gpca.experiments.new_concepts.tables import SEEN
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, VERMILION
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SHOWN = "bald_kmeans"
 ROWS = {"concepts": CONCEPTS, "nominal": ("nominal",), "geometry": ("geometry",)}
@@ -23,23 +27,12 @@ STYLES = {
 }
 
 
-def draw_new_concepts(
-    curve_files: Iterable[str | Path],
-    sources: Mapping[str, str],
-    target: float,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+def draw_new_concepts(curve_files: Iterable[str | Path], sources: Mapping[str, str], target: float) -> Figure:
     """Draw the accuracy over labels by the paper's strategy, its mean over the new concepts, then over the seeds.
 
     Args:
         curve_files: Files named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
-        sources: The title of each name, in order; those without curves are left out.
         target: The accuracy that a dashed line marks.
-        pdf_path, png_path: The two files to write.
-
-    Raises:
-        InputError: an unusable file, or no curve of these.
     """
     curve_files = list(curve_files)
     curves = {
@@ -48,4 +41,4 @@ def draw_new_concepts(
         for (source, strategy, setting), curve in mean_curves(curve_files, concepts).items()
         if strategy == SHOWN
     }
-    draw_panels(curves, sources, TITLES, SEEN, STYLES, target, pdf_path, png_path)
+    return draw_curves(curves, sources, TITLES, SEEN, STYLES, target)

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
-from gpca.active_learning.embedded import Embedded
-from gpca.active_learning.new_concepts import Experiment, run_experiment
+from gpca.active_learning.new_concepts import NewConceptTrial, run_trial
+from gpca.active_learning.rounds import Embedded
 from gpca.active_learning.settings import (
     FROM_OTHERS,
     ActiveLearningSettings,
@@ -49,7 +49,7 @@ def run(job: Job) -> None:
         work = _Work(job, own)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for experiment in progress(work.experiments(), f"new concepts of {job.source}"):
-            learnt = run_experiment(experiment, job.strategies, settings, job.source, job.seed)
+            learnt = run_trial(experiment, job.strategies, settings, job.source, job.seed)
             for setting, strategy, curve in learnt:
                 curves[strategy][setting, experiment.held_out] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
@@ -78,20 +78,20 @@ class _Work:
         self._seen = _seen(causes, h_S_d, Descriptors.load(job.descriptors, causes.registrations))
         self._objects = ObjectClouds.load(job.objects, job.source)
 
-    def experiments(self) -> Iterator[Experiment]:
+    def experiments(self) -> Iterator[NewConceptTrial]:
         """Yield every new concept, in every embedding."""
         registrations = self._registrations
         for name, h_S_d in self._embeddings(registrations):
             samples = Embedded(h_S_d, registrations.concept, registrations.split)
             errors = self._own.errors if name in self._own.erring else ()
             for concept in self._job.section("active_learning").get("held_out", CONCEPTS):
-                yield Experiment(name, samples, concept, CONCEPTS, errors)
+                yield NewConceptTrial(name, samples, concept, CONCEPTS, errors)
         yield from self._of_causes()
 
     def _embeddings(self, registrations: Registrations) -> Iterator[tuple[str, np.ndarray]]:
         """Yield each embedding's name and the samples (S, d) in it."""
         measured_S_F = describe_registrations(registrations, *self._axes, points=self._own.points)["relations"]
-        pair_S_F = _normalised(measured_S_F, registrations.split == "train", *self._axes)
+        pair_S_F = _normalized(measured_S_F, registrations.split == "train", *self._axes)
         for name in self._own.embeddings:
             if name == "pair":
                 yield name, pair_S_F
@@ -105,13 +105,13 @@ class _Work:
             else:
                 _leave_out(self._job.source, name, f"it needs {FROM_OTHERS[name]}")
 
-    def _of_causes(self) -> Iterator[Experiment]:
+    def _of_causes(self) -> Iterator[NewConceptTrial]:
         """Yield what has causes as new concepts: by the encoder of the causes, and by what was measured of the pair."""
         seen = self._seen
         known = tuple(label for label in LABELS if label in seen["encoder"].concept)
         if NOMINAL in self._own.causes:
-            yield Experiment("pretrained", seen["encoder"], NOMINAL, known)
-            yield Experiment("pair", self._normalised(seen["pair"]), NOMINAL, known)
+            yield NewConceptTrial("pretrained", seen["encoder"], NOMINAL, known)
+            yield NewConceptTrial("pair", self._normalized(seen["pair"]), NOMINAL, known)
         if GEOMETRY in self._own.causes and (drawn := self._geometry()) is not None:
             h_G_d = embed(self._cause_model, drawn.registrations, *self._axes, self._cause_encoder)[0]
             icp, descriptors = (
@@ -120,8 +120,8 @@ class _Work:
             )
             new = _seen(drawn, h_G_d, describe_all(drawn, *self._axes, descriptors, icp)[0], GEOMETRY)
             both = {name: seen[name].followed_by(new[name]) for name in new}
-            yield Experiment("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
-            yield Experiment("pair", self._normalised(both["pair"]), GEOMETRY, (*known, GEOMETRY))
+            yield NewConceptTrial("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
+            yield NewConceptTrial("pair", self._normalized(both["pair"]), GEOMETRY, (*known, GEOMETRY))
 
     def _geometry(self) -> Causes | None:
         drawn = draw_geometry(
@@ -136,11 +136,11 @@ class _Work:
             _leave_out(self._job.source, GEOMETRY, why)
         return drawn
 
-    def _normalised(self, samples: Embedded) -> Embedded:
-        return replace(samples, embedding=_normalised(samples.embedding, samples.split == "train", *self._axes))
+    def _normalized(self, samples: Embedded) -> Embedded:
+        return replace(samples, embedding=_normalized(samples.embedding, samples.split == "train", *self._axes))
 
 
-def _normalised(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) -> np.ndarray:
+def _normalized(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) -> np.ndarray:
     return NormalisedDescriptors(*axes, "new_concepts").fit(measured_S_F[train_S])(measured_S_F)
 
 

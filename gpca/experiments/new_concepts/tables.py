@@ -1,12 +1,8 @@
 """Makes the tables of new concepts where no encoder has seen the samples, or the concept.
 
-Both read the tidy metrics of active learning, of which `pretrained` and `unseen` are rows to compare with:
-
-    metrics: The tidy metrics of ``active_learning.csv`` and ``new_concepts.csv``.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
-    conditions: The config's sections ``active_learning`` and ``new_concepts``, with the ``seeds`` that the latter was
-        run for, ``test`` of its ``registrations``, and its section ``causes`` as ``of_causes``.
-    InputError: The metrics hold none of these sources.
+The metrics are those of ``active_learning.csv``, with which the others are compared, and of ``new_concepts.csv``. The
+``conditions`` are the sections ``active_learning`` and ``new_concepts`` of the config, with the ``seeds`` that the
+latter was run for, ``test`` of its ``registrations``, and its section ``causes`` as ``of_causes``.
 """
 
 from __future__ import annotations
@@ -19,9 +15,9 @@ from gpca.active_learning.settings import ALL_LABELS
 from gpca.causes.quotas import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.experiments.active_learning.tables import COUNT, Quantity, cell_of
-from gpca.objects.title import title_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -38,14 +34,13 @@ SEEN = {
 }
 NEW_CAUSES = (NOMINAL, GEOMETRY)
 PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
-_NOTHING = ("metrics", "have no results", "run new_concepts first")
 
 
 def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:
     """Return the labels that each new concept costs by what the samples are seen by, and what labels can give."""
     metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
     labels = {f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), PAPERS, c) for c in CONCEPTS}
-    random = {"labels_random": Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")}
+    labels["labels_random"] = Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")
     accuracies = {"all_labels": Quantity("final_accuracy", Column("Acc., pool labeled (%)"), ALL_LABELS)}
     within = Column(f"Within {WITHIN} labels (%)", decimals=0, interval=False)
     tests = tests_of_causes(conditions)
@@ -56,27 +51,22 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
             "final_accuracy", Column(f"{cause.capitalize()}, pool labeled (%)", interval=False), ALL_LABELS, cause
         )
     table = TableBuilder("table15_new_concepts", {"source": "Dataset", "seen": "Encoder learned from"})
-    for source, entry in sources.items():
-        for setting, title in SEEN.items():
-            of_row = rows_where(metrics, source=source, table=TABLE + setting)
-            of_concepts = of_row[of_row["concept"].isin(CONCEPTS)]
-            test = conditions["test"]
-            cells = {key: cell_of(of_concepts, quantity, test) for key, quantity in (labels | random).items()}
-            cells["within"] = _within(of_concepts, test)
-            cells |= {key: cell_of(of_concepts, quantity, test) for key, quantity in accuracies.items()}
-            cells |= {
-                key: cell_of(of_row, quantity, tests[str(quantity.concept)]) for key, quantity in of_causes.items()
-            }
-            table.add_row([(source, title_of(entry)), (setting, title)], cells, rival=setting != "pretrained")
-    table.require_rows(*_NOTHING)
-    table.compare_down([*labels, *random, "within", *NEW_CAUSES], same=1)
-    columns = {key: quantity.column for key, quantity in (labels | random).items()} | {"within": within}
+    for (source, setting), row_labels in crossed(titles_of(sources), SEEN):
+        of_row = rows_where(metrics, source=source, table=TABLE + setting)
+        of_concepts = of_row[of_row["concept"].isin(CONCEPTS)]
+        test = conditions["test"]
+        cells = {key: cell_of(of_concepts, quantity, test) for key, quantity in (labels | accuracies).items()}
+        cells["within"] = _within(of_concepts, test)
+        cells |= {key: cell_of(of_row, quantity, tests[str(quantity.concept)]) for key, quantity in of_causes.items()}
+        table.add_row(row_labels, cells, rival=setting != "pretrained")
+    table.compare_down([*labels, "within", *NEW_CAUSES], same=1)
+    columns = {key: quantity.column for key, quantity in labels.items()} | {"within": within}
     columns |= {key: quantity.column for key, quantity in (accuracies | of_causes).items()}
     return table.build(
         caption=f"Labels until a new concept is known, to {conditions['target']:.0%}, by what the encoder saw before"
         + table.stand_in_clause(sources, partly=False),
         column_head="quantity",
-        columns={key: column for key, column in columns.items() if any(found == key for _, found in table.cells)},
+        columns={key: column for key, column in columns.items() if any(shown == key for _, shown in table.cells)},
         footnotes=(
             f"{mean_over(table.span_of_seeds(), conditions['test'])}; a dash stands for what was not run. Bold: best "
             "of a dataset, the first row apart.",
@@ -101,18 +91,17 @@ def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], condit
     table = TableBuilder(
         "table15_oracle", {"source": "Dataset", "seen": "Encoder learned from", "strategy": "Strategy"}
     )
-    for source, entry in sources.items():
-        for setting in (setting for setting in SEEN if setting in conditions["erring"]):
-            for strategy, title in ((PAPERS, "BALD + k-means"), ("random", "Random")):
-                cells: dict[str, Cell | None] = {}
-                for share in shares:
-                    name = TABLE + (f"{setting}_errors_{share}" if share else setting)
-                    of_cell = rows_where(metrics, source=source, table=name, method=strategy)
-                    of_cell = of_cell[of_cell["concept"].isin(CONCEPTS)]
-                    for key, metric in (("labels", "labels_to_target"), ("accuracy", "final_accuracy")):
-                        cells[f"{key}_{share}"] = cell_of(of_cell, Quantity(metric, Column("")), conditions["test"])
-                table.add_row([(source, title_of(entry)), (setting, SEEN[setting]), (strategy, title)], cells)
-    table.require_rows(*_NOTHING)
+    seen = {setting: words for setting, words in SEEN.items() if setting in conditions["erring"]}
+    strategies = {PAPERS: "BALD + k-means", "random": "Random"}
+    for (source, setting, strategy), row_labels in crossed(titles_of(sources), seen, strategies):
+        cells: dict[str, Cell | None] = {}
+        for share in shares:
+            name = TABLE + (f"{setting}_errors_{share}" if share else setting)
+            of_cell = rows_where(metrics, source=source, table=name, method=strategy)
+            of_cell = of_cell[of_cell["concept"].isin(CONCEPTS)]
+            for key, metric in (("labels", "labels_to_target"), ("accuracy", "final_accuracy")):
+                cells[f"{key}_{share}"] = cell_of(of_cell, Quantity(metric, Column("")), conditions["test"])
+        table.add_row(row_labels, cells)
     table.compare_down([*labels, *accuracies], same=2)
     return table.build(
         caption=f"Labels until a new concept is known, to {conditions['target']:.0%}, from an oracle that errs"

@@ -8,7 +8,7 @@ PRINCIPAL_COMPONENTS = 16  # distances between embeddings are measured in so man
 
 
 def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int = 10) -> np.ndarray:
-    """Return the mean Euclidean distance (S,) to the nearest training samples, all features standardised on these.
+    """Return the mean Euclidean distance (S,) to the nearest training samples, all features standardized on these.
 
     Where there are fewer than `neighbours` training samples, to all of them.
     """
@@ -23,7 +23,7 @@ def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int =
 def mahalanobis_distance(train_N_F: np.ndarray, query_S_F: np.ndarray) -> np.ndarray:
     """Return the distance (S,) to the mean of the training samples in units of their scatter.
 
-    The covariance is that of the standardised features, shrunk after Ledoit & Wolf (2004).
+    The covariance is that of the standardized features, shrunk after Ledoit & Wolf (2004).
     """
     from scipy.linalg import pinvh
     from sklearn.covariance import ledoit_wolf
@@ -36,7 +36,7 @@ def mahalanobis_distance(train_N_F: np.ndarray, query_S_F: np.ndarray) -> np.nda
 
 
 def principal_components(train_N_d: np.ndarray, query_S_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return both in the leading principal components of the standardised training embeddings."""
+    """Return both in the leading principal components of the standardized training embeddings."""
     from sklearn.decomposition import PCA
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler

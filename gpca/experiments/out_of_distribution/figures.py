@@ -4,7 +4,6 @@ All take the same arguments and raise the same error:
 
     learned: The predictions that :func:`gpca.experiments.out_of_distribution.metrics.read_learner_predictions` returns.
     sources, learners: The title of each name, in order; those without predictions are left out.
-    pdf_path, png_path: The two files to write.
     InputError: There are no predictions of these sources and learners.
 
 The learners of the paper have a color, as everywhere, and all others are gray: the tables tell them apart.
@@ -13,25 +12,20 @@ The learners of the paper have a color, as everywhere, and all others are gray: 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.attribution.diagnostics import BINS, rank_correlation, risk_coverage
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.reliability import draw_reliability_panel
+from gpca.experiments.diagnosis.reliability import reliability_figure
 from gpca.experiments.out_of_distribution.metrics import sets_of, with_training_like, wrong
 from gpca.experiments.out_of_distribution.sets import DISTANCES
-from gpca.reporting.figures.panels import finish_panels, small_panels
-from gpca.reporting.figures.style import (
-    METHOD_LOOKS,
-    OTHER_LOOK,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.panels import legend_below, panels
+from gpca.reporting.figures.style import METHOD_LOOKS, OTHER_LOOK, SMALL_PT, write_title
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SETS = {  # those whose ρ Table V has, alone and under shift
     "in_distribution": "like the training",
@@ -44,19 +38,13 @@ COVERAGES = np.linspace(0.1, 1, 91)  # Of fewer samples, a single error would de
 DISTANCE_BINS = 10  # of equally many samples
 
 
-def draw_coverage_risk(
-    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
-) -> None:
+def draw_coverage_risk(learned: Mapping, sources: Titles, learners: Titles) -> Figure:
     """Draw the mean over the seeds of the risk, by the largest score, on the test samples like the training's.
 
     A panel in which no classifier errs says so.
     """
     shown, columns = _known(learned, sources, learners)
-    plt = use_style()
-    height_in = 2.5
-    figure, axes = plt.subplots(
-        1, len(columns), figsize=(TEXT_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
-    )
+    figure, axes = panels(1, len(columns), 2.5, sharex=True, sharey=True)
     for panel, source in zip(axes[0], columns, strict=True):
         for learner in _in_front(shown):
             risks = []
@@ -74,34 +62,25 @@ def draw_coverage_risk(
     axes[0, 0].set_ylim(bottom=0)
     axes[0, 0].set_ylabel("risk: errors among the covered (%)")
     _write_legend(figure, shown, learners)
-    figure.tight_layout(rect=(0, 0.24 / height_in, 1, 1), pad=0.4, w_pad=1.5)
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
-def draw_reliability(
-    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
-) -> None:
+def draw_reliability(learned: Mapping, sources: Titles, learners: Titles) -> Figure:
     """Draw accuracy over confidence, in the bins of the calibration error, and the number of samples in each bin.
 
     The samples are those like the training's, of all sources and seeds together. Bins of very few samples have no
     point. The number in a title is the calibration error of them all.
     """
     shown, columns = _known(learned, sources, learners)
-    figure, panels = small_panels(len(shown), panel_height_in=1.85)
-    for panel, learner in zip(panels, shown, strict=False):
+    samples = {}
+    for learner in shown:
         parts = [rows for source in columns for rows in _of(learned, source, learner, "in_distribution")]
         confidence_S = np.concatenate([1 - rows["max_score"].to_numpy() for rows in parts])
-        hit_S = np.concatenate([~wrong(rows) for rows in parts])
-        gap = draw_reliability_panel(panel, confidence_S, hit_S, BINS)
-        panel.set_title(f"{learners[learner]}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
-    handles, labels = panels[0].get_legend_handles_labels()
-    title = ", ".join(sources[name] for name in columns)
-    finish_panels(figure, panels, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
+        samples[learners[learner]] = confidence_S, np.concatenate([~wrong(rows) for rows in parts])
+    return reliability_figure(samples, ", ".join(sources[name] for name in columns), BINS)
 
 
-def draw_uncertainty_vs_distance(
-    learned: Mapping, sources: Titles, learners: Titles, pdf_path: str | Path, png_path: str | Path
-) -> None:
+def draw_uncertainty_vs_distance(learned: Mapping, sources: Titles, learners: Titles) -> Figure:
     """Draw the mean of 1 - largest score over the distance to the training samples: sources as columns, sets as rows.
 
     Above a panel stands ρ of the paper's learners by the letters of the legend, as Table V has it: the mean over the
@@ -111,13 +90,9 @@ def draw_uncertainty_vs_distance(
     parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
     letters = dict(zip(_paper_first(shown), "abcdefgh", strict=False))
     down = [name for name in SETS if any(name in of_key for of_key in parts.values())]
-    plt = use_style()
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    height_in = 0.72 + 1.22 * len(down)
-    figure, axes = plt.subplots(
-        len(down), len(columns), figsize=(TEXT_WIDTH_IN, height_in), sharex=True, sharey=True, squeeze=False
-    )
+    figure, axes = panels(len(down), len(columns), 0.72 + 1.22 * len(down), sharex=True, sharey=True)
     for row, name in enumerate(down):
         for panel, source in zip(axes[row], columns, strict=True):
             correlations = {}
@@ -141,8 +116,7 @@ def draw_uncertainty_vs_distance(
     lettered = {name: f"{letters[name]}: {learners[name]}" for name in letters}
     _write_legend(figure, shown, lettered)
     write_title(figure, "Above each panel: rank correlation ρ of the learners that have a letter")
-    figure.tight_layout(rect=(0, 0.22 / height_in, 1, 1 - 0.3 / height_in), pad=0.4, h_pad=0.5)
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray]:
@@ -183,7 +157,7 @@ def _write_legend(figure, shown: list[str], learners: Titles) -> None:
     handles = [Line2D([], [], label=learners[name], **_look(name)) for name in _paper_first(shown)]
     if others := sum(name not in METHOD_LOOKS for name in shown):
         handles.append(Line2D([], [], label=f"{others} others", **_look("")))
-    figure.legend(handles=handles, ncol=len(handles), loc="lower center", columnspacing=1.4, handlelength=2.4)
+    legend_below(figure, handles)
 
 
 def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[str], list[str]]:

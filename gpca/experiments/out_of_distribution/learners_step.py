@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from baselines.registry import explainer_entry
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution.learners import predict_sets
 from gpca.experiments.out_of_distribution.sets import ShiftedSets
+from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.process.progress import progress

@@ -59,8 +59,6 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     for path in prediction_files:
         source, learner, seed = source_method_seed(path)
         rows = read_predictions(path, ("set",))
-        if unknown := set(rows["set"]) - set(TRAINED_ON):
-            raise InputError(path, f"unknown set '{sorted(unknown)[0]}'", f"expected one of {', '.join(TRAINED_ON)}")
         p_S_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy()
         if not (p_S_C >= 0).all() or not np.allclose(p_S_C.sum(axis=1), 1, atol=1e-4):
             raise InputError(path, "scores are negative or do not sum to one", "a learner must give probabilities")

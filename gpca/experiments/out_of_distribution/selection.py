@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from gpca.experiments.out_of_distribution.metrics import TABLE
 from gpca.experiments.out_of_distribution.sets import DISTANCES, TRAINED_ON
-from gpca.reporting.tables.builder import TableBuilder, interval_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, interval_over
+from gpca.reporting.tables.cells import rows_where
 from gpca.reporting.words import in_words, plural
 
 if TYPE_CHECKING:
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 
 SHIFTED = {"severity": "severities beyond", "source": "unseen source", "objects": "unseen objects"}
 RHO = f"rho_max_score_{DISTANCES[0]}"
-NOTHING = ("diagnostics", "have no results", "run its learners first")  # The error of a table without rows says this.
 OF_DISTANCE = (
     "ρ: Spearman's correlation of 1 - largest score with the distance to the training samples, the mean over the "
     "nearest ones in the space of the analytical features; diagnostics.csv has the other scores and distances."

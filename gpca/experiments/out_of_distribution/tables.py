@@ -1,12 +1,4 @@
-"""Makes the tables of learners and of what their uncertainty is worth (Table V) from the tidy diagnostics.
-
-All take the same arguments and raise the same error:
-
-    metrics: The tidy diagnostics that :func:`gpca.experiments.out_of_distribution.metrics.collect_diagnostics` makes.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name, in the order of the rows.
-    learners: The title of each name, in the order in which they are shown.
-    InputError: The metrics hold none of these sources and learners.
-"""
+"""Makes the tables of learners and of what their uncertainty is worth (Table V) from the tidy diagnostics."""
 
 from __future__ import annotations
 
@@ -18,7 +10,6 @@ from gpca.experiments.out_of_distribution.metrics import with_training_like
 from gpca.experiments.out_of_distribution.selection import (
     AREA,
     CALIBRATION,
-    NOTHING,
     OF_DISTANCE,
     RHO,
     SHIFTED,
@@ -29,8 +20,10 @@ from gpca.experiments.out_of_distribution.selection import (
     values_by_seed,
 )
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, mean_over, span
+from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats
 from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import span
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,13 +72,12 @@ def table5_compact(metrics: pd.DataFrame, sources: Mapping[str, Mapping], learne
         cells = {source: _cell(metrics, source, learner, "in_distribution", "accuracy") for source in sources}
         cells |= {key: _cell(metrics, one, learner, "in_distribution", name) for key, name in diagnostics.items()}
         table.add_row([(learner, title)], cells)
-    table.require_rows(*NOTHING)
-    found = [source for source in sources if any(key == source for _, key in table.cells)]
+    shown = [source for source in sources if any(key == source for _, key in table.cells)]
     columns = {source: Column(f"{title_of(entry)} (%)") for source, entry in sources.items()}
     columns |= {"rho": Column("ρ", **_RHO), "aurc": Column("AURC", **_AREA), "ece": Column("ECE (share)", **_ERROR)}
     table.compare_down(columns)
     seeds = table.most_seeds()
-    samples = span(samples_of_seed(metrics, source, "in_distribution") for source in found)
+    samples = span(samples_of_seed(metrics, source, "in_distribution") for source in shown)
     return table.build(
         caption=f"Accuracy of learners by dataset, and what their uncertainty is worth on {sources[one]['title']}"
         + stand_in_clause(sources.values()),
@@ -133,11 +125,8 @@ def _by_learner(
 ) -> TableBuilder:
     """Return a table with a row for each source and learner, and a cell for each pick of a set and a metric."""
     table = TableBuilder(name, {"source": "Dataset", "learner": "Learner"})
-    for source, entry in sources.items():
-        for learner, title in learners.items():
-            cells = {key: _cell(metrics, source, learner, *pick) for key, pick in picks.items()}
-            table.add_row([(source, title_of(entry)), (learner, title)], cells)
-    table.require_rows(*NOTHING)
+    for (source, learner), labels in crossed(titles_of(sources), learners):
+        table.add_row(labels, {key: _cell(metrics, source, learner, *pick) for key, pick in picks.items()})
     table.compare_down(picks, same=1)
     return table
 

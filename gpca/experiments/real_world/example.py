@@ -17,23 +17,16 @@ from gpca.io.files import read_image
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.cloud_views import legend_of_clouds
-from gpca.reporting.figures.style import (
-    BLACK,
-    SOURCE_COLOUR,
-    TARGET_COLOUR,
-    TEXT_WIDTH_IN,
-    YELLOW,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.panels import panels, write_below
+from gpca.reporting.figures.style import BLACK, SOURCE_COLOUR, TARGET_COLOUR, YELLOW, write_title
 from gpca.reporting.words import BOP_TITLES, object_of_frames
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
-PANEL_IN = 1.88  # The three pictures are square.
+HEIGHT_IN = 2.4
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
 AROUND = (2.5, 1.2)  # The first picture, and the two others, show so many times the object's extent.
 
@@ -45,9 +38,7 @@ def draw_real_world_example(
     poses_csv: str | Path,
     predictions_csv: str | Path,
     title: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+) -> Figure:
     """Draw (a) a part of the frame with the object's region and what of it is covered, (b) its points at the initial
     pose over the model as the camera sees both, (c) after ICP, with the estimated axes, and (d) the concept scores.
 
@@ -65,16 +56,11 @@ def draw_real_world_example(
     sample = samples.iloc[row]
     i = int(sample["instance"])
     camera = _Camera(instances, i, registrations, row)
-    plt = use_style()
+    from matplotlib.patches import Rectangle
     from matplotlib.patheffects import withStroke
 
     image = read_image(str(instances.colour[i]), "fetch the frames anew")
-    height_in = PANEL_IN + 0.42
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
-    lefts_in = [0.03 + place * (PANEL_IN + 0.03) for place in range(3)]
-    square = (0.2 / height_in, PANEL_IN / TEXT_WIDTH_IN, PANEL_IN / height_in)
-    panels = [figure.add_axes((left / TEXT_WIDTH_IN, *square)) for left in lefts_in]
-    panels.append(figure.add_axes((0.868, 0.62 / height_in, 0.122, 1.1 / height_in)))
+    figure, [drawn] = panels(1, 4, HEIGHT_IN, width_ratios=(3, 3, 3, 2.2))
     model_m = objects.points(int(instances.object_index[i]))[:3000]
     observed_m = registrations.diameter_m[row] * registrations.cloud(row)
     initial_m = registrations.diameter_m[row] * source_before_icp(registrations, row)
@@ -86,20 +72,20 @@ def draw_real_world_example(
     }
     own_px = instances.pixels_of(i)
     everything = np.concatenate([own_px, *seen.values()])
-    for panel, times in zip(panels, (AROUND[0], AROUND[1], AROUND[1]), strict=False):
-        panel.imshow(image, alpha=1.0 if panel is panels[0] else 0.55)
+    for panel, times in zip(drawn, (AROUND[0], AROUND[1], AROUND[1]), strict=False):
+        panel.imshow(image, alpha=1.0 if panel is drawn[0] else 0.55)
         _zoom(panel, everything, times, image.shape)
     (left, top), (right, bottom) = everything.min(axis=0), everything.max(axis=0)
-    region = plt.Rectangle((left, top), right - left, bottom - top, fill=False, edgecolor=YELLOW, linewidth=1.2)
-    panels[0].add_patch(region)
-    for panel in panels[:3]:
+    region = Rectangle((left, top), right - left, bottom - top, fill=False, edgecolor=YELLOW, linewidth=1.2)
+    drawn[0].add_patch(region)
+    for panel in drawn[:3]:
         _shade(panel, covered(own_px, seen["init", "source"], image.shape[:2]))
     large = float(np.clip(2000 / len(observed_m), 1.1, 5))  # Few points are drawn larger.
     looks: dict[str, dict[str, Any]] = {
         "model": {"color": TARGET_COLOUR, "s": 0.7},
         "source": {"color": SOURCE_COLOUR, "s": large},
     }
-    for panel, pose in ((panels[1], "init"), (panels[2], "icp")):
+    for panel, pose in ((drawn[1], "init"), (drawn[2], "icp")):
         for name, look in looks.items():
             panel.scatter(*seen[pose, name].T, linewidths=0, **look)
     ends_m = np.vstack([np.zeros(3), 0.3 * registrations.diameter_m[row] * np.eye(3)])
@@ -107,28 +93,25 @@ def draw_real_world_example(
     for tip, name in zip(tips, "xyz", strict=True):
         outline = [withStroke(linewidth=2.4, foreground="white")]
         arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": BLACK, "lw": 1.2, "mutation_scale": 7}
-        panels[2].annotate("", tip, origin, arrowprops=arrow | {"shrinkA": 0, "path_effects": outline})
-        x, y = np.clip(tip + 0.15 * (tip - origin), *_inside(panels[2]))
+        drawn[2].annotate("", tip, origin, arrowprops=arrow | {"shrinkA": 0, "path_effects": outline})
+        x, y = np.clip(tip + 0.15 * (tip - origin), *_inside(drawn[2]))
         letter: dict[str, Any] = {"path_effects": outline, "fontweight": "bold"}
-        panels[2].text(x, y, name, color=BLACK, ha="center", va="center", **letter)
-    draw_scores(panels[3], sample)
-    panels[3].set_xlabel("score ± deviation", labelpad=1)
+        drawn[2].text(x, y, name, color=BLACK, ha="center", va="center", **letter)
+    draw_scores(drawn[3], sample)
     captions = (
         "(a) Region of interest; black: covered",
         f"(b) Initial pose: {100 * sample['init_error']:.1f} % $d$ off",
         f"(c) After ICP: {100 * sample['icp_error']:.1f} % $d$ off",
-        "(d) GP-CA, the truth bold",
     )
-    centres_in = [left + PANEL_IN / 2 for left in lefts_in] + [TEXT_WIDTH_IN - 0.7]
-    for panel, centre, caption in zip(panels, centres_in, captions, strict=True):
-        figure.text(centre / TEXT_WIDTH_IN, 0.02, caption, ha="center", va="bottom")
-        if panel is not panels[3]:
-            panel.set_axis_off()
+    for panel, caption in zip(drawn[:3], captions, strict=True):
+        panel.set_axis_off()
+        write_below(panel, caption)
+    drawn[3].set_xlabel("(d) Scores, the truth bold", labelpad=1)
     lost = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
     name = str(registrations.object_name[row])
     write_title(figure, f"{title_of_frame(name, title)}: {object_of_frames(name)}, {lost}")
     legend_of_clouds(figure, "model", "measured", gap=0.1)
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray) -> int:

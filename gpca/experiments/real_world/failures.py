@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -12,8 +13,11 @@ from gpca.errors import InputError
 from gpca.experiments.real_world.frame_views import draw_over_model, draw_scores, read_samples
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
-from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, save_figure, use_style, write_title
+from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, use_style, write_title
 from gpca.reporting.words import object_of_frames
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SHOWN = 10
 PANELS_PER_ROW = 5
@@ -25,9 +29,7 @@ def draw_real_world_failures(
     poses_csv: Sequence[str | Path],
     predictions_csv: Sequence[str | Path],
     title: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+) -> Figure:
     """Draw the test samples of all seeds that were attributed wrongly with the highest score, one of each instance.
 
     The three lists of files run through the seeds in the same order.
@@ -37,39 +39,26 @@ def draw_real_world_failures(
     """
     objects = ObjectClouds.load(objects_npz)
     mistakes = _mistakes(poses_csv, predictions_csv)
-    plt = use_style()
-    rows = max(1, -(-min(SHOWN, len(mistakes)) // PANELS_PER_ROW))
-    cell_in = TEXT_WIDTH_IN / PANELS_PER_ROW
-    head_in = 0.22
-    cell_height_in = 2.1
-    height_in = head_in + rows * cell_height_in
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height_in))
     shown = list(mistakes.head(SHOWN).iterrows())
+    rows = max(1, -(-len(shown) // PANELS_PER_ROW))
+    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 0.22 + 2.1 * rows), layout="constrained")
+    parts = figure.subfigures(rows, PANELS_PER_ROW, squeeze=False).flat
     loaded = {file: Registrations.load(registrations_npz[file]) for file in sorted({m["file"] for _, m in shown})}
-    for place, (_, mistake) in enumerate(shown):
+    for part, (_, mistake) in zip(parts, shown, strict=False):
         registrations = loaded[mistake["file"]]
         row = int(mistake["row"])
-        left_in = place % PANELS_PER_ROW * cell_in
-        top_in = head_in + place // PANELS_PER_ROW * cell_height_in
-
-        def panel(x_in, y_in, width_in, panel_height_in, left_in=left_in, top_in=top_in):
-            bottom_in = height_in - top_in - y_in - panel_height_in
-            bounds = ((left_in + x_in) / TEXT_WIDTH_IN, bottom_in / height_in)
-            return figure.add_axes((*bounds, width_in / TEXT_WIDTH_IN, panel_height_in / height_in))
-
+        above, below = part.subplots(2, 1, height_ratios=(2.5, 1))
         index = int(registrations.object_index[row])
         model = objects.points(index)[:2048] / objects.diameters_m[index]
-        draw_over_model(panel(0.06, 0.42, cell_in - 0.12, 0.95), model, registrations.cloud(row))
-        draw_scores(panel(0.42, 1.45, cell_in - 0.58, 0.38), mistake)
+        draw_over_model(above, model, registrations.cloud(row))
+        draw_scores(below, mistake)
         name = object_of_frames(registrations.object_name[row])
         taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
         words = f"{name}\n{taken}\npose {100 * mistake['icp_error']:.0f} % $d$ off"
-        x = (left_in + cell_in / 2) / TEXT_WIDTH_IN
-        y = 1 - (top_in + 0.02) / height_in
-        figure.text(x, y, words, ha="center", va="top", fontsize=SMALL_PT, linespacing=1.15)
+        part.suptitle(words, fontsize=SMALL_PT, linespacing=1.15)
     none = "" if shown else ": no mistake in any seed"
     write_title(figure, f"{title}{none}")
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def _mistakes(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | Path]) -> pd.DataFrame:

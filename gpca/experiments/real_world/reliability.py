@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,29 +12,17 @@ from gpca.attribution.diagnostics import BINS
 from gpca.attribution.metrics import source_method_seed
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.reliability import draw_reliability_panel
-from gpca.reporting.figures.panels import finish_panels, small_panels
-from gpca.reporting.figures.style import SMALL_PT
+from gpca.experiments.diagnosis.reliability import reliability_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-def draw_frame_reliability(
-    prediction_files: Iterable[str | Path],
-    methods: Mapping[str, str],
-    title: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+def draw_frame_reliability(prediction_files: Iterable[str | Path], methods: Mapping[str, str], title: str) -> Figure:
     """Draw accuracy over confidence on the test samples of depth frames, all seeds together.
 
     Args:
         prediction_files: named ``…/{source}/{method}/seed{seed}.csv``, of one source.
-        methods: the title of each method, in order; those without predictions are left out.
-        title: of the frames.
-        pdf_path: the figure.
-        png_path: the same figure.
-
-    Raises:
-        InputError: no predictions of these methods, what the reader of predictions refuses.
     """
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for path in prediction_files:
@@ -45,12 +34,8 @@ def draw_frame_reliability(
     shown = [method for method in methods if method in parts]
     if not shown:
         raise InputError("predictions on depth frames", "cover none of these methods", "run them first")
-    figure, panels = small_panels(len(shown), panel_height_in=1.55)
-    for panel, method in zip(panels, shown, strict=True):
+    samples = {}
+    for method in shown:
         confidence_N, hit_N = (np.concatenate(columns) for columns in zip(*parts[method], strict=True))
-        gap = draw_reliability_panel(panel, confidence_N, hit_N, BINS)
-        panel.set_title(f"{methods[method]}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
-        panel.set_xlim(1 / 3 - 0.03, 1.02)
-        panel.set_xticks([0.4, 0.6, 0.8, 1.0], ["0.4", "0.6", "0.8", "1"])
-    handles, labels = panels[0].get_legend_handles_labels()
-    finish_panels(figure, panels, title, handles, labels, "largest score", "accuracy", pdf_path, png_path)
+        samples[methods[method]] = confidence_N, hit_N
+    return reliability_figure(samples, title, BINS, least=1 / 3)

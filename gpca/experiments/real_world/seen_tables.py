@@ -11,7 +11,8 @@ import numpy as np
 from gpca.attribution.metrics import ALL
 from gpca.experiments.real_world.metrics import DATASET, SEEN, TOGETHER, UNSEEN
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
-from gpca.reporting.tables.builder import TableBuilder, cell_of_all_samples, cell_of_repeats, interval_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
+from gpca.reporting.tables.cells import cell_of_all_samples, cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import dataset_in_words, plural
 
@@ -33,23 +34,15 @@ def table6_seen_unseen(
 
     Args:
         metrics: The tidy metrics (:func:`gpca.experiments.real_world.metrics.collect`).
-        title: The title of the frames.
         conditions: Source of each condition -> its title, in order.
         backbones: The names of the methods ``{backbone}-{reduction}``, in order.
-        explainers: The titles of the other methods, in order.
         rendered: Whether the encoders learned from frames rendered of the models first.
-
-    Raises:
-        InputError: The metrics hold none of these.
     """
     titles = {name: encoder_title(*name.split("-")) for name in backbones} | CLASSIC | dict(explainers)
     datasets = sorted({name for name in metrics["table"] if name.startswith(DATASET)})
     table = TableBuilder("table6_seen_unseen", {"condition": "Initial poses", "method": "Method"})
-    for source, words in conditions.items():
-        of_source = rows_where(metrics, source=source)
-        for method, name in titles.items():
-            table.add_row([(source, words), (method, name)], _cells(rows_where(of_source, method=method), datasets))
-    table.require_rows("metrics", "have no accuracy", "run its explainers first")
+    for (source, method), labels in crossed(conditions, titles):
+        table.add_row(labels, _cells(rows_where(metrics, source=source, method=method), datasets))
     table.compare_down(EVERYTHING_SEEN, same=1)
     columns = {name: Column(head) for name, head in EVERYTHING_SEEN.items()}
     titles_of = {name: dataset_in_words(name.removeprefix(DATASET)) for name in datasets}
@@ -94,7 +87,7 @@ def _cell(rows: pd.DataFrame, metric: str, scale: float = 100) -> Cell | None:
 
 def _counts(table: TableBuilder, columns: Mapping[str, Column], conditions: Mapping[str, str]) -> list[str]:
     """Return how many samples of how many seeds the accuracies are over, by initial poses where these differ."""
-    told: dict[str, list[str]] = {}
+    conditions_of: dict[str, list[str]] = {}
     for source, words in conditions.items():
         cells = {key: cell for (row, key), cell in table.cells.items() if table.rows[row][0][0] == source}
         counts = [
@@ -103,10 +96,10 @@ def _counts(table: TableBuilder, columns: Mapping[str, Column], conditions: Mapp
             if key in cells and key not in ("ece", "nll")
         ]
         if counts:
-            told.setdefault(", ".join(counts), []).append(words)
-    if len(told) < 2:
-        return [f"Test samples: {counts}." for counts in told]
-    return [f"Test samples, {' and '.join(words)}: {counts}." for counts, words in told.items()]
+            conditions_of.setdefault(", ".join(counts), []).append(words)
+    if len(conditions_of) < 2:
+        return [f"Test samples: {counts}." for counts in conditions_of]
+    return [f"Test samples, {' and '.join(words)}: {counts}." for counts, words in conditions_of.items()]
 
 
 def _share(samples: pd.DataFrame, name: str) -> str:

@@ -13,7 +13,8 @@ from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.experiments.real_world.metrics import TOGETHER
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, interval_over, plain_cell, rows_where
+from gpca.reporting.tables.builder import TableBuilder, interval_over
+from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -61,14 +62,10 @@ def table6_backbones(
     Args:
         metrics: The tidy metrics of the methods ``{backbone}-{reduction}``, made by
             :func:`gpca.experiments.real_world.metrics.collect`.
-        title: The title of the frames.
         backbones: The number of parameters of each name, in order. The table shows differences to the first backbone
             with the first reduction.
         reductions: The names of the reductions, in order.
         pretrained_on: What the encoders learned from before the frames, if anything.
-
-    Raises:
-        InputError: The metrics hold none of these.
     """
     together = rows_where(metrics, table=TOGETHER)
     metrics, one_encoder = (rows_where(together, source=source) for source in (REAL_WORLD, ONE_ENCODER))
@@ -84,9 +81,8 @@ def table6_backbones(
     for method, name in CLASSIC.items():
         labels = [(method, name), ("none", REDUCTIONS["none"])]
         table.add_row(labels, _cells(metrics, method, reference_R, not table.rows))
-    table.require_rows("metrics", "have no accuracy", "run its explainers first")
     table.compare_down(["accuracy"])
-    shown = table.cells[0, "accuracy"]
+    shown = table.first_cell("accuracy")
     rival = f"To {BACKBONES.get(first, first)}"
     encoder = f"encoder that goes on from one pretrained on {pretrained_on}" if pretrained_on else "encoder"
     other = " without reduction" if reductions[0] == "none" else f" with {REDUCTIONS[reductions[0]]}"

@@ -12,7 +12,7 @@ from gpca.alignment.rigid import inverse
 from gpca.experiments.recovery.cases import Attempt, RobotIn
 from gpca.experiments.recovery.episodes import Episode
 from gpca.frames.camera import MeshScene, shade
-from gpca.frames.rgbd_scene import TABLE_COLOUR, model_colour
+from gpca.frames.rgbd_scene import TABLE_COLOR, model_color
 from gpca.frames.shots import Shot
 from gpca.frames.situations import Situation
 from gpca.frames.viewpoint import best_viewpoint
@@ -89,7 +89,7 @@ def save_example(
 def _seen(name: str, situation: Situation, shot: Shot, outcome: Attempt) -> dict[str, np.ndarray]:
     view = situation.meshes.look(shot.camera, shot.T_world_camera)
     surfaces = situation.shelf.surfaces
-    colours_M_3 = np.array([*(model_colour(p.model, len(surfaces)) for p in situation.standing), TABLE_COLOUR])
+    colours_M_3 = np.array([*(model_color(p.model, len(surfaces)) for p in situation.standing), TABLE_COLOR])
     model = surfaces[situation.model]
     alone = MeshScene([(model.vertices_m, model.triangles)])
     poses = {"true": situation.T_world_object, "placed": outcome.holding.T_world_object}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from gpca.alignment.pose_error import CORRECT
 from gpca.experiments.real_world.frame_views import draw_score_bars
 from gpca.io.arrays import load_arrays
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.panels import write_below
 from gpca.reporting.figures.style import (
     BLACK,
     SMALL_PT,
@@ -18,11 +20,13 @@ from gpca.reporting.figures.style import (
     TEXT_WIDTH_IN,
     YELLOW,
     blues,
-    save_figure,
     use_style,
     write_title,
 )
 from gpca.reporting.words import in_words, object_in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SILHOUETTES = ("mask", "true", "placed")
 SHAPES: dict[str, tuple[int | str, ...]] = {
@@ -41,9 +45,7 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
 }
 
 
-def draw_recovery_example(
-    title: str, example_npz: str | Path, pdf_path: str | Path, png_path: str | Path, dataset: str = ""
-) -> None:
+def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = "") -> Figure:
     """Draw (a) the first view, (b) the concept scores, (c) the viewpoints to choose from, (d) the new view.
 
     Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
@@ -53,31 +55,31 @@ def draw_recovery_example(
         InputError: an unusable file.
     """
     found = load_arrays(example_npz, SHAPES, "python -m gpca recover")
-    plt = use_style()
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, 1.95))
-    for left, view in ((0.003, "first"), (0.722, "next")):
-        panel = figure.add_axes((left, 0.12, 0.275, 0.75))
-        _draw_view(panel, found[f"image_{view}"], *(found[f"{name}_{view}"].astype(bool) for name in SILHOUETTES))
-    scores = figure.add_axes((0.345, 0.32, 0.125, 0.48))
+    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 2.0), layout="constrained")
+    polar = {"c": {"projection": "polar"}}
+    axes = figure.subplot_mosaic("abcd", width_ratios=(2.2, 1.3, 1.6, 2.2), per_subplot_kw=polar)
+    for letter, view in (("a", "first"), ("d", "next")):
+        silhouettes = (found[f"{name}_{view}"].astype(bool) for name in SILHOUETTES)
+        _draw_view(axes[letter], found[f"image_{view}"], *silhouettes)
     shown = found["scores"]
-    draw_score_bars(scores, shown.tolist(), str(found["cause"]))
-    scores.set(xlim=(min(0, shown.min()), max(1, shown.max())))
-    scores.set_xlabel("score", labelpad=1)
-    _draw_viewpoints(figure, figure.add_axes((0.487, 0.17, 0.185, 0.67), projection="polar"), found)
+    draw_score_bars(axes["b"], shown.tolist(), str(found["cause"]))
+    axes["b"].set(xlim=(min(0, shown.min()), max(1, shown.max())), box_aspect=1)
+    _draw_viewpoints(figure, axes["c"], found)
     before, after = (100 * error for error in found["errors"])
     solved = "solved" if after <= 100 * CORRECT else "not solved"
     chosen, first = (100 * share for share in (found["surface_n"][int(found["chosen"])], found["surface_first"]))
     captions = (
         f"(a) Occluded: pose {before:.0f} % $d$ off" if str(found["cause"]) == "overlap" else f"(a) {before:.0f} % off",
-        f"(b) {CONCEPTS[int(np.argmax(shown))].capitalize()} leads{_instead(str(found['action']))}",
+        f"(b) Score: {CONCEPTS[int(np.argmax(shown))]} leads{_instead(str(found['action']))}",
         f"(c) Surface seen: {first:.0f} % $\\to$ {chosen:.0f} %",
         f"(d) New view: {after:.1f} % $d$ off, {solved}",
     )
-    for centre, caption in zip((0.14, 0.385, 0.585, 0.86), captions, strict=True):
-        figure.text(centre, 0.02, caption, ha="center", va="bottom")
+    for letter, caption in zip("acd", (captions[0], *captions[2:]), strict=True):
+        write_below(axes[letter], caption)
+    axes["b"].set_xlabel(captions[1], labelpad=1)
     name = object_in_words(found["object"], dataset)
     write_title(figure, f"{title}: {name}; outlines: where it is (yellow), where ICP put it (red)")
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, placed: np.ndarray) -> None:
@@ -107,7 +109,7 @@ def _draw_viewpoints(figure, panel, found: Mapping[str, np.ndarray]) -> None:
     panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=TARGET_COLOUR)
     panel.set(rlim=(0, 90), xticks=[], yticks=[30, 60, 90])
     panel.set_yticklabels([])
-    bar = figure.colorbar(dots, cax=figure.add_axes((0.683, 0.25, 0.008, 0.5)), ticks=[0, 0.5, 1])
+    bar = figure.colorbar(dots, ax=panel, shrink=0.7, pad=0.02, aspect=25, ticks=[0, 0.5, 1])
     bar.ax.tick_params(labelsize=SMALL_PT, length=1.5, pad=1)
     bar.outline.set_linewidth(0.4)
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from baselines.registry import explainer_entry
 from gpca.attribution.scores import Attribution
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.recovery.answers import Explain
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.uncertainty.evaluation import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
@@ -57,7 +57,7 @@ def learn_explainers(
     """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration.
 
     Args:
-        names: explainers (:mod:`baselines.registry`) that read embeddings or the design ``removal``.
+        names: explainers (:mod:`gpca.explainers.registry`) that read embeddings or the design ``removal``.
         settings: explainer -> its settings.
         most_remedied: training samples whose remedies are run, at most; Monte-Carlo ICP is slow.
     """
@@ -70,11 +70,11 @@ def learn_explainers(
         if entry.reads == "embeddings":
             model = model or train_encoder(registrations, source, seed, encoder)[0]
             attach = _embedding(model, source, seed, encoder)
-            learnt = train
+            learned = train
         else:
             attach = _remedies(source, seed, uncertainty)
-            learnt = train.subset(np.arange(len(train))[:most_remedied])
-        explainer.fit(attach(learnt))
+            learned = train.subset(np.arange(len(train))[:most_remedied])
+        explainer.fit(attach(learned))
         fitted[name], attached[name] = explainer, attach
     explain = {name: _timed(explainer, attached[name]) for name, explainer in fitted.items()}
     calibration = {name: of_name(held_out.without_labels()) for name, of_name in explain.items()}

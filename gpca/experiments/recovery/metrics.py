@@ -34,7 +34,7 @@ def collect_recovery(
         budget: actions per failure.
 
     Raises:
-        InputError: no files, a name of another form, a missing column, no rows, an unknown cause.
+        InputError: no files, a name of another form, a missing column, no rows.
     """
     records = []
     for path in files:
@@ -99,12 +99,7 @@ def read_recovery(path: str | Path) -> pd.DataFrame:
     rows = read_csv(path, RECOVERY_COLUMNS, _OTHERS)
     for name in ("episode", "step", "tries"):
         rows[name] = numbers(path, rows, name).astype(int)
-    flags = ("failed", "recovered")
-    if not (rows["cause"].isin(CONCEPTS) & rows[[*flags]].isin(("True", "False")).all(axis=1)).all():
-        raise InputError(path, "contains an unknown cause, or a flag other than True and False", "regenerate it")
-    for name in flags:
-        rows[name] = rows[name] == "True"
-    return rows
+    return rows.assign(**{name: rows[name] == "True" for name in ("failed", "recovered")})
 
 
 def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:

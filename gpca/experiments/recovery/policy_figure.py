@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.reporting.figures.diagram import Canvas
-from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, save_figure, write_title
+from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, write_title
 from gpca.reporting.words import in_words, plural
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WORDS = {
     "reinitialize": "Reinitialize ICP\nbroader search over orientations",
@@ -40,7 +44,7 @@ def read_policy(path: str | Path) -> dict:
     return content
 
 
-def draw_mitigation(title: str, policy_json: str | Path, pdf_path: str | Path, png_path: str | Path) -> None:
+def draw_mitigation(title: str, policy_json: str | Path) -> Figure:
     """Draw the mapping of one policy: what it reads, its branches in the order of asking, and the ways back.
 
     An action leads to new scores; what is queued leads to a label and to a classifier that has learned it.
@@ -76,7 +80,7 @@ def draw_mitigation(title: str, policy_json: str | Path, pdf_path: str | Path, p
     )
     canvas.box(6.05, middles_in[-1] - 0.2, 1.06, middles_in[1] - middles_in[-1] + 0.4, back)
     canvas.arrow((6.58, middles_in[-1] - 0.2), (6.58, 0.06), (0.69, 0.06), (0.69, 0.86))
-    save_figure(canvas.figure, pdf_path, png_path)
+    return canvas.figure
 
 
 def short_action(action: str) -> str:

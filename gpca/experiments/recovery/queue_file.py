@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import wilson_interval
-from gpca.errors import InputError
 from gpca.io.csv_file import read_numbers
 
 if TYPE_CHECKING:
     import pandas as pd
 
-DOUBTED, DRAWN = "queued", "random"  # which cases are labelled next: those in doubt, or any
+DOUBTED, DRAWN = "queued", "random"  # which cases are labeled next: those in doubt, or any
 QUEUE_COLUMNS = ("policy", "order", "draw", "labels", "failures", "unsolved")
 
 
@@ -24,22 +23,15 @@ def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
     each failure were judged once.
 
     Raises:
-        InputError: a missing column, an unknown order, more errors than failures, or no rows.
+        InputError: a missing column, or no rows.
     """
     import pandas as pd
 
     parts = []
     for path in files:
         rows = read_numbers(path, QUEUE_COLUMNS, QUEUE_COLUMNS[2:])
-        within = (rows["unsolved"] >= 0) & (rows["unsolved"] <= rows["failures"]) & (rows["failures"] > 0)
-        if not (within & rows["order"].isin((DOUBTED, DRAWN))).all():
-            raise InputError(path, "contains an unknown order, or more errors than failures", "regenerate it")
         mean = rows.groupby(["policy", "order", "labels"], sort=False)[["failures", "unsolved"]].mean()
         parts.append(mean.reset_index())
-    if not parts or all(part.empty for part in parts):
-        raise InputError(
-            "recovery", "has no error by labels", "switch on a policy that learns and run the step recover"
-        )
     grouped = pd.concat(parts).groupby(["policy", "order", "labels"], sort=False)
     together = grouped[["failures", "unsolved"]].sum()[grouped.size() == len(parts)].reset_index()
     shares = [wilson_interval(row.unsolved, int(row.failures)) for row in together.itertuples()]

@@ -26,11 +26,11 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
-BATCH = 4  # cases that are labelled before anything is learned from them
+BATCH = 4  # cases that are labeled before anything is learned from them
 DRAWS = 5  # random orders
 
 
-class Learner(Protocol):
+class QueueLearner(Protocol):
     """What is in doubt about queued cases, learns their labels, and decides about others."""
 
     def doubts(self) -> np.ndarray:
@@ -85,10 +85,10 @@ class ChancesLearner:
         self, trials: Sequence[Sequence[Trial]], judged_N_F: Sequence[np.ndarray], costs: Mapping[str, float]
     ) -> None:
         self._trials, self._judged_N_F, self._costs = trials, judged_N_F, costs
-        self._learnt: list[int] = []
+        self._learned: list[int] = []
 
     def _utility(self) -> ExpectedUtility:
-        return learn_utility([self._trials[row] for row in self._learnt], self._costs, tuple(self._costs))
+        return learn_utility([self._trials[row] for row in self._learned], self._costs, tuple(self._costs))
 
     def doubts(self) -> np.ndarray:
         """Return the probability that the best action does not help."""
@@ -97,7 +97,7 @@ class ChancesLearner:
 
     def learn(self, rows: np.ndarray) -> None:
         """Learn what helped."""
-        self._learnt += rows.tolist()
+        self._learned += rows.tolist()
 
     def choose(self) -> list[str]:
         """Return the actions of the largest gains."""
@@ -113,7 +113,7 @@ def learners_of(
     judged: Sequence[Episode],
     explainers: LoopExplainers,
     budget: int,
-) -> dict[str, Callable[[], Learner]]:
+) -> dict[str, Callable[[], QueueLearner]]:
     """Return what makes the learner of each of these policies that queues cases or learns from rehearsals.
 
     Args:
@@ -126,7 +126,7 @@ def learners_of(
     queued = rehearsal.failures
     trials = [rehearsal.trials[episode.number] for episode in queued]
     entries = {name: policy_entry(name, means.actions) for name in policies}
-    learners: dict[str, Callable[[], Learner]] = {}
+    learners: dict[str, Callable[[], QueueLearner]] = {}
     for name, entry in entries.items():
         if not (entry.learns or entry.queues) or any(entry.learns and entries[other].learns for other in learners):
             continue  # policies of the same chances learn the same
@@ -143,7 +143,7 @@ def learners_of(
 
 
 def error_by_labels(
-    learners: Mapping[str, Callable[[], Learner]],
+    learners: Mapping[str, Callable[[], QueueLearner]],
     solved: Sequence[Mapping[str, bool]],
     rehearsal: Rehearsal | None,
     axes: tuple,

@@ -4,62 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import nan
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
 from gpca.experiments.recovery.metrics import pool_share
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.style import (
-    BLACK,
-    BLUE,
-    CONCEPT_COLOURS,
-    CONCEPT_MARKERS,
-    SKY_BLUE,
-    TEXT_WIDTH_IN,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.panels import panels
+from gpca.reporting.figures.style import BLACK, BLUE, CONCEPT_COLOURS, CONCEPT_MARKERS, SKY_BLUE, write_title
 from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 ROW_IN = 0.33  # In less, the markers of one policy overlap.
 APART = 0.26  # of a row
 SHADES = (SKY_BLUE, BLUE, BLACK)  # The shade grows darker with every action.
 
 
-def draw_recovery_rates(
-    metrics: pd.DataFrame,
-    title: str,
-    policies: Mapping[str, str],
-    budget: int,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+def draw_recovery_rates(metrics: pd.DataFrame, title: str, policies: Mapping[str, str], budget: int) -> Figure:
     """Draw (left) the rate within 1 to `budget` actions with its Wilson interval, (right) that within all by cause.
 
     Args:
         metrics: The tidy metrics that :func:`gpca.experiments.recovery.metrics.collect_recovery` makes.
-        title: Where the failures are from.
         policies: The title of each name, from top to bottom; those without numbers are left out.
         budget: The number of actions that a policy may take.
-        pdf_path, png_path: The two files to write.
-
-    Raises:
-        InputError: the metrics hold none of these.
     """
     shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1") is not None]
     if not shown:
         raise InputError("metrics", "have no recovery rates", "run the step recover first")
-    use_style()
-    import matplotlib.pyplot as plt
-
-    height_in = 0.75 + ROW_IN * len(shown)
-    figure, axes = plt.subplots(1, 2, figsize=(TEXT_WIDTH_IN, height_in), sharey=True, width_ratios=(1.5, 1))
+    figure, [axes] = panels(1, 2, 0.75 + ROW_IN * len(shown), sharey=True, width_ratios=(1.5, 1))
     for k in range(1, budget + 1):
         offset = APART * (k - (budget + 1) / 2)
         look = {"color": SHADES[(k - 1) % len(SHADES)], "marker": "o", "label": f"within {plural(k, 'action')}"}
@@ -82,8 +57,7 @@ def draw_recovery_rates(
         )
     _, episodes = pool_share(metrics, shown[0], "recovered_within_1") or (nan, 0)
     write_title(figure, f"{title}: {episodes} failures; right: within {budget} actions, by cause")
-    figure.tight_layout(rect=(0, 0, 1, 1 - 0.16 / height_in), pad=0.4)
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: Mapping[str, str]) -> None:

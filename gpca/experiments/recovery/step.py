@@ -32,13 +32,13 @@ def run(job: Job) -> None:
     settings = RecoverySettings.from_sections(job.settings)
     recovery = settings.section
     loop = settings.loop
-    objects = resolve(dict(settings.objects), job.folders.get("data_dir"))
+    objects = resolve(dict(settings.objects), job.data_dir)
     actions = {name: action_of(name, given or {}) for name, given in recovery["actions"].items()}
     entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
     outputs = [job.rows, job.timings, job.queue, job.policy, job.example]
     axes = (SOURCE, job.seed)
     with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
-        tables = lay_tables(surfaces(objects, Path(job.folders.get("downloads", ""))), settings, *axes)
+        tables = lay_tables(surfaces(objects, job.downloads), settings, *axes)
         registrations = register_situations(tables, recovery["train"], recovery["calibration"], loop)
         explainers = learn_explainers(
             [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from gpca.experiments.recovery.metrics import pool_share
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, plain_cell
-from gpca.reporting.tables.shares import WILSON, share_cell
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.cells import WILSON, plain_cell, share_cell
 from gpca.reporting.tables.table import Column, Table
 from gpca.reporting.words import plural
 
@@ -27,12 +27,7 @@ def table8_recovery(
     Args:
         metrics: The tidy metrics that :func:`gpca.experiments.recovery.metrics.collect_recovery` makes.
         seconds: The mean seconds of a failure, by policy.
-        title: Where the failures are from.
-        policies: The title of each name, in order.
         budget: The number of actions that a policy may take.
-
-    Raises:
-        InputError: The metrics hold none of these.
     """
     seeds = metrics["seed"].nunique()
     within = [f"recovered_within_{k}" for k in range(1, budget + 1)]
@@ -51,9 +46,8 @@ def table8_recovery(
         if policy in seconds:
             cells["seconds"] = plain_cell(seconds[policy], seeds, failures)
         table.add_row([(policy, words)], cells)
-    table.require_rows("metrics", "have no recovery", "run the step recover first")
     table.compare_down(within)
-    failures = table.cells[0, within[0]].test_samples
+    failures = table.first_cell(within[0]).test_samples
     return table.build(
         caption=f"Failed registrations recovered (%): {title}",
         column_head="metric",

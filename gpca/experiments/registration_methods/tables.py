@@ -1,13 +1,7 @@
 """Makes the tables of registration methods: how often and how well each registers, from which start, by what cause.
 
-Both take the same arguments and raise the same error:
-
-    metrics: The tidy metrics that :func:`gpca.experiments.registration_methods.metrics.collect_trials` makes.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name.
-    methods: The ``{"title": str, "is_global": bool}`` of each name, in the order in which they are shown.
-    global_start: The global method at whose pose local methods start a second time.
-    left_out: The package that is missing, by the title of the method that needs it.
-    InputError: The metrics hold none of these sources and methods.
+The ``methods`` are ``{"title": str, "is_global": bool}`` here. Local ones start a second time at the pose of the global
+method ``global_start``; ``left_out`` is the package that is missing, by the title of the method that needs it.
 """
 
 from __future__ import annotations
@@ -17,11 +11,11 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL
-from gpca.experiments.registration_methods.metrics import BINS, bin_name
-from gpca.experiments.registration_methods.rows import INITIAL, NO_START, row_name
+from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, bin_name, row_name
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_over_sources, mean_over, missing_packages
+from gpca.reporting.tables.builder import TableBuilder, mean_over, missing_packages
+from gpca.reporting.tables.cells import cell_over_sources
 from gpca.reporting.tables.table import Column, Table
 
 if TYPE_CHECKING:
@@ -58,7 +52,6 @@ def table11_registration(
         }
         cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", ALL, 1e3)
         table.add_row(labels, cells)
-    table.require_rows("metrics", "have no registration method", "run the step register_methods first")
     columns = {f"success_{cause}": Column(f"{cause.capitalize()} (%)") for cause in causes}
     columns |= {key: column for key, (column, _) in _ERRORS.items()}
     table.compare_down(columns, same=1)
@@ -93,7 +86,6 @@ def table11_severity(
         table.add_row(
             labels, {key: cell_over_sources(metrics, metrics, sources, name, "success", key, 100) for key in columns}
         )
-    table.require_rows("metrics", "have no registration method", "run the step register_methods first")
     table.compare_down(columns, same=1)
     pairs = {key: cell.test_samples for (_, key), cell in table.cells.items()}
     return table.build(
@@ -126,6 +118,7 @@ def _rows(methods: Mapping[str, Mapping], global_start: str) -> Iterable[tuple[l
 def _notes(
     table: TableBuilder, metrics: pd.DataFrame, sources: Mapping[str, Mapping], left_out: Mapping[str, str]
 ) -> list[str]:
+    table.require_rows()
     (start, _), (method, _) = table.rows[0]
     pairs = cell_over_sources(metrics, metrics, sources, row_name(method, start), "success", ALL, 1)
     per_seed = pairs.test_samples // pairs.seeds if pairs else 0

@@ -15,7 +15,7 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry, require_global
 from gpca.errors import InputError
 from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.rows import INITIAL, NO_START, SEVERITY_COLUMNS
+from gpca.experiments.registration_methods.metrics import INITIAL, NO_START, SEVERITY_COLUMNS
 from gpca.experiments.registration_methods.settings import PairSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
@@ -59,12 +59,12 @@ def try_methods(
     rows = _chosen(registrations, source, settings.samples)
     of_objects = Judges(objects, f"objects of {source}")
     judges = [of_objects.of(registrations, row) for row in rows]
-    first = observed_pair(registrations, rows[0], source, seed, settings.points)
+    first = pair_to_register(registrations, rows[0], source, seed, settings.points)
     for method in made.values():
         method(first)
     records: dict[str, list[dict]] = {name: [] for name in made}
     for i, row in enumerate(progress(rows, f"registration methods on {source}, seed {seed}")):
-        pair = observed_pair(registrations, row, source, seed, settings.points)
+        pair = pair_to_register(registrations, row, source, seed, settings.points)
         T_true = registrations.T_target_source("true", row)
         judge = judges[i]
         known = {
@@ -85,7 +85,7 @@ def try_methods(
     return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
 
 
-def observed_pair(registrations: Registrations, row: int, source: str, seed: int, points: int) -> Pair:
+def pair_to_register(registrations: Registrations, row: int, source: str, seed: int, points: int) -> Pair:
     """Return what a method is given of a registration: clouds thinned to `points`, normals estimated on these."""
     axes = (source, seed, "methods", registrations.split[row], registrations.sample[row])
     observed = registrations.source(row)

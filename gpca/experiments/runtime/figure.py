@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from gpca.comparison.published import HARDWARE, Number, printed_seconds
 from gpca.errors import InputError
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION
-from gpca.reporting.figures.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.panels import legend_below, panels
+from gpca.reporting.figures.style import BLUE, GREEN, GREY, ORANGE, SMALL_PT, write_title
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 LOOKS = ((GREY, "D"), (BLUE, "o"), (GREEN, "s"), (ORANGE, "^"))  # the paper's first, then those of our devices
 ROW_IN = 0.34
@@ -36,24 +27,15 @@ class Stage(NamedTuple):
     deviation: float = 0.0
 
 
-def draw_runtime(
-    runtime: pd.DataFrame, title: str, numbers: Iterable[Number], pdf_path: str | Path, png_path: str | Path
-) -> None:
+def draw_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number]) -> Figure:
     """Draw the mean of every stage of one explanation and of their sum, ours with one standard deviation.
 
     Args:
         runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.
-        title: The title of the objects that were registered.
-        numbers: The numbers that the paper prints.
-        pdf_path, png_path: The two files to write.
-
-    Raises:
-        InputError: A stage was not measured.
     """
     series = _stages(runtime, numbers)
-    plt = use_style()
     rows = [*(COMPONENTS[component] for component in OF_ONE_EXPLANATION), ALL_STAGES]
-    figure, panel = plt.subplots(figsize=(TEXT_WIDTH_IN, 0.9 + ROW_IN * len(rows)))
+    figure, [[panel]] = panels(1, 1, 0.9 + ROW_IN * len(rows))
     step = 0.7 / len(series)
     for place, (name, stages) in enumerate(series.items()):
         colour, marker = LOOKS[min(place, len(LOOKS) - 1)]
@@ -65,9 +47,8 @@ def draw_runtime(
             panel.plot([low, high], [y, y], color=colour, linewidth=1.0)
             panel.plot(mean, y, marker, color=colour, linestyle="", label=name if row == 0 else None)
             words = f"{mean:,.3g}" if mean < 1000 else f"{mean:,.0f}"
-            panel.annotate(
-                words, (high, y), (5, 0), textcoords="offset points", va="center_baseline", fontsize=SMALL_PT
-            )
+            look = {"textcoords": "offset points", "va": "center_baseline", "fontsize": SMALL_PT}
+            panel.annotate(words, (high, y), (5, 0), **look)
     panel.margins(x=0.08)  # The last number needs room.
     panel.axhline(len(rows) - 1.5, color=GREY, linewidth=0.6)
     panel.set_yticks(range(len(rows)), rows)
@@ -77,10 +58,8 @@ def draw_runtime(
     panel.grid(axis="x")
     panel.set_axisbelow(True)
     write_title(figure, f"One explanation on {title}")
-    below_title = 1 - 0.2 / figure.get_size_inches()[1]
-    figure.set_layout_engine("constrained", rect=(0, 0, 1, below_title))
-    figure.legend(loc="outside lower center", ncol=len(series))
-    save_figure(figure, pdf_path, png_path)
+    legend_below(figure, *panel.get_legend_handles_labels())
+    return figure
 
 
 def _stages(runtime: pd.DataFrame, numbers: Iterable[Number]) -> dict[str, dict[str, Stage]]:

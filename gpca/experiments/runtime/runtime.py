@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.active_learning.rounds import Task, initial_gpc
+from gpca.active_learning.rounds import LabelingTask, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings
-from gpca.experiments.runtime.stage_times import CloudPair, time_explanations, time_labelling, time_stages
+from gpca.experiments.runtime.stage_times import CloudPair, time_explanations, time_labeling, time_stages
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.runtime_file import COMPONENTS, RUNTIME_COLUMNS
@@ -30,7 +30,7 @@ SMALL = 512  # points of the smaller explanation
 def measure(
     model: Model,
     registrations: Registrations,
-    task: Task[np.ndarray],
+    task: LabelingTask[np.ndarray],
     settings: ActiveLearningSettings,
     repeats: int,
     threads: int,
@@ -65,7 +65,7 @@ def measure(
         small = (_drawn(source, random), _drawn(target, random))
         times = chain(
             time_stages(explainers, model, (source, target), random),
-            time_labelling(projected, gpc, settings, random),
+            time_labeling(projected, gpc, settings, random),
             time_explanations(explainers, {"explanation": (source, target), "explanation_512": small}),
         )
         for key, elapsed in times:

@@ -11,13 +11,13 @@ from typing import TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import select
-from gpca.active_learning.rounds import Task, pool_of
+from gpca.active_learning.rounds import LabelingTask, pool_of
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.icp import ICP
 from gpca.alignment.rigid import transform
-from gpca.attribution.scores import summarise_draws
+from gpca.attribution.scores import summarize_draws
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.model.explainer import Explainer
@@ -56,7 +56,7 @@ def time_stages(
         yield ("features", device), elapsed
     logits, elapsed = timed(lambda: _draws(model, h_1_d, random))
     yield ("sampling", "CPU"), elapsed
-    yield ("scores", "CPU"), timed(lambda: summarise_draws(logits))[1]
+    yield ("scores", "CPU"), timed(lambda: summarize_draws(logits))[1]
 
 
 def time_explanations(explainers: Mapping[str, Explainer], pairs: Mapping[str, CloudPair]) -> Times:
@@ -74,8 +74,8 @@ def _draws(model: Model, h_1_d: np.ndarray, random: np.random.Generator) -> np.n
     return mean_1_C + deviation_1_C * random.normal(size=shape)
 
 
-def time_labelling(
-    task: Task[Projection], gpc: GPC, settings: ActiveLearningSettings, random: np.random.Generator
+def time_labeling(
+    task: LabelingTask[Projection], gpc: GPC, settings: ActiveLearningSettings, random: np.random.Generator
 ) -> Times:
     """Measure BALD selection from the whole pool, and the update of a copy of the classifier.
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from gpca.comparison.published import HARDWARE, Number, printed_seconds
 from gpca.errors import InputError
 from gpca.model.runtime_file import COMPONENTS
-from gpca.reporting.tables.builder import TableBuilder, plain_cell
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -22,11 +23,6 @@ def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number])
 
     Args:
         runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.
-        title: The title of the objects that were registered.
-        numbers: The numbers that the paper prints.
-
-    Raises:
-        InputError: The frame has no rows.
     """
     if runtime.empty:
         raise InputError("runtime", "has no rows", "run the step 'runtime' first")

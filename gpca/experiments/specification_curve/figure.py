@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from textwrap import shorten, wrap
 from typing import TYPE_CHECKING
 
@@ -12,19 +11,12 @@ import numpy as np
 from gpca.comparison.readings import asked_about
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause
-from gpca.reporting.figures.style import (
-    LIGHT_GREY,
-    PALETTE,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    YELLOW,
-    save_figure,
-    use_style,
-    write_title,
-)
+from gpca.reporting.figures.panels import panels
+from gpca.reporting.figures.style import LIGHT_GREY, PALETTE, SMALL_PT, YELLOW, write_title
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 COLUMNS = 3
 PANEL_IN, LINE_IN = 1.9, 0.13  # the height of a row of panels, and what each line of the legends below it adds
@@ -35,43 +27,21 @@ LETTERS = 48  # of a number's name, which a panel has room for
 LINES = ("-", "--", ":")  # of the first numbers in a panel that have a color each, the next such, …
 
 
-def draw_readings(
-    judged: pd.DataFrame,
-    groups: Mapping[str, str],
-    sources: Mapping[str, Mapping],
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
+def draw_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: Mapping[str, Mapping]) -> Figure:
     """Draw a panel per group: a curve for each number that is not reproduced, its readings in order of their values.
 
     Args:
         judged: what :func:`gpca.comparison.readings.read_judged` returned.
-        groups: The title of each group, in order; those without such a number are left out.
-        sources: source -> title and whether it is a stand-in.
-        pdf_path, png_path: The two files to write.
-
-    Raises:
-        InputError: there is no number to draw.
     """
     missed = asked_about(judged)
     shown = [name for name in groups if (missed["group"] == name).any()]
     if not shown:
         raise InputError("reading_verdicts.csv", "has no readings of these groups", "run the readings first")
-    plt = use_style()
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
     columns = min(COLUMNS, len(shown))
     of_groups = [dict(list(missed[missed["group"] == name].groupby(NUMBER, sort=False))) for name in shown]
     rows = [of_groups[i : i + columns] for i in range(0, len(shown), columns)]
     height_in = sum(PANEL_IN + LINE_IN * max(map(len, row)) for row in rows) + 0.5
-    figure, axes = plt.subplots(
-        len(rows),
-        columns,
-        figsize=(TEXT_WIDTH_IN, height_in),
-        sharey=True,
-        squeeze=False,
-        layout=ConstrainedLayoutEngine(rect=(0, 0, 1, 1 - 0.25 / height_in)),
-    )
+    figure, axes = panels(len(rows), columns, height_in, sharey=True)
     for panel, group, of_group in zip(axes.flat, shown, of_groups, strict=False):
         _draw_group(panel, of_group)
         panel.set_title("\n".join(wrap(groups[group], 40)), fontsize=8)
@@ -81,7 +51,7 @@ def draw_readings(
     figure.supylabel(f"distance from the printed number (times what is close; {linear})", fontsize=8)
     figure.supxlabel("share of the readings (%), from the lowest to the highest value", fontsize=8)
     write_title(figure, f"Every reading of the unstated{stand_in_clause(sources.values())}")
-    save_figure(figure, pdf_path, png_path)
+    return figure
 
 
 def _draw_group(panel, of_numbers: Mapping[tuple[str, str, str], pd.DataFrame]) -> None:

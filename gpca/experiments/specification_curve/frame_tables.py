@@ -10,7 +10,8 @@ from gpca.attribution.metrics import ALL
 from gpca.experiments.real_world.tables import encoder_title
 from gpca.experiments.specification_curve.registry import FRAME_INPUT
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, cell_of_repeats, interval_over, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -31,21 +32,15 @@ def table6_inputs(metrics: pd.DataFrame, title: str) -> Table:
 
     Args:
         metrics: The tidy rows of the readings ``frame_input``.
-        title: The title of the frames.
-
-    Raises:
-        InputError: The metrics hold none of them.
     """
-    methods = list(dict.fromkeys(metrics["method"]))
+    methods = {method: encoder_title(*method.split("-")) for method in metrics["method"].unique()}
     table = TableBuilder("table6_inputs", {"backbone": "Backbone", "input": "The encoder sees"})
-    for method in methods:
-        for cloud, words in INPUTS.items():
-            of = {name: rows_where(metrics, table=f"{FRAME_INPUT}/{cloud}/{name}", method=method) for name in OBJECTS}
-            cells = {name: _share(rows) for name, rows in of.items()}
-            cells |= {concept: _share(of["all"], concept=concept) for concept in CONCEPTS}
-            cells |= {f"{one}_as_{other}": _taken(of["all"], one, other) for one, other in CONFUSED.items()}
-            table.add_row([(method, encoder_title(*method.split("-"))), (cloud, words)], cells)
-    table.require_rows("metrics", "have no accuracy", "run the readings frame_input first")
+    for (method, cloud), labels in crossed(methods, INPUTS):
+        of = {name: rows_where(metrics, table=f"{FRAME_INPUT}/{cloud}/{name}", method=method) for name in OBJECTS}
+        cells = {name: _share(rows) for name, rows in of.items()}
+        cells |= {concept: _share(of["all"], concept=concept) for concept in CONCEPTS}
+        cells |= {f"{one}_as_{other}": _taken(of["all"], one, other) for one, other in CONFUSED.items()}
+        table.add_row(labels, cells)
     table.compare_down(OBJECTS, same=1)
     columns = {name: Column(head) for name, head in OBJECTS.items()}
     columns |= {concept: Column(f"{concept.capitalize()} (%)", interval=False) for concept in CONCEPTS}

@@ -14,7 +14,7 @@ from sklearn.cluster import KMeans
 from sklearn.preprocessing import StandardScaler, normalize
 
 from gpca.adam import Adam
-from gpca.attribution.scores import summarise_marginals
+from gpca.attribution.scores import summarize_marginals
 from gpca.classifier.covariances import make_covariance
 from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
@@ -62,7 +62,7 @@ def scores(
     reading: Reading,
     *axes: object,
 ) -> np.ndarray:
-    """Fit to labelled embeddings and return the scores (S, C) at others."""
+    """Fit to labeled embeddings and return the scores (S, C) at others."""
     random = torch.Generator().manual_seed(seed_of(*axes, "gpc"))
     scale = {
         "standardised": StandardScaler().fit(h_N_d).transform,
@@ -76,9 +76,9 @@ def scores(
         lengthscale = float(torch.pdist(inputs_N_d).median()) or 1.0
     inducing_M_d = _inducing(inputs_N_d, reading["inducing"], settings.inducing, axes, random)
     model = SparseGPs(make_covariance(settings.kernel, len(CONCEPTS), lengthscale), inducing_M_d, random)
-    optimiser = Adam(model.parameters(), settings.learning_rate)
+    optimizer = Adam(model.parameters(), settings.learning_rate)
     for _ in range(settings.iterations):
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         if reading["batch"] == "full":
             (-model.elbo(inputs_N_d, targets_N)).backward()
         else:
@@ -86,9 +86,9 @@ def scores(
             # The divergence counts once for all samples, not once for each minibatch.
             too_much = model.divergence() * (1 / len(rows) - 1 / len(targets_N))
             (-model.elbo(inputs_N_d[rows], targets_N[rows]) - too_much).backward()
-        optimiser.step()
+        optimizer.step()
     normal_M_C = generator(*axes, "draws").normal(size=(settings.draws, len(CONCEPTS)))
-    return summarise_marginals(*model.latents().marginals(Prior.of(model).project(asked)), normal_M_C)[0]
+    return summarize_marginals(*model.latents().marginals(Prior.of(model).project(asked)), normal_M_C)[0]
 
 
 def _inducing(inputs_N_d: torch.Tensor, start: str, most: int, axes: tuple, random: torch.Generator) -> torch.Tensor:

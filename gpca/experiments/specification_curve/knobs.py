@@ -17,7 +17,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.uncertainty.conditions import CORNERS
-from gpca.uncertainty.designs import KNOB_RANGE, STEP, Pair
+from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow
 from gpca.uncertainty.evaluation import design_rows
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
@@ -61,7 +61,7 @@ def shap(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iter
 
 def _pairs(
     given: Given, sizes: ReadingSizes, settings: UncertaintySettings, starts: int, title: str
-) -> Iterator[tuple[str, int, Iterator[tuple[str, dict[str, tuple[Pair, KnobRuns]]]]]]:
+) -> Iterator[tuple[str, int, Iterator[tuple[str, dict[str, tuple[RegisteredRow, KnobRuns]]]]]]:
     """Yield source, seed, and of each sample its concept and its runs: of the observed pair, and of a clean one.
 
     What is random in a sample is named as in :func:`gpca.uncertainty.evaluation.evaluate_design`.
@@ -79,7 +79,7 @@ def _runs(
     for row in progress(range(len(registrations)), title):
         axes = (source, seed, "uncertainty", observed.split[row], observed.sample[row])
         xi_n_6 = generator(*axes, "starts").normal(size=(starts, 6)) * settings.deviation_6()
-        random, pair = generator(*axes, "clouds"), Pair(observed, row)
+        random, pair = generator(*axes, "clouds"), RegisteredRow(observed, row)
         clouds = {"observed": pair.observed(settings.icp_points, random), "clean": pair.clean(settings.icp_points)}
         made = {name: (of_pair, KnobRuns(*of_pair, xi_n_6, settings, random)) for name, of_pair in clouds.items()}
         yield str(registrations.concept[row]), made

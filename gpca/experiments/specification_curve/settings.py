@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import Kernel, LearningRate
 from gpca.pairs.reading import Reading as ReadAs
-from gpca.settings import Bounds, Count, OpenShare, Positive
+from gpca.settings import Bounds, Count, Distinct, OpenShare, Positive
 
 Quantity = Literal[
     "divergence",
@@ -39,114 +39,114 @@ Starts = Annotated[int, Bounds(minimum=2)]
 class Sensitivity:
     """What sensitivity analysis differentiates, and which derivative names the cause."""
 
-    quantity: tuple[Quantity, ...]
-    sign: tuple[Literal["signed", "absolute", "lowest"], ...]
-    unit: tuple[Literal["range", "own"], ...]
-    step: tuple[Literal["small", "middle"], ...]
+    quantity: Distinct[Quantity]
+    sign: Distinct[Literal["signed", "absolute", "lowest"]]
+    unit: Distinct[Literal["range", "own"]]
+    step: Distinct[Literal["small", "middle"]]
 
 
 @dataclass(frozen=True)
 class Shap:
     """What SHAP's uncertainty is of."""
 
-    starts: tuple[Starts, ...]
-    background: tuple[Literal["observed", "clean"], ...]
-    quantity: tuple[Literal["divergence", "divergence_reversed", "log_determinant"], ...]
-    floor: tuple[Positive, ...]
-    sign: tuple[Literal["signed", "absolute"], ...]
+    starts: Distinct[Starts]
+    background: Distinct[Literal["observed", "clean"]]
+    quantity: Distinct[Literal["divergence", "divergence_reversed", "log_determinant"]]
+    floor: Distinct[Positive]
+    sign: Distinct[Literal["signed", "absolute"]]
 
 
 @dataclass(frozen=True)
 class TestSeverities:
     """How strong the perturbations of the test samples are."""
 
-    part: tuple[Literal["all", "weakest", "middle", "strongest"], ...]
-    classifier: tuple[Literal["paper", "converged"], ...]
+    part: Distinct[Literal["all", "weakest", "middle", "strongest"]]
+    classifier: Distinct[Literal["paper", "converged"]]
 
 
 @dataclass(frozen=True)
 class GPCStart:
     """How the Gaussian process classifier starts."""
 
-    inputs: tuple[Literal["standardised", "unit_norm", "raw"], ...]
-    inducing: tuple[Literal["kmeans", "random"], ...]
-    lengthscale: tuple[Literal["median", "default"], ...]
-    batch: tuple[Literal["full", "minibatch"], ...]
+    inputs: Distinct[Literal["standardised", "unit_norm", "raw"]]
+    inducing: Distinct[Literal["kmeans", "random"]]
+    lengthscale: Distinct[Literal["median", "default"]]
+    batch: Distinct[Literal["full", "minibatch"]]
 
 
 @dataclass(frozen=True)
 class TableKernel:
     """Kernel and schedule of Table V's classifier."""
 
-    kernel: tuple[Kernel, ...]
-    iterations: tuple[Count, ...]
+    kernel: Distinct[Kernel]
+    iterations: Distinct[Count]
 
 
 @dataclass(frozen=True)
 class LinearSVM:
     """Which linear support vector machine, and how it gives probabilities."""
 
-    machine: tuple[Literal["svc", "linear_svc"], ...]
-    inputs: tuple[Literal["standardised", "raw"], ...]
-    probability: tuple[Literal["platt", "softmax"], ...]
+    machine: Distinct[Literal["svc", "linear_svc"]]
+    inputs: Distinct[Literal["standardised", "raw"]]
+    probability: Distinct[Literal["platt", "softmax"]]
 
 
 @dataclass(frozen=True)
 class EncoderHead:
     """The head that trains the encoder, and the inputs of the learners on its embeddings."""
 
-    head: tuple[Literal["linear", "two_layer"], ...]
-    inputs: tuple[Literal["standardised", "raw"], ...]
+    head: Distinct[Literal["linear", "two_layer"]]
+    inputs: Distinct[Literal["standardised", "raw"]]
 
 
 @dataclass(frozen=True)
 class Diagnostics:
     """Samples, distance, uncertainty and area of Table V's diagnostics."""
 
-    set: tuple[Set, ...]
-    distance: tuple[Literal["knn_analytical", "mahalanobis_analytical", "knn_embedding", "mahalanobis_embedding"], ...]
-    score: tuple[Literal["max_score", "entropy", "bald"], ...]
-    area: tuple[Literal["aurc", "auroc_error"], ...]
+    set: Distinct[Set]
+    distance: Distinct[Literal["knn_analytical", "mahalanobis_analytical", "knn_embedding", "mahalanobis_embedding"]]
+    score: Distinct[Literal["max_score", "entropy", "bald"]]
+    area: Distinct[Literal["aurc", "auroc_error"]]
 
 
 @dataclass(frozen=True)
 class LabelPool:
-    """What there is to be labelled."""
+    """What there is to be labeled."""
 
-    new_share: tuple[OpenShare, ...]
-    batch: tuple[Count, ...]
-    initial: tuple[Annotated[int, Bounds(minimum=2)], ...]
+    new_share: Distinct[OpenShare]
+    batch: Distinct[Count]
+    initial: Distinct[Annotated[int, Bounds(minimum=2)]]
 
 
 @dataclass(frozen=True)
 class Epochs:
     """What an epoch is: a pass of Adam over these labels, at this rate."""
 
-    learning_rate: tuple[LearningRate, ...]
-    labels: tuple[Literal["at_target", "all"], ...]
+    learning_rate: Distinct[LearningRate]
+    labels: Distinct[Literal["at_target", "all"]]
 
 
 @dataclass(frozen=True)
 class FrameRepeats:
     """What varies between the repeats on depth frames, and which objects the test samples show."""
 
-    repeats: tuple[Literal["everything", "classifiers", "samples"], ...]
-    objects: tuple[Literal["all", "seen", "unseen"], ...]
+    repeats: Distinct[Literal["everything", "classifiers", "samples"]]
+    objects: Distinct[Literal["all", "seen", "unseen"]]
 
 
 @dataclass(frozen=True)
 class FrameInput:
     """What the encoder sees on depth frames, and which objects the test samples show."""
 
-    input: tuple[ReadAs, ...]
-    objects: tuple[Literal["all", "seen", "unseen"], ...]
+    input: Distinct[ReadAs]
+    objects: Distinct[Literal["all", "seen", "unseen"]]
 
 
 @dataclass(frozen=True)
 class ClassicFeatures:
     """Which of the classic features there are."""
 
-    features: tuple[Literal["all", "no_counts", "no_residual", "residual", "counts"], ...]
+    features: Distinct[Literal["all", "no_counts", "no_residual", "residual", "counts"]]
 
 
 @dataclass(frozen=True)

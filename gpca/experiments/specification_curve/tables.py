@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from gpca.comparison.readings import summarise
 from gpca.experiments.specification_curve.words import reading_in_words
 from gpca.objects.title import stand_in_clause
-from gpca.reporting.tables.builder import TableBuilder, plain_cell, rows_where
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.cells import plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -34,11 +35,6 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
 
     Args:
         judged: as :func:`gpca.comparison.readings.read_judged` reads it.
-        groups: group -> its title.
-        sources: source -> title and whether it is a stand-in.
-
-    Raises:
-        InputError: no missed number that a reading touches.
     """
     heads = {"number": "Number", "unit": "Unit", "group": "What is open", "where": "Printed number"}
     heads |= {"nearest": "Nearest reading", "close": "Readings that are close", "joint": _BEST}
@@ -61,7 +57,6 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
             numbers |= {"least": of.least, "most": of.most, "value": of.value}
             cells = {name: None if math.isnan(x) else plain_cell(float(x), seeds, 0) for name, x in numbers.items()}
             table.add_row(labels, cells)
-    table.require_rows("reading_verdicts.csv", "has no missed number", "nothing is missed")
     return table.build(
         "The numbers that are not reproduced, under other readings of what the paper leaves unstated"
         + stand_in_clause(sources.values()),

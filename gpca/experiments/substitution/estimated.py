@@ -20,8 +20,7 @@ from gpca.experiments.judge import Judges
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.designs import ADDITIVE_KNOBS
-from gpca.uncertainty.designs import Pair as Clouds
+from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
 from gpca.uncertainty.estimators.interface import POINT_TO_POINT, Estimate, Example, RegisteredPair
 from gpca.uncertainty.knobs import UNTOUCHED, KnobbedSource, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
@@ -64,7 +63,7 @@ class Estimates:
         return replace(chosen, attached={**chosen.attached, **own})
 
 
-class Registrar:
+class KnobbedRegistrar:
     """Registers the rows of a source and seed by point-to-point ICP, under any setting of the knobs."""
 
     def __init__(self, registrations: Registrations, source: str, seed: int, settings: UncertaintySettings) -> None:
@@ -76,7 +75,7 @@ class Registrar:
         registrations, settings = self._registrations, self._settings
         axes = (*self._axes, registrations.split[row], registrations.sample[row])
         random = generator(*axes, "clouds")
-        points, target, T_init, _ = Clouds(registrations, row).observed(settings.icp_points, random)
+        points, target, T_init, _ = RegisteredRow(registrations, row).observed(settings.icp_points, random)
         source = KnobbedSource(points, random)
         normals = estimate_normals(target)
         for knobs in settings_of_knobs:

@@ -12,7 +12,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.experiments.controls.rivals import Embed, Rival, described_for
 from gpca.experiments.judge import Judges
-from gpca.experiments.substitution.estimated import OBSERVED, Estimates, Registrar
+from gpca.experiments.substitution.estimated import OBSERVED, Estimates, KnobbedRegistrar
 from gpca.experiments.substitution.registered import registered_by
 from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
 from gpca.io.names import SPLITS
@@ -81,28 +81,30 @@ class Exchange:
             h_S_d, logits_S_C = self.embed(anew, self.source)
             seen = replace(anew, attached={"embedding": h_S_d, "head_logits": logits_S_C})
             found[name] = described_for(rivals, seen), failure_S
-        for learnt_from, (learnt, _) in found.items():
+        for learnt_from, (learned, _) in found.items():
             for explainer_name, rival in rivals.items():
                 explainer = rival.make()
-                explainer.fit(learnt.subset(learnt.rows("train")))
+                explainer.fit(learned.subset(learned.rows("train")))
                 for asked_of, (asked, failure_S) in found.items():
                     test = asked.subset(asked.rows("test"))
                     said = explainer.explain(test.without_labels())
                     labels = METHOD, learnt_from, asked_of, explainer_name
-                    yield labelled(prediction_frame(test, said), labels, failure_S[asked.rows("test")])
+                    yield labeled(prediction_frame(test, said), labels, failure_S[asked.rows("test")])
 
     def _by_estimators(
         self, registrations: Registrations, rivals: Mapping[str, Rival], judges: Judges
     ) -> Iterator[pd.DataFrame]:
         settings = self.settings
-        learnt = first(registrations, "train", 2 * settings.estimated_train)
-        half = len(learnt) // 2 // len(CONCEPTS) * len(CONCEPTS)  # threes of one object stay together
+        learned = first(registrations, "train", 2 * settings.estimated_train)
+        half = len(learned) // 2 // len(CONCEPTS) * len(CONCEPTS)  # threes of one object stay together
         test = first(registrations, "test", settings.estimated_test)
-        described = described_for(rivals, registrations.subset(np.concatenate([learnt[:half], test])))
+        described = described_for(rivals, registrations.subset(np.concatenate([learned[:half], test])))
         rows_of = {split: described.rows(split) for split in SPLITS}
-        examples = Registrar(registrations, self.source, self.seed, self.uncertainty).examples(learnt[half:], judges)
+        examples = KnobbedRegistrar(registrations, self.source, self.seed, self.uncertainty).examples(
+            learned[half:], judges
+        )
         estimators = {name: make_estimator(name, given, examples) for name, given in self.estimators.items()}
-        registrar = Registrar(described.without_labels(), self.source, self.seed, self.uncertainty)
+        registrar = KnobbedRegistrar(described.without_labels(), self.source, self.seed, self.uncertainty)
         lessons = rows_of["train"] if any(rival.observed_only for rival in rivals.values()) else np.arange(0)
         taught = registrar.estimates(lessons, estimators, OBSERVED)
         asked = registrar.estimates(rows_of["test"], estimators)
@@ -111,7 +113,7 @@ class Exchange:
             for name, rival in rivals.items():
                 said, failure_S = self._said(rival, train, taught[estimator], test_samples, asked[estimator])
                 frame = prediction_frame(test_samples, said)
-                yield labelled(frame, (ESTIMATOR, estimator, estimator, name), failure_S)
+                yield labeled(frame, (ESTIMATOR, estimator, estimator, name), failure_S)
 
     def _said(
         self, rival: Rival, train: Registrations, taught: Estimates, test: Registrations, asked: Estimates
@@ -140,7 +142,7 @@ def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
     return np.flatnonzero((registrations.split == split) & (registrations.sample < samples))
 
 
-def labelled(frame: pd.DataFrame, labels: tuple[str, ...], failure_S: np.ndarray) -> pd.DataFrame:
+def labeled(frame: pd.DataFrame, labels: tuple[str, ...], failure_S: np.ndarray) -> pd.DataFrame:
     """Return a prediction file's columns between `LABELS` and `FAILURE`."""
     for place, (name, label) in enumerate(zip(LABELS, labels, strict=True)):
         frame.insert(place, name, label)

@@ -2,46 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import Experiment
+from gpca.alignment.methods.registry import installed, left_out, method_entry
+from gpca.errors import require_names, with_key
+from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Tidy
+from gpca.experiments.explained import require_explained, titles
+from gpca.experiments.substitution.asked import require_exchangeable
 from gpca.experiments.substitution.settings import ExchangeSettings
-
-# What these functions import inside loads numba, and this module is loaded by every command.
+from gpca.explainers.registry import explainer_entry
+from gpca.settings import Distinct
+from gpca.uncertainty.estimators.registry import estimator_entry
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section(ExchangeSettings):
-    """The settings, and the sources whose registrations are explained."""
+    """The settings, the sources whose registrations are explained, and the explainers."""
 
-    sources: tuple[str, ...]
+    sources: Distinct[str]
+    explainers: ByName
 
 
-def check(config: dict, left_out: Callable[[str], set[str]]) -> None:
-    """Check the names; as under controls, an explainer's settings add to those that it has as an explainer."""
-    from baselines.registry import require_settings
-    from gpca.errors import require_names, with_key
-    from gpca.experiments.substitution.asked import require_exchangeable
-    from gpca.settings import check_settings
-
+def check(config: dict, names_left_out: LeftOut) -> None:
+    """Check that all names exist, and that the explainers read what is exchanged."""
     exchange = config["exchange"]
     for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
-        require_names(f"exchange.{key}", exchange[key], config[key], noun, left_out(key))
-    for name, settings in exchange["explainers"].items():
-        key = f"exchange.explainers.{name}"
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(key, require_settings, name, own)
-        with_key(key, check_settings, own, "explainers", name)
+        require_names(f"exchange.{key}", exchange[key], config[key], noun, names_left_out(key))
+    for key, name in require_explained(config, "exchange.explainers"):
         with_key(key, require_exchangeable, name)
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the sources and seeds, the methods, and the explainers whose estimator or whose method is exchanged."""
-    from baselines.registry import explainer_entry
-    from gpca.alignment.methods.registry import installed
-
     exchange = config["exchange"]
     return {
         "exchange_source": list(exchange["sources"]),
@@ -54,17 +48,13 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of what stands in the tables, and the methods whose package is missing here."""
-    from baselines.registry import explainer_entry
-    from gpca.alignment.methods.registry import installed, left_out, method_entry
-    from gpca.uncertainty.estimators.registry import estimator_entry
-
     exchange = config["exchange"]
     missing = left_out(exchange["methods"])
     return {
         "exchange_sources": {
             name: {key: sources[name][key] for key in ("title", "stand_in")} for name in exchange["sources"]
         },
-        "exchange_explainers": {name: explainer_entry(name).title for name in exchange["explainers"]},
+        "exchange_explainers": titles(exchange["explainers"]),
         "exchange_methods": {name: method_entry(name).title for name in installed(exchange["methods"])},
         "exchange_left_out": {method_entry(name).title: package for name, package in missing.items()},
         "exchange_estimators": {name: estimator_entry(name).title for name in exchange["estimators"]},
@@ -74,12 +64,19 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="exchange",
     summary="registrations -> explanations based on other registration methods and estimators",
-    settings=Section,
-    tidy="exchange.csv",
     folder="substitution",
+    sections={"exchange": Section},
+    tidy=(
+        Tidy(
+            "exchange.csv",
+            "gpca.experiments.substitution.metrics:collect",
+            {"prediction_files": "exchange/{exchange_source}/seed{exchange_seed}.csv"},
+            rule="exchange_metrics",
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,
-    lists={"sources": "sources", "methods": "methods", "estimators": "estimators"},
-    explainers=True,
+    leavable={"exchange.explainers": EXPLAINERS},
+    lists={f"exchange.{name}": name for name in ("sources", "methods", "estimators")},
 )

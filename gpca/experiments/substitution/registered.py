@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import scale_translation, transform
-from gpca.experiments.registration_methods.trial import observed_pair
+from gpca.experiments.registration_methods.trial import pair_to_register
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.process.progress import progress
 
@@ -29,7 +29,7 @@ def registered_by(
     made = {name: make_method(name, given) for name, given in methods.items()}
     outcomes: dict[str, list] = {name: [] for name in made}
     for row in progress(range(len(registrations)), f"registrations by other methods of {source}, seed {seed}"):
-        pair = observed_pair(registrations, row, source, seed, points)
+        pair = pair_to_register(registrations, row, source, seed, points)
         for name, method in made.items():
             outcomes[name].append(method(pair))
     targets = [registrations.target(row) for row in range(len(registrations))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from gpca.settings import Bounds, Count
+from gpca.settings import Bounds, Count, Distinct
 
 BALANCED = {"multipleOf": 3}  # over the concepts
 METHOD, ESTIMATOR = "method", "estimator"  # what is exchanged
@@ -29,11 +29,11 @@ class ExchangeSettings:
     """
 
     seeds: Count = 3
-    methods: tuple[str, ...] = ("point_to_point", "point_to_plane")
+    methods: Distinct[str] = ("point_to_point", "point_to_plane")
     train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 120
     test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 60
     points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 512
-    estimators: tuple[str, ...] = ("monte_carlo",)
+    estimators: Distinct[str] = ("monte_carlo",)
     estimated_train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 24
     estimated_test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 9
 

@@ -1,12 +1,4 @@
-"""Makes the tables of explainers with other estimators and other registration methods beneath them.
-
-Both take these arguments and raise the same error:
-
-    metrics: The tidy metrics that :func:`gpca.experiments.substitution.metrics.collect` makes.
-    sources: The ``{"title": str, "stand_in": bool}`` of each name.
-    explainers: The title of each name, in order.
-    InputError: The metrics hold none of these.
-"""
+"""Makes the tables of explainers with other estimators and other registration methods beneath them."""
 
 from __future__ import annotations
 
@@ -17,16 +9,15 @@ from gpca.attribution.metrics import ALL
 from gpca.experiments.substitution.metrics import ANOTHER, MONTE_CARLO
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, missing_packages, rows_where, span
-from gpca.reporting.tables.shares import WILSON, share_over_sources
+from gpca.reporting.tables.builder import TableBuilder, crossed, missing_packages
+from gpca.reporting.tables.cells import WILSON, rows_where, share_over_sources
 from gpca.reporting.tables.table import Column, Table
-from gpca.reporting.words import plural
+from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _INTERVAL = f"{WILSON}, as if all samples were independent; where seeds or objects differ, it is too narrow."
-_NOTHING = ("metrics", "have no explanation", "run the step exchange first")
 _OF_ESTIMATORS = {
     "agreement": Column("As with Monte-Carlo"),
     "abstained": Column("Abstained", interval=False),
@@ -40,23 +31,16 @@ def table14_estimator_explanations(
     explainers: Mapping[str, str],
     estimators: Mapping[str, str],
 ) -> Table:
-    """Return accuracy in all and by concept, and what agrees with Monte-Carlo: explainers × estimators.
-
-    Args:
-        metrics, sources, explainers: See above.
-        estimators: The title of each name, in order.
-    """
+    """Return accuracy in all and by concept, and what agrees with Monte-Carlo: explainers × estimators."""
     table = TableBuilder("table14_estimator_explanations", {"explainer": "Explainer", "estimator": "Uncertainty by"})
     causes = (ALL, *CONCEPTS)
-    for explainer, words in explainers.items():
+    for (explainer, name), labels in crossed(explainers, estimators):
         rows = rows_where(metrics, table=explainer)
-        for name, title in estimators.items():
-            cells = {key: share_over_sources(rows, sources, name, "accuracy", key) for key in causes}
-            cells |= {key: share_over_sources(rows, sources, name, key, ALL) for key in _OF_ESTIMATORS}
-            if name == MONTE_CARLO:
-                cells["agreement"] = None  # with itself
-            table.add_row([(explainer, words), (name, title)], cells)
-    table.require_rows(*_NOTHING)
+        cells = {key: share_over_sources(rows, sources, name, "accuracy", key) for key in causes}
+        cells |= {key: share_over_sources(rows, sources, name, key, ALL) for key in _OF_ESTIMATORS}
+        if name == MONTE_CARLO:
+            cells["agreement"] = None  # with itself
+        table.add_row(labels, cells)
     table.compare_down([ALL], same=1)
     return table.build(
         caption="Accuracy (%) with each estimator in place of Monte-Carlo" + stand_in_clause(sources.values()),
@@ -83,18 +67,14 @@ def table14_method_matrix(
     """Return the accuracy of explainers × the method learned from, by that of the test registrations.
 
     Args:
-        metrics, sources, explainers: See above.
-        methods: The title of each name, in order.
         left_out: The package that is missing, by the title of the method that needs it.
     """
     table = TableBuilder("table14_method_matrix", {"explainer": "Explainer", "learnt_from": "Learned from"})
     names = [*methods, ANOTHER]
-    for explainer, words in explainers.items():
+    for (explainer, learned_from), labels in crossed(explainers, methods):
         rows = rows_where(metrics, table=explainer)
-        for learnt_from, title in methods.items():
-            cells = {name: share_over_sources(rows, sources, name, "accuracy", learnt_from) for name in names}
-            table.add_row([(explainer, words), (learnt_from, title)], cells)
-    table.require_rows(*_NOTHING)
+        cells = {name: share_over_sources(rows, sources, name, "accuracy", learned_from) for name in names}
+        table.add_row(labels, cells)
     table.compare_down(methods, same=1)
     columns = {name: Column(f"on {title}") for name, title in methods.items()} | {
         ANOTHER: Column("on another (mean)", interval=False)  # the same samples several times
@@ -116,7 +96,7 @@ def table14_method_matrix(
 
 def _samples(table: TableBuilder, column: str) -> str:
     """Return how many test samples the first row's cell in a column has, in words."""
-    cell = table.cells[0, column]
+    cell = table.first_cell(column)
     return f"{cell.test_samples} test samples, of {plural(cell.seeds, 'seed')} and all datasets together"
 
 
@@ -127,8 +107,8 @@ def _of_concepts(table: TableBuilder) -> str:
 def _failed(
     metrics: pd.DataFrame, table: TableBuilder, sources: Mapping[str, Mapping], methods: Mapping[str, str]
 ) -> list[str]:
-    explainer, learnt_from = (key for key, _ in table.rows[0])
+    explainer, learned_from = (key for key, _ in table.rows[0])
     rows = rows_where(metrics, table=explainer)
-    shares = {title: share_over_sources(rows, sources, name, "failed", learnt_from) for name, title in methods.items()}
-    told = ", ".join(f"{title} {cell.mean:.1f} %" for title, cell in shares.items() if cell)
-    return [f"Registrations that failed by the method's own account, which are explained like any other: {told}."]
+    shares = {title: share_over_sources(rows, sources, name, "failed", learned_from) for name, title in methods.items()}
+    failed = ", ".join(f"{title} {cell.mean:.1f} %" for title, cell in shares.items() if cell)
+    return [f"Registrations that failed by the method's own account, which are explained like any other: {failed}."]

@@ -22,7 +22,7 @@ HANDLES: dict[str, Sequence[tuple[float, float]]] = {
 
 @dataclass(frozen=True)
 class Cup:
-    """Dimensions of one cup in millimetres.
+    """Dimensions of one cup in millimeters.
 
     Attributes:
         profile: (outer radius, height) from the foot (height 0) to the rim; a smooth monotone curve runs through them.
@@ -72,7 +72,7 @@ CUPS = {
 
 
 def build(cup: Cup) -> trimesh.Trimesh:
-    """Mesh of one cup in metres, foot at z = 0, first handle towards +x."""
+    """Mesh of one cup in meters, foot at z = 0, first handle towards +x."""
     radii, heights = np.array(cup.profile).T
     outline = PchipInterpolator(heights, radii)
     top = heights[-1]

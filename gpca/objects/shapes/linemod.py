@@ -278,7 +278,7 @@ DRAWN = {  # name: (drawing, extents mm, diameter mm)
 
 
 def build(name: str) -> trimesh.Trimesh:
-    """Mesh of one object in metres, foot at z = 0."""
+    """Mesh of one object in meters, foot at z = 0."""
     draw, extents_mm, diameter_mm = DRAWN[name]
     mesh = scale_to(draw(), np.multiply(extents_mm, 0.001), diameter_mm * 0.001)
     return move(mesh, (0, 0, -mesh.bounds[0, 2]))

@@ -27,7 +27,7 @@ Points = ArrayLike  # (K, 3), in a section (K, 2)
 
 
 def box(extents: Point, at: Point = (0, 0, 0), rounding: float = 0) -> trimesh.Trimesh:
-    """Box of full side lengths `extents` centred at `at`; `rounding` is the radius of all edges and corners."""
+    """Box of full side lengths `extents` centered at `at`; `rounding` is the radius of all edges and corners."""
     inner = np.asarray(extents, float) - 2 * rounding
     if not rounding:
         return _trimesh(Manifold.cube(inner, center=True).translate(at))
@@ -37,13 +37,13 @@ def box(extents: Point, at: Point = (0, 0, 0), rounding: float = 0) -> trimesh.T
 
 
 def cylinder(radius: float, height: float, at: Point = (0, 0, 0), axis: str = "z", top: float | None = None):
-    """Cylinder centred at `at` along x, y or z; with `top` a cone frustum of that radius at its upper end."""
+    """Cylinder centered at `at` along x, y or z; with `top` a cone frustum of that radius at its upper end."""
     body = Manifold.cylinder(height, radius, radius if top is None else top, SEGMENTS, center=True)
     return _trimesh(body.rotate(AXES[axis]).translate(at))
 
 
 def ellipsoid(radii: float | Point, at: Point = (0, 0, 0)) -> trimesh.Trimesh:
-    """Ellipsoid of semi-axes `radii` (one number: a ball) centred at `at`."""
+    """Ellipsoid of semi-axes `radii` (one number: a ball) centered at `at`."""
     return _trimesh(Manifold.sphere(1, SEGMENTS).scale(np.broadcast_to(radii, 3)).translate(at))
 
 
@@ -102,12 +102,12 @@ def tube(
     angles = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     across = np.asarray(side, float)
     rings = []
-    for centre, radius, tangent in zip(path_K_3, radii_K, tangents, strict=True):
+    for center, radius, tangent in zip(path_K_3, radii_K, tangents, strict=True):
         tangent = tangent / np.linalg.norm(tangent)
         across = across - (across @ tangent) * tangent  # carried along the path, so that the circle never twists
         across /= np.linalg.norm(across)
         circle = np.outer(aspect * np.cos(angles), across) + np.outer(np.sin(angles), np.cross(tangent, across))
-        rings.append(centre + radius * circle)
+        rings.append(center + radius * circle)
     return _skin(rings)
 
 
@@ -137,7 +137,7 @@ def intersection(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def blend(*meshes: trimesh.Trimesh, edge: float, rounds: int = 10) -> trimesh.Trimesh:
-    """Return the union, its seams smoothed away as in modelling clay.
+    """Return the union, its seams smoothed away as in modeling clay.
 
     Edges are cut to at most `edge` and smoothed by Laplacian rounds that keep the volume; what is then flat within
     1/30 of `edge` is merged into larger triangles.

@@ -1,7 +1,7 @@
 """Stand-ins for the 21 objects of YCB-Video, built from solids with the size of the real ones.
 
 Shapes are drawn in millimeters, z up, each lying or standing as in the YCB scans, and then stretched to the sizes of
-the published google_16k scans (tightest upright box; handles along x). The calliper table of Calli et al. (IEEE RAM,
+the published google_16k scans (tightest upright box; handles along x). The caliper table of Calli et al. (IEEE RAM,
 September 2015) is some millimeters smaller, since real cardboard bulges. No label, no fine relief; the
 pitcher stands without the lid that its scan wears.
 """
@@ -223,7 +223,7 @@ def _foam_brick() -> trimesh.Trimesh:
     return difference(box((52, 77.6, 51.2), rounding=1.5), *holes)
 
 
-# name: (how it is drawn, extents x, y, z in millimetres)
+# name: (how it is drawn, extents x, y, z in millimeters)
 _DRAWINGS: dict[str, tuple[Callable[[], trimesh.Trimesh], tuple[float, float, float]]] = {
     "002_master_chef_can": (lambda: _can(51, 140, ribs=5), (102.3, 102.3, 140.2)),
     "003_cracker_box": (lambda: box((71.9, 163.7, 213.4), rounding=2), (71.9, 163.7, 213.4)),

@@ -5,14 +5,19 @@ from __future__ import annotations
 import math
 import textwrap
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.objects.canonical import ObjectClouds
 from gpca.reporting.figures.cloud_views import view_from
+from gpca.reporting.figures.panels import write_below
 from gpca.reporting.figures.splats import splat
-from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
+from gpca.reporting.figures.style import TEXT_WIDTH_IN, use_style, write_title
 from gpca.reporting.words import object_in_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 VIEW = (math.radians(-55), math.radians(32))  # Azimuth and elevation of the eye, z up: it sees front, right and top.
 BASE_COLOUR = np.array([0.62, 0.70, 0.80])
@@ -89,48 +94,37 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
-def draw_contact_sheet(
-    objects_npz: str | Path, title: str, pdf_path: str | Path, png_path: str | Path, dataset: str = ""
-) -> None:
+def draw_contact_sheet(objects_npz: str | Path, title: str, dataset: str = "") -> Figure:
     """Draw all objects of one source in a grid, each filling its tile, with its name and diameter below.
 
     Args:
         objects_npz: The clouds as `gpca objects` writes them.
         title: The line on top, which says so when the objects are stand-ins.
-        pdf_path, png_path: The two files to write.
         dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
         InputError: the npz is missing, unreadable or not of that format.
     """
     objects = ObjectClouds.load(objects_npz)
-    plt = use_style()
     count = len(objects)
     columns = _columns(count)
     rows = math.ceil(count / columns)
-    tile = TEXT_WIDTH_IN / columns
-    size_pt = min(7.0, max(4.5, 7.0 * tile))
-    captions = [_caption(object_in_words(name, dataset), tile * 72, size_pt) for name in objects.names]
-    line = size_pt * 1.2 / 72
-    caption_height = line * (max(caption.count("\n") for caption in captions) + 2) + 0.08
-    title_height = 0.28
-    height = title_height + rows * (tile + caption_height)
-    figure = plt.figure(figsize=(TEXT_WIDTH_IN, height))
+    tile_in = TEXT_WIDTH_IN / columns
+    size_pt = min(7.0, max(4.5, 7.0 * tile_in))
+    captions = [_caption(object_in_words(name, dataset), tile_in * 72, size_pt) for name in objects.names]
+    caption_in = size_pt * 1.2 / 72 * (max(caption.count("\n") for caption in captions) + 2) + 0.08
+    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 0.36 + rows * (tile_in + caption_in)), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0, h_pad=0.02, wspace=0, hspace=0)
     write_title(figure, title)
+    grid = figure.add_gridspec(rows, 2 * columns)  # Half tiles, so that a short last row can stand in the middle.
     for index, (name_lines, diameter_m) in enumerate(zip(captions, objects.diameters_m, strict=True)):
         row, column = divmod(index, columns)
-        in_row = min(columns, count - row * columns)
-        left = (column + (columns - in_row) / 2) * tile  # A short last row stands in the middle.
-        bottom = height - title_height - row * (tile + caption_height) - tile
-        image = render_cloud(*objects.clouds[index], VIEW, round(tile * 300))
-        axes = figure.add_axes((left / TEXT_WIDTH_IN, bottom / height, tile / TEXT_WIDTH_IN, tile / height))
-        axes.imshow(image, interpolation="antialiased")
-        axes.set_axis_off()
-        text_x = (left + tile / 2) / TEXT_WIDTH_IN
-        text_y = (bottom - 0.02) / height
-        text = f"{name_lines}\n{diameter_m * 1000:.0f} mm"
-        figure.text(text_x, text_y, text, ha="center", va="top", fontsize=size_pt, linespacing=1.15)
-    save_figure(figure, pdf_path, png_path)
+        first = 2 * column + columns - min(columns, count - row * columns)
+        panel = figure.add_subplot(grid[row, first : first + 2])
+        panel.imshow(render_cloud(*objects.clouds[index], VIEW, round(tile_in * 300)), interpolation="antialiased")
+        panel.set_axis_off()
+        write_below(panel, f"{name_lines}\n{diameter_m * 1000:.0f} mm", fontsize=size_pt, pad=-2)
+    return figure
 
 
 def _columns(count: int) -> int:

@@ -1,50 +1,71 @@
-"""Figures of many small panels with shared axes, one legend and one title."""
+"""Lays out figures of one panel or many: what stands around the panels finds its room by itself."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from textwrap import wrap
 
-from gpca.reporting.figures.style import TEXT_WIDTH_IN, save_figure, use_style, write_title
+import numpy as np
+
+from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, use_style
 
 MOST_PER_ROW = 5
 
 
-def small_panels(count: int, panel_height_in: float):
-    """Return a figure with that many panels, their axes shared, and the panels; rows are as even as they can be."""
-    plt = use_style()
-    lines = -(-count // MOST_PER_ROW)
-    size = (TEXT_WIDTH_IN, 0.75 + panel_height_in * lines)
-    figure, axes = plt.subplots(lines, -(-count // lines), figsize=size, sharex=True, sharey=True, squeeze=False)
-    for spare in axes.flat[count:]:
+def panels(rows: int, columns: int, height_in: float, width_in: float = TEXT_WIDTH_IN, **options):
+    """Return a figure and its panels (rows, columns); the options are those of ``pyplot.subplots``."""
+    size = (width_in, height_in)
+    return use_style().subplots(rows, columns, figsize=size, squeeze=False, layout="constrained", **options)
+
+
+def panels_in_lines(count: int, panel_height_in: float, most: int = MOST_PER_ROW, **options):
+    """Return a figure and so many panels with shared axes, in lines of `most` or fewer, as even as they can be."""
+    lines = -(-count // most)
+    options = {"sharex": True, "sharey": True} | options
+    figure, grid = panels(lines, -(-count // lines), 0.75 + panel_height_in * lines, **options)
+    for spare in grid.flat[count:]:
         spare.set_visible(False)
-    return figure, list(axes.flat[:count])
+    return figure, list(grid.flat[:count])
 
 
-def finish_panels(
-    figure,
-    panels: list,
-    title: str,
-    handles: list,
-    labels: list[str],
-    across: str,
-    up: str,
-    pdf_path: str | Path,
-    png_path: str | Path,
-) -> None:
-    """Label the outer panels, set a title above all and a legend below, and write the figure."""
-    height_in = figure.get_size_inches()[1]
-    per_row = panels[0].get_gridspec().ncols
-    for i, panel in enumerate(panels):
+def label_outer(of_panels: list, across: str, up: str) -> None:
+    """Label the axes of the panels that have none to their left, and of those that have none below them."""
+    per_row = of_panels[0].get_gridspec().ncols
+    for i, panel in enumerate(of_panels):
         if i % per_row == 0:
             panel.set_ylabel(up)
-        if i + per_row >= len(panels):
+        if i + per_row >= len(of_panels):
             panel.set_xlabel(across)
             panel.tick_params(labelbottom=True)
-    figure.legend(handles, labels, ncol=len(labels), loc="lower center", columnspacing=1.4)
-    write_title(figure, title)
-    figure.tight_layout(rect=(0.012, 0.2 / height_in, 1, 1 - 0.2 / height_in), pad=0.4, h_pad=0.8, w_pad=0.6)
-    save_figure(figure, pdf_path, png_path)
+
+
+def legend_below(figure, handles: list, labels: list[str] | None = None, columns: int = 0, **style) -> None:
+    """Name lines and markers below all panels, in one line or in so many columns."""
+    labels = [handle.get_label() for handle in handles] if labels is None else labels
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns or len(labels), columnspacing=1.4, **style)
+
+
+def draw_percentages(panel, percentages: np.ndarray, form: str, counts: np.ndarray | None = None, **style) -> None:
+    """Draw a matrix in blues and write the number of every cell into it; a NaN has neither.
+
+    Args:
+        form: of what is written, as in ``{:.0f}``; a second pair of braces holds the count of the cell.
+    """
+    panel.imshow(np.ma.masked_invalid(percentages), cmap=blues(), vmin=0, vmax=100, aspect="auto")
+    for cell, percentage in np.ndenumerate(percentages):
+        if np.isfinite(percentage):
+            words = form.format(percentage, None if counts is None else counts[cell])
+            look = {"ha": "center", "va": "center", "fontsize": SMALL_PT, "color": color_on_blue(percentage / 100)}
+            panel.text(cell[1], cell[0], words, **look | style)
+
+
+def color_on_blue(share: float) -> str:
+    """Return the color of letters on a shade of blue between 0, which is white, and 1."""
+    return "white" if share > 0.65 else "black"
+
+
+def write_below(panel, words: str, **style) -> None:
+    """Write a caption below a panel, which may be one without axes."""
+    panel.set_title(words, **{"y": 0, "pad": -4, "va": "top", "linespacing": 1.15} | style)
 
 
 def in_lines(title: str, letters: int = 26) -> str:

@@ -60,7 +60,9 @@ def use_style() -> Any:
 def write_title(figure, words: str) -> None:
     """Write a figure's title where all have it: at the top left, in one line or more."""
     height_in = figure.get_size_inches()[1]
-    figure.text(0.005, 1 - 0.02 / height_in, words, ha="left", va="top", linespacing=1.15)
+    # A layout that is worked out by itself leaves room for a title that has no place of its own.
+    place = {} if figure.get_layout_engine() else {"y": 1 - 0.02 / height_in}
+    figure.suptitle(words, x=0.005, ha="left", va="top", linespacing=1.15, **place)
 
 
 def blues():

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from math import nan
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from gpca.attribution.metrics import mean_interval
 from gpca.errors import InputError
-from gpca.objects.title import stand_in_clause
+from gpca.objects.title import stand_in_clause, title_of
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
-from gpca.reporting.words import plural
+from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 INTERVAL = "± is the half-width of the 95 % t-interval over the seeds"
 Label = tuple[str, str]  # key for the CSV, title for the reader
@@ -47,12 +44,12 @@ class TableBuilder:
             cells: The cell of each column key, or None where there is no number.
             rival: Whether the row competes with others for bold, as an oracle does not.
         """
-        found = {key: cell for key, cell in cells.items() if cell is not None}
-        if not found:
+        known = {key: cell for key, cell in cells.items() if cell is not None}
+        if not known:
             return
         row = len(self.rows)
         self.rows.append(tuple(labels))
-        self.cells |= {(row, key): cell for key, cell in found.items()}
+        self.cells |= {(row, key): cell for key, cell in known.items()}
         if rival:
             self._rivals.add(row)
 
@@ -69,13 +66,20 @@ class TableBuilder:
                 groups.setdefault((self.rows[row][:same], key), []).append((row, key))
         self._compared += groups.values()
 
-    def require_rows(self, subject: str, verb: str, remedy: str) -> None:
-        """Raise an InputError, such as "metrics: have no accuracy for table1_extended", if no row was added."""
+    def require_rows(self) -> None:
+        """Raise an InputError if no row was added."""
         if not self.rows:
-            raise InputError(subject, f"{verb} for {self.name}", remedy)
+            fault = "has nothing to show: its files hold no numbers of what the config names"
+            raise InputError(f"table '{self.name}'", fault, "run that first")
+
+    def first_cell(self, column: str) -> Cell:
+        """Return the cell of the first row in a column."""
+        self.require_rows()
+        return self.cells[0, column]
 
     def first_labels(self) -> list[str]:
         """Return the different keys of the rows' first labels, in the order of the rows."""
+        self.require_rows()
         return list(dict.fromkeys(labels[0][0] for labels in self.rows))
 
     def stand_in_clause(self, sources: Mapping[str, Mapping], partly: bool = True) -> str:
@@ -84,14 +88,17 @@ class TableBuilder:
 
     def most_seeds(self) -> int:
         """Return over how many seeds the cell with the most of them is a mean."""
+        self.require_rows()
         return max(cell.seeds for cell in self.cells.values())
 
     def span_of_seeds(self) -> str:
         """Return over how many seeds its cells are means, such as ``5`` or ``1 to 3``."""
+        self.require_rows()
         return span(cell.seeds for cell in self.cells.values())
 
     def build(self, caption: str, column_head: str, columns: Mapping[str, Column], footnotes: Iterable[str]) -> Table:
-        """Return the table with its columns, which may depend on the cells that were found."""
+        """Return the table with its columns, which may depend on the cells that there are."""
+        self.require_rows()
         return Table(
             name=self.name,
             caption=caption,
@@ -105,71 +112,15 @@ class TableBuilder:
         )
 
 
-def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bool = False) -> Cell | None:
-    """Return the mean over R repeats with the half-width of its t-interval, or None without any repeat.
-
-    Fewer than `LEAST_SEEDS` repeats have no interval.
-
-    Args:
-        values_R: One value per seed, in the column's unit.
-        test_samples: The number of test samples of all seeds together.
-        at_least: Whether some repeat was stopped before it was done, which makes the mean a lower bound.
-    """
-    if len(values_R) == 0:
-        return None
-    mean, low, _ = mean_interval(values_R)
-    half_width = mean - low if len(values_R) >= LEAST_SEEDS else nan
-    return Cell(mean, half_width, len(values_R), test_samples, at_least)
+def crossed(*titles: Mapping[str, str]) -> Iterator[tuple[tuple[str, ...], list[Label]]]:
+    """Yield the keys and the labels of every row of a table that crosses names, given the title of each."""
+    for labels in product(*(named.items() for named in titles)):
+        yield tuple(key for key, _ in labels), list(labels)
 
 
-def cell_of_all_samples(values_R: Sequence[float], samples_R: Sequence[float]) -> Cell | None:
-    """Return the mean over the samples of R seeds, which have unequally many, or None without any seed.
-
-    The interval is that of a ratio of two means over the seeds (by its linearisation), which for equally many samples
-    is the t-interval of the seeds' means.
-
-    Args:
-        values_R: The mean over the samples of each seed, in the column's unit.
-        samples_R: How many these are.
-    """
-    value_R, sample_R = np.asarray(values_R, float), np.asarray(samples_R, float)
-    if not len(value_R):
-        return None
-    mean = np.average(value_R, weights=sample_R)
-    return cell_of_repeats(mean + sample_R / sample_R.mean() * (value_R - mean), int(sample_R.sum()))
-
-
-def cell_over_sources(
-    metrics: pd.DataFrame,
-    values: pd.DataFrame,
-    sources: Iterable[str],
-    method: str,
-    metric: str,
-    concept: str,
-    factor: float,
-) -> Cell | None:
-    """Return the mean over the seeds of what all pairs of a seed have, whatever their source."""
-    counts = rows_where(metrics, method=method, metric="test_samples", concept=concept)
-    of_metric = rows_where(values, method=method, metric=metric, concept=concept)
-    both = of_metric.merge(counts, on=["source", "seed"], suffixes=("", "_n"))
-    both = both[both["source"].isin(list(sources))]
-    sums = (both["value"] * both["value_n"]).groupby(both["seed"]).sum()
-    counts_R = both.groupby("seed")["value_n"].sum()
-    return cell_of_repeats((factor * sums / counts_R).to_numpy(), int(counts_R.sum()))
-
-
-def plain_cell(value: float, seeds: int, test_samples: int) -> Cell:
-    """Return a number that has no interval."""
-    return Cell(value, nan, seeds, test_samples)
-
-
-def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
-    """Return the rows whose columns hold what is wanted, e.g. ``rows_where(metrics, source="ycb", concept="all")``."""
-    chosen = None
-    for column, value in wanted.items():
-        holds = frame[column] == value
-        chosen = holds if chosen is None else chosen & holds
-    return frame if chosen is None else frame[chosen]
+def titles_of(sources: Mapping[str, Mapping]) -> dict[str, str]:
+    """Return the title of each source, which says so where it is a stand-in."""
+    return {name: title_of(entry) for name, entry in sources.items()}
 
 
 def mean_over(seeds: int | str, samples: int | str) -> str:
@@ -185,15 +136,9 @@ def interval_over(seeds: int | str) -> str:
     return INTERVAL if fewest >= LEAST_SEEDS else f"{INTERVAL} (none for fewer than {LEAST_SEEDS})"
 
 
-def span(numbers: Iterable[float]) -> str:
-    """Return the least and the largest of some whole numbers, such as ``15 to 200``, or the one that all are."""
-    distinct = sorted({int(number) for number in numbers})
-    return str(distinct[0]) if len(distinct) == 1 else f"{distinct[0]} to {distinct[-1]}"
-
-
 def missing_packages(left_out: Mapping[str, str]) -> list[str]:
     """Return the footnote on methods whose package is not installed, if there are any."""
     if not left_out:
         return []
-    told = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
-    return [f"Left out, as the package is not installed: {told}."]
+    needs = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
+    return [f"Left out, as the package is not installed: {needs}."]

@@ -35,11 +35,7 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
 
     Args:
         verdicts: as :func:`gpca.comparison.claim_verdicts.read_verdicts` reads them.
-        sources: source -> title and whether it is a stand-in.
         titles: method -> what the tables call it.
-
-    Raises:
-        InputError: nothing that was run.
     """
     table = TableBuilder(
         "claims",
@@ -71,7 +67,6 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
             ],
             {"difference": Cell(row.value, row.high - row.value, int(row.n), 0, bounds=(row.low, row.high))},
         )
-    table.require_rows("claims.csv", "has no results", "run what the claims compare")
     open_ones = verdicts[verdicts["claim_verdict"] == NOT_RUN].drop_duplicates("claim")
     return table.build(
         caption="What the paper says in sentences, and whether the differences in this run support it",

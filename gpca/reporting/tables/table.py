@@ -1,13 +1,15 @@
-"""Writes a table of means over seeds as CSV for machines, Markdown for readers and LaTeX for the paper."""
+"""Writes a table as CSV for machines, Markdown for readers, LaTeX for the paper and JSON for the page."""
 
 from __future__ import annotations
 
 import csv
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from gpca.io.files import whole_file
 
@@ -113,13 +115,28 @@ class Table:
                 best |= chosen if tells_apart else set()
         return best
 
-    def write(self, csv_path: str | Path, md_path: str | Path, tex_path: str | Path) -> None:
-        """Write the three files, each whole or not at all."""
-        for path, text in ((md_path, self.markdown()), (tex_path, self.latex())):
-            with whole_file(path) as partial:
+    def write(self, stem: str | Path) -> None:
+        """Write ``{stem}.csv``, ``.md``, ``.tex`` and, for the page, ``.json``: each whole or not at all."""
+        page = json.dumps(self.printed(), indent=1, ensure_ascii=False) + "\n"
+        for suffix, text in (("md", self.markdown()), ("tex", self.latex()), ("json", page)):
+            with whole_file(f"{stem}.{suffix}") as partial:
                 partial.write_text(text, encoding="utf-8")
-        with whole_file(csv_path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        with whole_file(f"{stem}.csv") as partial, partial.open("w", newline="", encoding="utf-8") as file:
             csv.writer(file, lineterminator="\n").writerows(self.records())
+
+    def printed(self) -> dict[str, Any]:
+        """Return the words that a reader sees; each cell is its text, and whether it is bold."""
+        best, rows = self.best(), []
+        for row, labels in enumerate(self.rows):
+            numbers = [(self._text(row, name), (row, name) in best) for name in self._own_columns()]
+            rows.append([*((title, False) for _, title in labels), *numbers])
+        return {
+            "caption": self.caption,
+            "heads": [*self.row_heads.values(), *(column.title for column in self._own_columns().values())],
+            "label_columns": len(self.row_heads),
+            "rows": rows,
+            "footnotes": list(self.footnotes),
+        }
 
     def records(self) -> list[tuple]:
         """Return the CSV's rows, head first: one row per cell, in its column's unit, `n_test` over all seeds."""
@@ -144,7 +161,7 @@ class Table:
         """Return a GitHub table, caption above, footnotes below."""
         rule = [":--"] * len(self.row_heads) + ["--:"] * len(self._own_columns())
         body = self._body(lambda text: text.replace("|", "\\|"), lambda text: f"**{text}**")
-        lines = [" | ".join(row) for row in (self._heads(), rule, *body)]
+        lines = [" | ".join(row) for row in (self.printed()["heads"], rule, *body)]
         table = "\n".join(f"| {line} |" for line in lines)
         return "\n\n".join([f"**{self.caption}**", table, *self.footnotes]) + "\n"
 
@@ -153,7 +170,7 @@ class Table:
 
         A table that may be wider than the text is scaled down to it, which needs ``graphicx`` too.
         """
-        plain = [self._heads(), *self._body(str, str)]
+        plain = [self.printed()["heads"], *self._body(str, str)]
         characters = sum(2 + max(map(len, column)) for column in zip(*plain, strict=True))
         float_name = "table" if characters <= _COLUMN_CHARACTERS else "table*"
         alignments = "l" * len(self.row_heads) + "c" * len(self._own_columns())
@@ -164,7 +181,7 @@ class Table:
             begin = f"{_SCALED_DOWN}\n{begin}"
             end += "}"
             packages = "booktabs, graphicx"
-        heads = [r"\textbf{" + _tex(title) + "}" for title in self._heads()]
+        heads = [r"\textbf{" + _tex(title) + "}" for title in plain[0]]
         body = self._body(_tex, lambda text: r"\textbf{" + text + "}")
         return "\n".join(
             [
@@ -187,9 +204,6 @@ class Table:
             ]
         )
 
-    def _heads(self) -> list[str]:
-        return [*self.row_heads.values(), *(column.title for column in self._own_columns().values())]
-
     def _own_columns(self) -> dict[str, Column]:
         return {name: column for name, column in self.columns.items() if not column.beside}
 
@@ -202,15 +216,7 @@ class Table:
         return " ".join([self.columns[name].text(cell), *(f"({text})" for text in texts)])
 
     def _body(self, escape, bold) -> list[list[str]]:
-        body = []
-        best = self.best()
-        for row, labels in enumerate(self.rows):
-            texts = [escape(title) for _, title in labels]
-            for name in self._own_columns():
-                text = escape(self._text(row, name))
-                texts.append(bold(text) if (row, name) in best else text)
-            body.append(texts)
-        return body
+        return [[bold(escape(text)) if b else escape(text) for text, b in row] for row in self.printed()["rows"]]
 
 
 _TEX = {

@@ -47,10 +47,10 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
     variances_E_6 = np.array([_variances(example) for example in examples])
     variances = torch.from_numpy(variances_E_6)
     log_scale = torch.zeros(features.shape[1], dtype=torch.float64, requires_grad=True)
-    optimiser = Adam([log_scale], learning_rate)
+    optimizer = Adam([log_scale], learning_rate)
     others = torch.eye(len(examples), dtype=torch.bool)
     for _ in range(steps):
-        optimiser.zero_grad()
+        optimizer.zero_grad()
         scaled = features * torch.exp(log_scale)
         lengths = scaled.square().sum(dim=1)
         squares = lengths[:, None] + lengths - 2 * scaled @ scaled.T
@@ -58,7 +58,7 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
         predicted = weights @ variances
         loss = (logarithm(predicted) + variances / predicted).sum(dim=1).mean()
         loss.backward()
-        optimiser.step()
+        optimizer.step()
     scale_K = np.exp(log_scale.detach().numpy())
     known_E_K = features.numpy() * scale_K
 
@@ -72,7 +72,7 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
 
 
 class Reduction:
-    """Descriptors, standardised and limited, onto their first principal components.
+    """Descriptors, standardized and limited, onto their first principal components.
 
     There are at most one fewer than training pairs: along any other axis these do not differ, and another pair would
     lie infinitely far away.

@@ -208,13 +208,13 @@ def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
 
     An axis points to where the cloud reaches farther, by the sum of cubes, so that like clouds have like frames.
     """
-    centre_3 = points_N_3.mean(axis=0)
-    offset_N_3 = points_N_3 - centre_3
+    center_3 = points_N_3.mean(axis=0)
+    offset_N_3 = points_N_3 - center_3
     axes_3_3 = np.linalg.eigh(np.einsum("ni,nj->ij", offset_N_3, offset_N_3))[1][:, ::-1]
     along_N_3 = np.einsum("ni,ij->nj", offset_N_3, axes_3_3)
     axes_3_3 = axes_3_3 * np.where((along_N_3**3).sum(axis=0) < 0, -1.0, 1.0)
     axes_3_3[:, 2] = np.cross(axes_3_3[:, 0], axes_3_3[:, 1])
-    return rigid_motion(axes_3_3, centre_3)
+    return rigid_motion(axes_3_3, center_3)
 
 
 def _batched(pair: Pair, method: str) -> Starter:

@@ -105,15 +105,15 @@ class _Ensemble:
 
         features, mean, variance = (torch.from_numpy(array) for array in (features_E_K, mean_E_6, variance_E_6))
         parameters = [self._first, self._second]
-        optimiser = Adam(parameters, learning_rate)
+        optimizer = Adam(parameters, learning_rate)
         for _ in range(steps):
-            optimiser.zero_grad()
+            optimizer.zero_grad()
             said, log_variance = self._predict(features)
             misfit = ((mean - said).square() + variance) * torch.exp(-log_variance)
             decay = weight_decay * sum(parameter.square().sum() for parameter in parameters)
             loss = 0.5 * (log_variance + misfit).sum(dim=2).mean(dim=1).sum() + decay
             loss.backward()
-            optimiser.step()
+            optimizer.step()
 
     def variances(self, features_1_K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the aleatoric and the epistemic variances (6,) of one pair."""

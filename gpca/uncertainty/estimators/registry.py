@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-import gpca.uncertainty.estimators as folder
 from gpca.errors import InputError
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import Estimate, EstimatorEntry, Example, FailedEstimate, RegisteredPair
 
-REGISTRY: Registry[EstimatorEntry] = Registry("estimator", folder, "ESTIMATORS")
+REGISTRY: Registry[EstimatorEntry] = Registry("estimator", __package__, "ESTIMATORS")
 estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
@@ -38,7 +37,7 @@ def make_estimator(
     settings = dict(settings or {})
     require_estimator_settings(name, settings)
     entry = estimator_entry(name)
-    unlearnt = ""
+    unlearned = ""
     estimate: Callable[[RegisteredPair], np.ndarray] | None = None
     if entry.learn is not None:
         if not examples:
@@ -48,14 +47,14 @@ def make_estimator(
         try:
             estimate = entry.learn(examples, **settings)
         except FailedEstimate as failure:
-            unlearnt = str(failure)
+            unlearned = str(failure)
     elif entry.estimate is not None:
         function = entry.estimate
         estimate = lambda registered: function(registered, **settings)  # noqa: E731
 
     def told(registered: RegisteredPair) -> Estimate:
         if estimate is None:
-            return Estimate(None, unlearnt)
+            return Estimate(None, unlearned)
         if registered.outcome.fitness == 0:
             return Estimate(None, registered.outcome.failure or "no source point is near the target")
         try:

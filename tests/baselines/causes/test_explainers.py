@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from baselines.causes.nominal import NominalThreshold
-from baselines.registry import CAUSES, explainer_entry, explainer_module, explainers
 from gpca.alignment.icp import ICPSettings
-from gpca.causes.labels import LABELS, labelled
+from gpca.causes.labels import LABELS, labeled
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
+from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
 from gpca.features.dataset import describe_all
 from gpca.features.settings import DescriptorSettings
 
@@ -27,7 +27,7 @@ NAMES = sorted(set(explainers(CAUSES)) - {"pair_committee"})  # it is made of th
 @pytest.fixture(scope="module")
 def seen(causes):
     """Registrations with labels, descriptors and an embedding that tells the labels apart."""
-    registrations = labelled(causes)
+    registrations = labeled(causes)
     few = DescriptorSettings(starts=1, restarts=2, icp_points=64)
     descriptors, _, _ = describe_all(causes, "four", 100, few, ICPSettings())
     embedding = np.random.default_rng(0).normal(size=(len(causes), 6))
@@ -55,7 +55,7 @@ def test_scores_are_over_the_labels_and_the_same_again(name, seen):
 
 
 @pytest.mark.parametrize("name", ["gpca", "softmax_head", "concept_vectors", "pair_forest", "gpca_pair"])
-def test_who_learns_finds_the_labels_of_the_samples_that_it_learnt(name, seen):
+def test_who_learns_finds_the_labels_of_the_samples_that_it_learned(name, seen):
     attribution = explained(name, seen)
     assert (attribution.predicted_N == seen.concept).mean() > 0.5
 

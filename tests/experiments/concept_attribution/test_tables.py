@@ -1,4 +1,5 @@
 import csv
+import json
 import math
 from dataclasses import replace
 
@@ -92,9 +93,8 @@ def test_different_numbers_of_seeds_are_told():
 
 
 def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
-    paths = [tmp_path / f"t.{suffix}" for suffix in ("csv", "md", "tex")]
-    table1_single_baselines(metrics, REAL, EXPLAINERS).write(*paths)
-    with paths[0].open(encoding="utf-8") as file:
+    table1_single_baselines(metrics, REAL, EXPLAINERS).write(tmp_path / "t")
+    with (tmp_path / "t.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     gpca = next(row for row in rows if (row["source"], row["explainer"]) == ("linemod", "gpca"))
     assert float(gpca["mean"]) == 98.0
@@ -102,7 +102,22 @@ def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
     assert float(gpca["ci_high"]) == 100.0
     assert (gpca["n_seeds"], gpca["n_test"]) == ("3", "600")
     assert len(rows) == 3
-    assert paths[1].read_text(encoding="utf-8").startswith("**Mean accuracy")
+    assert (tmp_path / "t.md").read_text(encoding="utf-8").startswith("**Mean accuracy")
+
+
+def test_the_page_is_given_the_words_of_the_table(metrics, tmp_path):
+    table = table1_single_baselines(metrics, REAL, EXPLAINERS)
+    table.write(tmp_path / "t")
+    printed = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"))
+    assert (printed["caption"], printed["label_columns"], printed["footnotes"]) == (
+        table.caption,
+        1,
+        [*table.footnotes],
+    )
+    assert printed["heads"][0] == "Dataset"
+    [row, *_] = printed["rows"]
+    bold = " | ".join(f"**{text}**" if best else text for text, best in row)
+    assert f"| {bold} |" in table.markdown()
 
 
 def test_ties_at_the_printed_precision_are_all_bold():

@@ -11,8 +11,7 @@ from gpca.errors import InputError
 from gpca.experiments.controls.costs import collect_costs
 from gpca.experiments.controls.intervals import collect as collect_intervals
 from gpca.experiments.controls.intervals import read_intervals
-from gpca.experiments.controls.judged import read_controls
-from gpca.experiments.controls.metrics import collect
+from gpca.experiments.controls.metrics import collect, read_controls
 from gpca.experiments.controls.protocol import LABELS
 from gpca.experiments.controls.samples import sample_table
 from gpca.experiments.controls.severity import REGISTRATION, read_severities
@@ -112,20 +111,13 @@ def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
         ("a", "gpca_pair", "learning_seconds", 100): 2.5,
         ("a", "gpca_pair", "seconds", 100): 0.01,
     }
-    write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [-1], "seconds": [0.01]}))
-    with pytest.raises(InputError, match="'learning_seconds' contains numbers below 0"):
-        collect_costs([path])
 
 
 def test_views_of_one_instance_are_one_object(files):
     assert set(read_controls(files)["instance"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
 
 
-def test_an_unknown_control_is_refused(tmp_path):
-    path = tmp_path / "controls" / "a" / "seed100.csv"
-    write_csv(path, said("a", "a", "gravity", "gpca", 3))
-    with pytest.raises(InputError, match="unknown control 'gravity'; expected one of density"):
-        read_controls([path])
+def test_no_files_are_refused():
     with pytest.raises(InputError, match="no files were given"):
         read_controls([])
 
@@ -163,7 +155,6 @@ def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
     ("changed", "words"),
     [
         ({"crop": 0.9}, r"'crop' contains 0.9, outside its bins from 0.2 to 0.6"),
-        ({"sample": 7}, "contains a sample twice"),
         ({"sample": np.arange(30) + 1}, "lack test samples"),
     ],
 )

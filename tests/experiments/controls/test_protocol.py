@@ -53,18 +53,18 @@ def test_what_a_source_does_not_admit_is_left_out_and_named(registrations, capsy
     ]
 
 
-def test_shuffled_labels_are_learnt_in_parts_and_every_test_sample_is_asked_about_once(six, monkeypatch):
+def test_shuffled_labels_are_learned_in_parts_and_every_test_sample_is_asked_about_once(six, monkeypatch):
     monkeypatch.setattr("gpca.experiments.controls.protocol.FEWEST_OF_PART", 12)
-    learnt = []
+    learned = []
 
     class Counting(Nearest):
         def fit(self, registrations):
-            learnt.append(registrations.sample.tolist())
+            learned.append(registrations.sample.tolist())
             super().fit(registrations)
 
     found = experiment(six, "shuffled", rivals={"counting": Rival(Counting, "embeddings")}).run(six, {})
-    assert [len(samples) for samples in learnt] == [36, 12, 12, 12]
-    assert sorted(sample for samples in learnt[1:] for sample in samples) == learnt[0]
+    assert [len(samples) for samples in learned] == [36, 12, 12, 12]
+    assert sorted(sample for samples in learned[1:] for sample in samples) == learned[0]
     assert sorted(found["sample"][found["control"] == "shuffled"]) == list(range(18))
 
 
@@ -105,15 +105,15 @@ def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(si
 class WithEncoder(Nearest):
     """Its encoder finds the concept, if it was trained; it has measured nothing."""
 
-    learnt: ClassVar[list] = []
+    learned: ClassVar[list] = []
 
     def learn_encoder(self, registrations):
-        self.learnt.append(registrations.concept.tolist())
+        self.learned.append(registrations.concept.tolist())
         return lambda asked: replace(asked, attached={**asked.attached, "embedding": seen(asked)[0]})
 
 
 def test_an_encoder_of_an_explainer_is_trained_once_for_all_labels_and_anew_for_other_samples(six):
-    WithEncoder.learnt.clear()
+    WithEncoder.learned.clear()
     of_unseen = of_unseen_objects(six, 3, "tiny", 100)
     made = experiment(
         *(six, "density", "unseen_objects", "reversed", "label_noise_30", "shuffled", "transfer"),
@@ -121,7 +121,7 @@ def test_an_encoder_of_an_explainer_is_trained_once_for_all_labels_and_anew_for_
         rivals={"own": Rival(WithEncoder, "registrations")},
     )
     found = made.run(six, {"other": six})
-    of_paper, of_density, of_known = WithEncoder.learnt
+    of_paper, of_density, of_known = WithEncoder.learned
     assert of_paper == of_density == six.concept[six.split == "train"].tolist()
     assert of_known == of_unseen.concept[of_unseen.split == "train"].tolist()
     assert all(share_right(found, control=control) == 1 for control in ("density", "unseen_objects", "transfer"))
@@ -159,7 +159,7 @@ def test_an_encoder_is_trained_as_its_control_says(six, monkeypatch, control, he
     )
     monkeypatch.setattr("gpca.experiments.controls.encoding.embed", lambda model, asked, *_: seen(asked))
     arrays, _ = encode(control, six, "tiny", 100, ControlSettings(draw_points=(32, 64)), EncoderSettings())
-    learnt, settings = given[0][0], given[0][3]
+    learned, settings = given[0][0], given[0][3]
     assert (settings.head, settings.fewest_points) == (head, fewest_points)
     expected = six if control == "density" else of_unseen_objects(six, 3, "tiny", 100)
-    assert np.array_equal(learnt.split, expected.split) and len(arrays["h"]) == len(expected)
+    assert np.array_equal(learned.split, expected.split) and len(arrays["h"]) == len(expected)

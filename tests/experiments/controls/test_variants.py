@@ -6,12 +6,12 @@ import pytest
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
-from gpca.experiments.controls.settings import RELABELLED, ControlSettings
+from gpca.experiments.controls.settings import RELABELED, ControlSettings
 from gpca.experiments.controls.variants import (
     left_out,
     of_unseen_objects,
     registered_backwards,
-    relabelled,
+    relabeled,
     shows_known_object,
     thinned,
 )
@@ -70,18 +70,18 @@ def test_icp_backwards_finds_normals_for_its_target(six):
 @pytest.mark.parametrize(("control", "share"), [("label_noise_10", 0.1), ("label_noise_30", 0.3)])
 def test_so_many_labels_are_wrong(six, control, share):
     train = six.subset(six.rows("train"))
-    changed = relabelled(control, train, "tiny", 100)
+    changed = relabeled(control, train, "tiny", 100)
     assert (changed.concept != train.concept).sum() == round(share * len(train))
     assert set(changed.concept) == set(CONCEPTS)
-    assert np.array_equal(relabelled(control, train, "tiny", 100).concept, changed.concept)
+    assert np.array_equal(relabeled(control, train, "tiny", 100).concept, changed.concept)
 
 
 def test_shuffled_labels_say_nothing_of_the_concept(six):
     train = six.subset(six.rows("train"))
-    changed = relabelled("shuffled", train, "tiny", 100)
+    changed = relabeled("shuffled", train, "tiny", 100)
     counts = [[(changed.concept[train.concept == true] == label).sum() for label in CONCEPTS] for true in CONCEPTS]
     assert np.array_equal(counts, np.full((3, 3), 4))
-    assert set(RELABELLED) == {"label_noise_5", "label_noise_10", "label_noise_20", "label_noise_30", "shuffled"}
+    assert set(RELABELED) == {"label_noise_5", "label_noise_10", "label_noise_20", "label_noise_30", "shuffled"}
 
 
 def test_what_a_source_does_not_admit_is_said(six, registrations):

@@ -35,9 +35,9 @@ def test_what_the_ceiling_names_nominal_has_its_score_of_it(causes):
 
 def test_the_confusion_counts_every_sample_that_has_a_label(causes, tmp_path):
     rows = collect(*write_run(tmp_path, causes))
-    labelled = (labels_of(causes.truth)[causes.rows("test")] != BORDERLINE).sum()
+    labeled = (labels_of(causes.truth)[causes.rows("test")] != BORDERLINE).sum()
     named = rows[(rows["method"] == "always_pose") & rows["metric"].str.startswith("predicted_as_")]
-    assert named["value"].sum() == labelled == sum(values(named, metric="predicted_as_pose"))
+    assert named["value"].sum() == labeled == sum(values(named, metric="predicted_as_pose"))
 
 
 def test_all_sources_together_are_one_more_where_there_are_several(causes, tmp_path):

@@ -45,13 +45,8 @@ def test_the_panel_is_square_and_counts_the_samples_of_each_bin():
     plt.close()
 
 
-def test_the_figure_is_the_same_bytes_each_time(tmp_path):
+def test_the_figure_is_the_same_bytes_each_time(same_bytes):
     judged = {("cups", "gpca_pair", seed): random_judged(seed=seed) for seed in (100, 101)}
-    drawn = []
-    for name in ("one", "two"):
-        files = [tmp_path / f"{name}.{suffix}" for suffix in ("pdf", "png")]
-        draw_nominal_reliability(judged, SOURCES, EXPLAINERS, *files)
-        drawn.append([file.read_bytes() for file in files])
-    assert drawn[0] == drawn[1]
+    same_bytes(lambda: draw_nominal_reliability(judged, SOURCES, EXPLAINERS))
     with pytest.raises(InputError, match="have no predictions of these sources and explainers"):
-        draw_nominal_reliability(judged, {"mugs": "Mugs"}, EXPLAINERS, tmp_path / "a.pdf", tmp_path / "a.png")
+        draw_nominal_reliability(judged, {"mugs": "Mugs"}, EXPLAINERS)

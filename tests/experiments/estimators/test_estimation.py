@@ -10,8 +10,8 @@ from gpca.alignment.twist import exp
 from gpca.errors import InputError
 from gpca.experiments.estimators.covariances import COVARIANCE, REFERENCE, covariance_of
 from gpca.experiments.estimators.estimation import mahalanobis, predicted_spread, try_estimators
+from gpca.experiments.estimators.settings import EstimatorPairSettings
 from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.settings import EstimatorPairSettings
 from gpca.uncertainty.spread import divergence
 
 SETTINGS = EstimatorPairSettings(

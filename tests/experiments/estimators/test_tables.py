@@ -86,5 +86,5 @@ def test_the_notes_say_what_was_counted(metrics, seconds):
 
 
 def test_nothing_to_show_is_one_line(metrics, seconds):
-    with pytest.raises(InputError, match="have no estimator for table12_uncertainty; run the step estimate first"):
+    with pytest.raises(InputError, match="has nothing to show"):
         made(metrics[metrics["source"] == "none"], seconds)

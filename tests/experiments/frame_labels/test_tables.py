@@ -47,5 +47,5 @@ def test_a_row_is_what_the_samples_are_seen_by_and_the_chosen_backbone_is_named(
 
 def test_metrics_without_learning_curves_are_refused():
     of_validation = metrics().query("table == 'validation'")
-    with pytest.raises(InputError, match="have no learning curve for table6_labels"):
+    with pytest.raises(InputError, match="has nothing to show"):
         table6_labels(of_validation, "frames", ENCODERS, CONDITIONS)

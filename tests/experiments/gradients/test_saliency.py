@@ -9,7 +9,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import make_model
 from gpca.experiments.gradients.saliency import (
-    CENTRE,
+    CENTER,
     GRADIENT,
     chosen_rows,
     deletions,
@@ -43,7 +43,7 @@ def gpc(encoder):
 
 
 def test_the_differentiable_means_are_those_of_the_posterior(gpc):
-    h_N_d = gpc.learnt_N_d * gpc._scaler.scale_d + gpc._scaler.mean_d
+    h_N_d = gpc.learned_N_d * gpc._scaler.scale_d + gpc._scaler.mean_d
     assert gpc.mean_logits(torch.from_numpy(h_N_d)).numpy() == pytest.approx(gpc.posterior(h_N_d)[0], abs=1e-4)
 
 
@@ -67,16 +67,16 @@ def test_the_gradient_in_the_points_is_that_of_differences(encoder, gpc):
     assert (odds(1e-3) - odds(-1e-3)) / 2e-3 == pytest.approx(gradient[largest], rel=0.1)
 
 
-def test_salient_is_a_long_gradient_or_what_a_way_to_the_centre_lowers():
+def test_salient_is_a_long_gradient_or_what_a_way_to_the_center_lowers():
     points = np.array([[2.0, 0, 0], [-2, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 0]])
     gradient = np.array([[3.0, 0, 0], [1, 0, 0], [0, 0, 5], [0, -1, 0], [1, 1, 1]])
     found = saliencies(points, gradient)
     assert found[GRADIENT] == pytest.approx([3, 1, 5, 1, np.sqrt(3)])
-    assert found[CENTRE] == pytest.approx([12, -4, 0, 1, 0])
+    assert found[CENTER] == pytest.approx([12, -4, 0, 1, 0])
 
 
 def test_the_orders_begin_with_the_most_and_with_the_least_salient():
-    ways = orders({GRADIENT: np.array([1.0, 3, 2]), CENTRE: np.array([0.0, -1, 1])}, "tiny", 0)
+    ways = orders({GRADIENT: np.array([1.0, 3, 2]), CENTER: np.array([0.0, -1, 1])}, "tiny", 0)
     assert [way.tolist() for way in ways["gradient"] + ways["to_centre"] + ways["least_gradient"]] == [
         [1, 2, 0],
         [2, 0, 1],

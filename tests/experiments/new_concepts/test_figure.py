@@ -4,6 +4,7 @@ from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.errors import InputError
 from gpca.experiments.active_learning.figure import draw_overlap_curves, mean_curves
 from gpca.experiments.new_concepts.figure import draw_new_concepts
+from tests.figures import words_of
 
 
 def curve(rounds, best):
@@ -36,25 +37,24 @@ def test_the_mean_is_over_the_concepts_asked_for(files):
     assert mean_curves(files, ["overlap"])[key]["mean"].tolist()[-1] == pytest.approx(90)
 
 
-def test_the_papers_experiment_has_the_rare_pool_below(files, tmp_path, written):
+def test_the_papers_experiment_has_the_rare_pool_below(files):
     titles = {"bald_kmeans": "BALD + k-means", "random": "Random"}
-    draw_overlap_curves(files, {"ycb": "YCB"}, titles, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
-    assert {"YCB", "BALD + k-means", "Random"} <= set(written)
-    assert sum("rare" in text for text in written) == 1
-    assert not [text for text in written if "never saw" in text]
+    words = words_of(draw_overlap_curves(files, {"ycb": "YCB"}, titles, 0.9))
+    assert {"YCB", "BALD + k-means", "Random"} <= set(words)
+    assert sum("rare" in text for text in words) == 1
+    assert not [text for text in words if "never saw" in text]
 
 
-def test_a_line_is_drawn_for_each_embedding_and_a_row_for_each_kind_of_concept(files, tmp_path, written):
-    draw_new_concepts(files, {"ycb": "YCB"}, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
-    assert [text for text in written if text in ("same samples, all concepts", "nothing: measurements of the pair")]
-    assert not [text for text in written if "errors" in text]
-    rows = [text for text in written if "new: " in text]
+def test_a_line_is_drawn_for_each_embedding_and_a_row_for_each_kind_of_concept(files):
+    words = words_of(draw_new_concepts(files, {"ycb": "YCB"}, 0.9))
+    assert [text for text in words if text in ("same samples, all concepts", "nothing: measurements of the pair")]
+    assert not [text for text in words if "errors" in text]
+    rows = [text for text in words if "new: " in text]
     assert len(rows) == 2
     assert any("nominal" in text for text in rows)
-    assert {"Means over 1 seed", "target (90 %)"} <= set(written)
+    assert {"Means over 1 seed", "target (90 %)"} <= set(words)
 
 
-def test_without_a_curve_nothing_is_drawn(files, tmp_path):
+def test_without_a_curve_nothing_is_drawn(files):
     with pytest.raises(InputError, match="has no curve of these sources"):
-        draw_new_concepts(files, {"cups": "Cups"}, 0.9, tmp_path / "a.pdf", tmp_path / "a.png")
-    assert not list(tmp_path.glob("a.*"))
+        draw_new_concepts(files, {"cups": "Cups"}, 0.9)

@@ -12,13 +12,13 @@ RANDOM = np.random.default_rng(0)
 TRAIN = RANDOM.normal(size=(60, 5))
 
 
-def test_knn_is_the_mean_over_the_nearest_in_standardised_features():
+def test_knn_is_the_mean_over_the_nearest_in_standardized_features():
     train, query = np.array([[0.0], [1.0], [2.0], [3.0]]), np.array([[1.0], [13.0]])
     deviation = np.std(train)
     assert knn_distance(train, query, neighbours=2) == pytest.approx([0.5 / deviation, 10.5 / deviation])
 
 
-def test_fewer_training_samples_than_neighbours_are_all_taken():
+def test_fewer_training_samples_than_neighbors_are_all_taken():
     assert knn_distance(np.array([[0.0], [2.0]]), np.array([[1.0]]), neighbours=10) == pytest.approx([1.0])
 
 

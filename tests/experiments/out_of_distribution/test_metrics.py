@@ -11,7 +11,7 @@ from gpca.experiments.out_of_distribution.metrics import (
     read_learner_predictions,
     uncertainty_metrics,
 )
-from gpca.experiments.out_of_distribution.sets import DISTANCES, ShiftedSets
+from gpca.experiments.out_of_distribution.sets import DISTANCES
 from gpca.io.csv_file import write_csv
 from tests.experiments.out_of_distribution.test_learners import quick
 from tests.experiments.out_of_distribution.test_sets import sets
@@ -113,10 +113,7 @@ def test_one_sample_of_a_set_is_finite(files):
     ("change", "message"),
     [
         (lambda rows: rows.__setitem__("score_pose", 2 * rows["score_pose"] + 0.1), "do not sum to one"),
-        (lambda rows: rows.__setitem__("score_pose", np.nan), "'score_pose' contains values that are not finite"),
-        (lambda rows: rows.__setitem__("set", rows["set"].replace("severity", "space")), "unknown set 'space'"),
         (lambda rows: rows.__setitem__("sample", rows["sample"] + 1), "lacks samples of"),
-        (lambda rows: rows.__setitem__("sample", 0), "contains a sample twice"),
     ],
 )
 def test_bad_predictions_are_one_line(files, change, message):
@@ -136,11 +133,3 @@ def test_what_grows_with_the_distance_has_rho_one(files):
     rows = rows[rows["set"] == "severity"]
     rows = rows.assign(max_score=rows["knn_analytical"] ** 3)
     assert uncertainty_metrics(rows)["rho_max_score_knn_analytical"] == pytest.approx(1)
-
-
-def test_the_files_of_sets_are_checked(files):
-    predictions, set_files = files
-    set_files[0].write_bytes(b"PK")
-    with pytest.raises(InputError, match="not a readable npz"):
-        collect_diagnostics(predictions, set_files)
-    assert ShiftedSets.load(set_files[1])

@@ -8,7 +8,8 @@ from gpca.experiments.out_of_distribution.selection import (
     samples_of_seed,
     values_by_seed,
 )
-from gpca.reporting.tables.builder import TableBuilder, plain_cell
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.cells import plain_cell
 
 
 def test_only_the_metrics_asked_for_and_the_numbers_of_samples_stay(diagnostics):

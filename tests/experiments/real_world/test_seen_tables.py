@@ -57,5 +57,5 @@ def test_the_note_says_that_the_pretraining_knows_the_models():
 
 
 def test_nothing_to_show_is_refused():
-    with pytest.raises(InputError, match="have no accuracy for table6_seen_unseen"):
+    with pytest.raises(InputError, match="has nothing to show"):
         make({("real_rgbd", "attribution", "other"): [(0.7, 100)]})

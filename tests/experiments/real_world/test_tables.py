@@ -66,7 +66,7 @@ def test_one_seed_has_no_deviation_and_no_interval():
 
 def test_what_was_not_run_has_no_row_and_nothing_at_all_is_refused():
     assert len(make({"dgcnn-none": (0.8, 0.8)}).rows) == 1
-    with pytest.raises(InputError, match="have no accuracy for table6_backbones"):
+    with pytest.raises(InputError, match="has nothing to show"):
         make({"softmax_head": (0.8, 0.8)})
 
 

@@ -6,7 +6,7 @@ import pytest
 from gpca.alignment.rigid import inverse
 from gpca.experiments.recovery.cases import register_after, register_held
 from gpca.recovery.actions import ACTIONS
-from tests.recovery.conftest import LOOP
+from tests.failures import LOOP
 
 ICP = LOOP.icp
 

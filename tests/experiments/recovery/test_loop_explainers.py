@@ -10,29 +10,29 @@ SETTINGS = {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}}
 
 
 @pytest.fixture(scope="module")
-def learnt(registrations):
+def learned(registrations):
     names = ("gpca", "sa_supervised")
     uncertainty = UncertaintySettings(starts=13, icp_points=32)
     return learn_explainers(names, registrations, ENCODER, SETTINGS, uncertainty, 9, "tiny", 0)
 
 
-def test_each_speaks_of_all_calibration_samples_and_is_judged_by_their_truth(learnt, registrations):
+def test_each_speaks_of_all_calibration_samples_and_is_judged_by_their_truth(learned, registrations):
     held_out = registrations.rows("test")
-    assert list(learnt.calibration) == ["gpca", "sa_supervised"]
-    for name, attribution in learnt.calibration.items():
+    assert list(learned.calibration) == ["gpca", "sa_supervised"]
+    for name, attribution in learned.calibration.items():
         assert attribution.scores_N_C.shape == (len(held_out), 3)
         predicted = np.array([attribution.concepts[column] for column in attribution.scores_N_C.argmax(axis=1)])
-        assert (learnt.right(name) == (predicted == registrations.concept[held_out])).all()
+        assert (learned.right(name) == (predicted == registrations.concept[held_out])).all()
 
 
-def test_remedies_cost_registrations_and_embeddings_none(learnt):
-    assert not learnt.calibration["gpca"].icp_calls_N.any()
-    assert (learnt.calibration["sa_supervised"].icp_calls_N > 0).all()
+def test_remedies_cost_registrations_and_embeddings_none(learned):
+    assert not learned.calibration["gpca"].icp_calls_N.any()
+    assert (learned.calibration["sa_supervised"].icp_calls_N > 0).all()
 
 
-def test_what_is_said_needs_no_label_and_takes_time(learnt, registrations):
+def test_what_is_said_needs_no_label_and_takes_time(learned, registrations):
     some = registrations.subset(registrations.rows("test")[:3])
-    for name, explain in learnt.explain.items():
+    for name, explain in learned.explain.items():
         said = explain(some.without_labels())
-        assert said.scores_N_C == pytest.approx(learnt.calibration[name].scores_N_C[:3], abs=1e-4)
+        assert said.scores_N_C == pytest.approx(learned.calibration[name].scores_N_C[:3], abs=1e-4)
         assert (said.seconds_N > 0).all()

@@ -4,7 +4,7 @@ from gpca.errors import InputError
 from gpca.experiments.recovery import virtual_tables
 from gpca.experiments.recovery.virtual_tables import register_situations
 from gpca.pairs.perturbation import CONCEPTS
-from tests.recovery.conftest import LOOP
+from tests.failures import LOOP
 
 
 def test_the_classifier_learns_from_all_causes(situations):

@@ -8,7 +8,7 @@ from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Ou
 from gpca.alignment.methods.registry import make_method
 from gpca.errors import InputError
 from gpca.experiments.registration_methods.settings import PairSettings
-from gpca.experiments.registration_methods.trial import observed_pair, try_methods
+from gpca.experiments.registration_methods.trial import pair_to_register, try_methods
 
 SETTINGS = PairSettings(samples=6, points=100)
 METHODS = {"point_to_point": {}, "fgr": {}, "point_to_plane": {"max_iterations": 1}}
@@ -33,7 +33,7 @@ def test_local_methods_start_twice_and_global_ones_once(rows):
 
 def test_a_row_is_what_the_method_found_on_that_pair(rows, registrations):
     row = registrations.rows("test")[1]
-    pair = observed_pair(registrations, row, "tiny", 100, 100)
+    pair = pair_to_register(registrations, row, "tiny", 100, 100)
     coarse = make_method("fgr")(pair)
     fine = make_method("point_to_point")(pair.started_at(coarse.T_target_source))
     for name, outcome in (("fgr", coarse), ("point_to_point", fine)):
@@ -90,7 +90,7 @@ def test_more_samples_change_nothing_of_the_first(rows, registrations, objects):
 
 def test_clouds_are_thinned_and_have_normals(registrations):
     row = registrations.rows("test")[0]
-    pair = observed_pair(registrations, row, "tiny", 100, 70)
+    pair = pair_to_register(registrations, row, "tiny", 100, 70)
     assert len(pair.source) == len(pair.target) == len(pair.source_normals) == 70
     nearest = np.abs(registrations.source(row)[:, None] - pair.source).sum(axis=2).min(axis=0)
     assert nearest.max() == 0
@@ -106,7 +106,7 @@ def test_clouds_are_thinned_and_have_normals(registrations):
             "'gicp': needs an initial pose; choose one of fgr, ",
         ),
         ({"icp": {}, "fgr": {}}, {}, "'icp': unknown"),
-        ({"fgr": {"radius": 1}}, {}, "unexpected keyword argument 'radius'"),
+        ({"fgr": {"radius": 1}}, {}, "setting radius: unknown; did you mean feature_radius"),
     ],
 )
 def test_methods_that_cannot_run_are_refused(registrations, objects, methods, changes, message):

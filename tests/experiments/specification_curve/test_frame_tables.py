@@ -34,5 +34,5 @@ def test_a_row_is_a_cloud_and_confusions_are_shares_of_the_concept():
 
 
 def test_nothing_to_show_is_refused():
-    with pytest.raises(InputError, match="have no accuracy for table6_inputs"):
+    with pytest.raises(InputError, match="has nothing to show"):
         table6_inputs(pd.DataFrame(rows("lost/all", accuracy=(1,)), columns=list(TIDY_COLUMNS)), "frames")

@@ -31,9 +31,9 @@ def test_the_grid_has_every_group_and_each_has_a_function():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kernel": {"kernel": ["cubic"]}}, "readings.groups.kernel.kernel.0: 'cubic' is not one of"),
+        ({"kernel": {"kernel": ["cubic"]}}, "readings.groups.kernel.kernel.0: 'cubic' should be 'rbf', 'matern32' or"),
         ({"shap": {"starts": []}}, "readings.groups.shap.starts"),
-        ({"pool": {"new_share": [1]}}, "readings.groups.pool.new_share.0: 1 is greater than or equal to"),
+        ({"pool": {"new_share": [1]}}, "readings.groups.pool.new_share.0: 1 should be less than 1"),
         ({"lenses": {}}, "readings.groups.lenses: unknown"),
     ],
 )

@@ -18,7 +18,7 @@ from gpca.experiments.controls.rivals import Rival
 from gpca.experiments.estimators.examples import true_twist
 from gpca.experiments.judge import Judges
 from gpca.experiments.substitution.asked import require_exchangeable
-from gpca.experiments.substitution.estimated import OBSERVED, Registrar
+from gpca.experiments.substitution.estimated import OBSERVED, KnobbedRegistrar
 from gpca.experiments.substitution.exchange import UNTAUGHT, Exchange
 from gpca.experiments.substitution.registered import registered_by
 from gpca.experiments.substitution.settings import ExchangeSettings
@@ -101,7 +101,7 @@ def test_an_explainer_that_learns_is_untaught_by_an_estimator_that_failed_in_tra
             raise FailedEstimate("nothing")
         return 1e-4 * np.eye(6)
 
-    registrar = Registrar(registrations, "tiny", 100, UNCERTAINTY)
+    registrar = KnobbedRegistrar(registrations, "tiny", 100, UNCERTAINTY)
     asked = {next(registrar.under(row, OBSERVED)).pair.seed for row in registrations.rows("test")[:3]}
     entries = {"m": {"late": EstimatorEntry("Late", of_test_pairs)}}
     monkeypatch.setattr(estimator_registry.REGISTRY, "by_module", lambda: entries)
@@ -116,7 +116,7 @@ def test_the_conditions_are_those_of_the_design(registrations):
     """The same clouds: a Monte-Carlo of the design's own starts says the same of them."""
     one = registrations.subset(registrations.rows("test")[:1])
     outcomes, *_ = evaluate_design("additive", one, "tiny", 100, UNCERTAINTY)
-    registrar = Registrar(one, "tiny", 100, UNCERTAINTY)
+    registrar = KnobbedRegistrar(one, "tiny", 100, UNCERTAINTY)
     axes = ("tiny", 100, "uncertainty", "test", one.sample[0])
     unit_n_6 = generator(*axes, "starts").normal(size=(UNCERTAINTY.starts, 6))
     for k, registered in enumerate(registrar.under(0, ADDITIVE_KNOBS)):
@@ -129,7 +129,7 @@ def test_the_conditions_are_those_of_the_design(registrations):
 
 
 def test_the_true_twist_of_an_observed_cloud_leads_to_the_truth(registrations, judges):
-    registrar = Registrar(registrations, "tiny", 100, UNCERTAINTY)
+    registrar = KnobbedRegistrar(registrations, "tiny", 100, UNCERTAINTY)
     for row in registrations.rows("test")[:6]:
         [registered] = registrar.under(row, OBSERVED)
         T_true, judge = registrations.T_target_source("true", row), judges.of(registrations, row)
@@ -152,7 +152,7 @@ def test_registrations_by_another_method_are_the_same_pairs_at_its_poses(registr
     assert np.abs(poses[0] - poses[1]).max() > 1e-4
 
 
-def test_each_method_is_learnt_from_and_asked_about_and_a_failed_registration_counts(
+def test_each_method_is_learned_from_and_asked_about_and_a_failed_registration_counts(
     registrations, judges, monkeypatch
 ):
     def fails(pair):

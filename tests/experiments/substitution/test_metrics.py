@@ -53,7 +53,7 @@ def test_estimators_are_judged_by_concept_and_beside_monte_carlo(path):
     assert found["censi", "noise", "test_samples"] == 1
 
 
-def test_methods_are_judged_by_what_was_learnt_from_and_over_all_others(path):
+def test_methods_are_judged_by_what_was_learned_from_and_over_all_others(path):
     found = values(path, table="gpca", metric="accuracy")
     assert found["icp", "icp", "accuracy"] == 1 and found["gicp", "icp", "accuracy"] == 0.5
     assert found["another", "gicp", "accuracy"] == 0.5

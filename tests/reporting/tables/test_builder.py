@@ -4,17 +4,10 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.reporting.tables.builder import (
-    INTERVAL,
-    TableBuilder,
-    cell_of_all_samples,
-    cell_of_repeats,
-    mean_over,
-    plain_cell,
-    rows_where,
-    span,
-)
+from gpca.reporting.tables.builder import INTERVAL, TableBuilder, mean_over
+from gpca.reporting.tables.cells import cell_of_all_samples, cell_of_repeats, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.words import span
 
 HEADS = {"source": "Dataset", "explainer": "Explainer"}
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}, "linemod": {"title": "LINEMOD", "stand_in": False}}
@@ -86,10 +79,10 @@ def test_comparisons_add_up_and_without_one_nothing_is_bold(builder):
     assert len(built(builder).compared) == 1 + 5
 
 
-def test_a_table_without_rows_is_refused_by_its_name(builder):
-    builder.require_rows("metrics", "have no accuracy", "run its explainers first")
-    with pytest.raises(InputError, match=r"^metrics: have no accuracy for table0; run its explainers first$"):
-        TableBuilder("table0", HEADS).require_rows("metrics", "have no accuracy", "run its explainers first")
+@pytest.mark.parametrize("use", [TableBuilder.first_labels, TableBuilder.most_seeds, TableBuilder.span_of_seeds, built])
+def test_a_table_without_rows_is_refused_by_its_name(use):
+    with pytest.raises(InputError, match=r"^table 'table0': has nothing to show"):
+        use(TableBuilder("table0", HEADS))
 
 
 def test_the_caption_speaks_of_the_stand_ins_among_the_rows(builder):

@@ -43,5 +43,5 @@ def test_the_csv_has_the_bounds_of_factors_too():
 
 
 def test_nothing_that_was_run_makes_no_table():
-    with pytest.raises(InputError, match="has no results for claims"):
+    with pytest.raises(InputError, match="has nothing to show"):
         table(ROWS[-1:])

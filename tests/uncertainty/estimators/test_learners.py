@@ -68,7 +68,7 @@ def test_an_error_is_the_truth_seen_from_each_run():
     assert learned._errors(Example(np.zeros(3), truth[None], truth, np.eye(4))) == pytest.approx(np.zeros((1, 6)))
 
 
-def test_descriptors_that_say_nothing_are_not_learnt_by_heart():
+def test_descriptors_that_say_nothing_are_not_learned_by_heart():
     """Each training pair is predicted by the others alone; by itself too, the metric would single it out."""
     random = np.random.default_rng(5)
     blind = [Example(random.normal(size=7), each.twists, each.true_twist, FRAME) for each in EXAMPLES]

@@ -1,1 +1,0 @@
-"""What no schema can say of a config, section by section: names of what exists, and settings that fit each other."""

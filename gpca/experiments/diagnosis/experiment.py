@@ -1,0 +1,62 @@
+"""What made a registration fail: explainers of causes against their measured shares in the error (Table IX)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from gpca.encoders.registry import require_backbone
+from gpca.encoders.settings import NamedEncoder, require_draws
+from gpca.errors import with_key
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
+from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
+from gpca.features.settings import DescriptorSettings
+from gpca.settings import part_of
+
+
+@dataclass(frozen=True)
+class Section:
+    """How the explainers of causes describe, encode and explain a pair."""
+
+    descriptors: Annotated[dict, part_of(DescriptorSettings)]
+    encoder: NamedEncoder
+    explainers: ByName
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check the explainers, and the encoder, for whose draws the clouds need points enough."""
+    encoder = config["diagnosis"]["encoder"]
+    with_key("diagnosis.encoder.backbone", require_backbone, encoder["backbone"])
+    require_draws("diagnosis.encoder", encoder, config["causes"]["points"][1], "causes.points")
+    for name, settings in config["diagnosis"]["explainers"].items():
+        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the explainers of causes."""
+    return {"cause_explainer": list(config["diagnosis"]["explainers"])}
+
+
+def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the titles of the explainers."""
+    titles = {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]}
+    return {"cause_explainers": titles}
+
+
+DIAGNOSED = {
+    "prediction_files": "diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
+    "causes_files": "causes/{source}/seed{seed}.npz",
+}
+EXPERIMENT = Experiment(
+    name="diagnosis",
+    tidy=(
+        Tidy("causes.csv", "gpca.experiments.diagnosis.metrics:collect", DIAGNOSED, rule="cause_metrics"),
+        Tidy("cause_intervals.csv", "gpca.experiments.diagnosis.intervals:collect", DIAGNOSED),
+    ),
+    sections={"diagnosis": Section},
+    names=names,
+    shown=shown,
+    check=check,
+    leavable={"diagnosis.explainers": Names("explainer", lambda: explainers(CAUSES))},
+)

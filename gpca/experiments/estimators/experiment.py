@@ -1,0 +1,60 @@
+"""Estimators of a pose's covariance against many Monte-Carlo runs and against the error (Table XII)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from gpca.alignment.methods.registry import method_entry, methods, require_local
+from gpca.errors import InputError, with_key
+from gpca.experiments.estimators.covariances import REFERENCE
+from gpca.experiments.estimators.settings import EstimatorPairSettings
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
+from gpca.settings import part_of
+from gpca.uncertainty.estimators.registry import estimator_entry, estimators, require_estimator_settings
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check that every estimator takes its settings, and that the methods are ones that start at an initial pose."""
+    for name, settings in config["estimators"].items():
+        with_key(f"estimators.{name}", require_estimator_settings, name, settings or {})
+    if not config["estimator_pairs"]["methods"]:
+        raise InputError("config key estimator_pairs.methods", "is empty", "name a method, such as point_to_point")
+    for name in config["estimator_pairs"]["methods"]:
+        with_key(f"estimator_pairs.methods.{name}", require_local, name)
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the estimators, and with the reference before them those that have files of estimates."""
+    compared = list(config["estimators"])
+    return {"estimator": compared, "estimate": [REFERENCE, *compared]}
+
+
+def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the titles of the estimators and of the methods whose registrations they see, and the conditions."""
+    return {
+        "estimators": {name: estimator_entry(name).title for name in config["estimators"]},
+        "estimated_methods": {name: method_entry(name).title for name in config["estimator_pairs"]["methods"]},
+        "estimator_pairs": config["estimator_pairs"],
+    }
+
+
+EXPERIMENT = Experiment(
+    name="estimators",
+    sections={"estimators": ByName, "estimator_pairs": Annotated[dict, part_of(EstimatorPairSettings)]},
+    tidy=(
+        Tidy(
+            "estimators.csv",
+            "gpca.experiments.estimators.calibration:collect_estimates",
+            {"files": "estimates/{source}/{estimate}/seed{seed}.csv"},
+            rule="estimator_metrics",
+        ),
+    ),
+    names=names,
+    shown=shown,
+    check=check,
+    leavable={
+        "estimators": Names("estimator", estimators),
+        "estimator_pairs.methods": Names("registration method", methods),
+    },
+)

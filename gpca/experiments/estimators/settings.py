@@ -1,0 +1,43 @@
+"""Which registrations the estimators of covariance are asked about: apart from what runs them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from gpca.settings import Bounds, PositiveShare
+from gpca.uncertainty.settings import start_deviation
+
+
+@dataclass(frozen=True)
+class EstimatorPairSettings:
+    """Which registrations the estimators of their covariance are asked about, and what they are held against.
+
+    Attributes:
+        methods: registration method -> test registrations of each source and seed, at most.
+        train: training registrations by each method, for estimators that learn, at most.
+        train_starts: runs of each of them.
+        points: of source and of target (fewer where a cloud has fewer).
+        starts: of the reference, Monte-Carlo.
+        start_rotation_deg, start_translation: root mean square angle and length of all starts' offsets.
+        floor: variance that is added to every covariance before it is judged: below it a spread is none.
+        failed: error from which a registration has failed, ADD or ADD-S in diameters.
+    """
+
+    methods: dict[str, Annotated[int, Bounds(minimum=1, maximum=100_000)]] = field(
+        default_factory=lambda: {"point_to_point": 30}
+    )
+    train: Annotated[int, Bounds(minimum=8)] = 300
+    train_starts: Annotated[int, Bounds(minimum=7, maximum=1000)] = 13
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 256
+    starts: Annotated[int, Bounds(minimum=20, maximum=100_000)] = 1000
+    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 10.0
+    start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.05
+    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-6
+    failed: PositiveShare = 0.03
+
+    def deviation_6(self) -> np.ndarray:
+        """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
+        return start_deviation(self.start_rotation_deg, self.start_translation)

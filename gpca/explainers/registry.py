@@ -1,0 +1,39 @@
+"""Every explainer by name: GP-CA itself and the rivals, one per file of ``baselines/``.
+
+Those of causes have a folder of their own below it, and names of their own. Both folders are found by their names, as
+the rivals import this package and not the other way round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from gpca.explainers.interface import ExplainerEntry
+from gpca.registry import Registry
+from gpca.settings import require_arguments
+
+CONCEPTS, CAUSES = "concepts", "causes"  # what explainers name: what was perturbed, or what is wrong
+REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
+    CONCEPTS: Registry("explainer", "baselines", "EXPLAINERS", first=("gpca.explainers.gpca",)),
+    CAUSES: Registry("explainer", "baselines.causes", "EXPLAINERS"),
+}
+
+
+def explainers(kind: str = CONCEPTS) -> dict[str, ExplainerEntry]:
+    """Return all explainers of a kind by name: GP-CA itself and those of every file in its folder."""
+    return REGISTRIES[kind].entries()
+
+
+def explainer_entry(name: str, kind: str = CONCEPTS) -> ExplainerEntry:
+    """Return the explainer of that name; an unknown one raises an InputError that lists the known."""
+    return REGISTRIES[kind].entry(name)
+
+
+def require_settings(name: str, settings: Mapping[str, object], kind: str = CONCEPTS) -> None:
+    """Raise an InputError unless the explainer is known and takes these settings."""
+    require_arguments(f"explainer '{name}'", explainer_entry(name, kind).make, 2, settings)
+
+
+def explainer_module(name: str, kind: str = CONCEPTS) -> str:
+    """Return the module that lists the explainer."""
+    return REGISTRIES[kind].module(name)
