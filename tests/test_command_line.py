@@ -7,8 +7,8 @@ import sys
 import pytest
 
 import gpca
-from gpca.__main__ import STEPS, main
 from gpca.code_files import ROOT
+from tests.steps.by_words import main
 
 
 def test_help_and_wrong_usage_need_no_heavy_library():
@@ -20,11 +20,11 @@ def test_help_and_wrong_usage_need_no_heavy_library():
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0
     assert done.stdout.endswith("set()\n")
-    for step in STEPS:
+    for step in COMMANDS:
         assert step in done.stdout
 
 
-@pytest.mark.parametrize("step", [None, *STEPS])
+@pytest.mark.parametrize("step", [None, *COMMANDS])
 def test_help_is_plain_text(capsys, step):
     with pytest.raises(SystemExit) as caught:
         main([step, "--help"] if step else ["--help"])

@@ -6,11 +6,11 @@ import shutil
 import pytest
 import yaml
 
-from gpca.__main__ import main
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.code_files import ROOT
 from gpca.comparison.reference import Allowance, check_reference
 from gpca.process.processor import describe
+from tests.steps.by_words import main
 
 from .conftest import HEADS, SETTINGS, write
 

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 import trimesh
 
-from gpca.__main__ import main
 from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
+from tests.steps.by_words import main
 
 REGISTRATIONS = {"train": 9, "test": 6, "cloud_points": 128, "test_share": 0.4, "occluders": 1.0}
 

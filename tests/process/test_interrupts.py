@@ -7,10 +7,10 @@ import weakref
 import pytest
 
 from gpca import __main__ as command_line
-from gpca.__main__ import main
 from gpca.errors import InputError
 from gpca.process.interrupts import certain_interrupts
 from gpca.process.progress import progress
+from tests.steps.by_words import main
 
 
 @pytest.fixture(autouse=True)

@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 
-from gpca.__main__ import main
 from gpca.io.arrays import save_arrays
+from tests.steps.by_words import main
 
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {
@@ -38,15 +38,15 @@ STEP_OPTIONS = {
     },
     "registrations": COMMON | {
         "--settings": {"train": 18, "test": 6, "cloud_points": 128}, "--seed": 0, "--objects": "objects.npz",
-        "--out": "registrations.npz", "--timings": "icp.csv",
+        "--registrations": "registrations.npz", "--timings": "icp.csv",
     },
     "causes": COMMON | {
         "--settings": CAUSES | {"icp": {"max_iterations": 30}}, "--seed": 0, "--objects": "objects.npz",
-        "--out": "causes.npz", "--candidates": "candidates.csv", "--timings": "causes_timings.csv",
+        "--causes": "causes.npz", "--candidates": "candidates.csv", "--timings": "causes_timings.csv",
     },
     "describe": COMMON | {
         "--settings": {"starts": 1, "restarts": 2, "icp_points": 64, "icp": {"max_iterations": 30}}, "--seed": 0,
-        "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--out": "descriptors.npz",
+        "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--descriptors": "descriptors.npz",
         "--timings": "descriptors.csv",
     },
     "estimate": COMMON | {
@@ -57,12 +57,12 @@ STEP_OPTIONS = {
             "estimators": {"brossard": {}, "cello": {"steps": 2}},
         },
         "--seeds": 0, "--estimators": ["brossard", "cello"], "--objects": "objects.npz", "--causes": "causes.npz",
-        "--samples": "reference_samples.npz", "--out": ["reference_said.csv", "brossard_said.csv", "cello_said.csv"],
+        "--samples": "reference_samples.npz", "--rows": ["reference_said.csv", "brossard_said.csv", "cello_said.csv"],
         "--timings": ["reference_seconds.csv", "brossard_seconds.csv", "cello_seconds.csv"],
     },
     "train_on_causes": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
-        "--weights": "cause_weights.pt", "--curve": "cause_curve.csv", "--out": "cause_embeddings.npz",
+        "--weights": "cause_weights.pt", "--curve": "cause_curve.csv", "--embeddings": "cause_embeddings.npz",
         "--timings": "cause_embeddings.csv",
     },
     "diagnose": COMMON | {
@@ -73,21 +73,21 @@ STEP_OPTIONS = {
     "register_methods": COMMON | {
         "--settings": {"method_pairs": {"samples": 3, "points": 64}, "methods": {"point_to_point": {}, "fgr": {}}},
         "--seeds": 0, "--methods": ["point_to_point", "fgr"], "--objects": "objects.npz",
-        "--registrations": "registrations.npz", "--out": ["point_trials.csv", "fgr_trials.csv"],
+        "--registrations": "registrations.npz", "--rows": ["point_trials.csv", "fgr_trials.csv"],
         "--timings": ["point_seconds.csv", "fgr_seconds.csv"],
     },
     "train": COMMON | {
-        "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--out": "weights.pt",
+        "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--weights": "weights.pt",
         "--curve": "curve.csv",
     },
     "embed": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz",
-        "--registration-timings": "icp.csv", "--encoder": "weights.pt", "--out": "embeddings.npz",
+        "--registration-timings": "icp.csv", "--encoder": "weights.pt", "--embeddings": "embeddings.npz",
         "--timings": "dgcnn.csv",
     },
     "train_control": COMMON | {
         "--settings": {"controls": CONTROLS, "encoder": ENCODER}, "--control": "density", "--seed": 0,
-        "--registrations": "registrations.npz", "--out": "control.npz", "--curve": "control_curve.csv",
+        "--registrations": "registrations.npz", "--embeddings": "control.npz", "--curve": "control_curve.csv",
     },
     "controls": COMMON | {
         "--settings": {"controls": CONTROLS, "encoder": ENCODER, "uncertainty": {"starts": 13, "icp_points": 40},
@@ -95,7 +95,7 @@ STEP_OPTIONS = {
                        "explainers": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "residuals_logistic": {}}},
         "--seed": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoder": "weights.pt",
         "--embeddings": "embeddings.npz", "--retrained": "density", "--retrained-embeddings": "control.npz",
-        "--others": "other", "--other-registrations": "other.npz", "--out": "controls.csv",
+        "--others": "other", "--other-registrations": "other.npz", "--predictions": "controls.csv",
         "--samples": "control_samples.csv", "--timings": "control_seconds.csv",
     },
     "exchange": COMMON | {
@@ -117,7 +117,7 @@ STEP_OPTIONS = {
     "uncertainty": COMMON | {
         "--settings": {"starts": 13, "icp_points": 40, "icp": {"max_iterations": 20}},
         "--design": "removal", "--seeds": 0, "--registrations": "registrations.npz",
-        "--out": "uncertainty.npz", "--tables": "uncertainty.csv", "--timings": "uncertainty_timings.csv",
+        "--outcomes": "uncertainty.npz", "--tables": "uncertainty.csv", "--timings": "uncertainty_timings.csv",
     },
     "attribute": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
@@ -201,8 +201,8 @@ STEP_OPTIONS = {
 # The files of a second source that some steps read besides.
 OF_ANOTHER_SOURCE = {
     "objects": {"--out": "objects_other.npz"},
-    "registrations": {"--objects": "objects_other.npz", "--out": "other.npz", "--timings": "other_icp.csv"},
-    "train": {"--registrations": "other.npz", "--out": "other.pt", "--curve": "other_curve.csv"},
+    "registrations": {"--objects": "objects_other.npz", "--registrations": "other.npz", "--timings": "other_icp.csv"},
+    "train": {"--registrations": "other.npz", "--weights": "other.pt", "--curve": "other_curve.csv"},
 }
 
 

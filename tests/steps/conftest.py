@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from gpca.__main__ import main
+from tests.steps.by_words import main
 
 from .command_lines import every_step
 

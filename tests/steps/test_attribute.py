@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from baselines import analytical
-from gpca.__main__ import main
 from gpca.attribution.predictions import write_timings
+from tests.steps.by_words import main
 
 from .command_lines import arguments, arrays_changed, lines_kept, refused, removed, settings, untouched, written
 

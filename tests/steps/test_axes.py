@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.__main__ import main
 from gpca.encoders.tensor_file import write_tensors
 from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
+from tests.steps.by_words import main
 
 from .command_lines import STEP_OPTIONS, arguments, refused
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.__main__ import main
+from tests.steps.by_words import main
 
 from .command_lines import CONTROLS, ENCODER, STEP_OPTIONS, arguments, arrays_changed, refused, settings, untouched
 

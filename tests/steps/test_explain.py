@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from gpca.__main__ import main
 from gpca.model.location import SHIPPED
+from tests.steps.by_words import main
 
 from ..documents import ROOT
 from .command_lines import arguments, refused, removed, truncated, untouched, written

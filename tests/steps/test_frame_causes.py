@@ -4,12 +4,12 @@ import json
 
 import pytest
 
-from gpca.__main__ import main
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.tables import table9_frames
 from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH, collect
+from tests.steps.by_words import main
 
 from ..hostile import refusal
 from .command_lines import CAUSES, ENCODER

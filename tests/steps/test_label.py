@@ -6,9 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from gpca.__main__ import main
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
+from tests.steps.by_words import main
 
 from .command_lines import refused, removed, untouched, written
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from gpca.__main__ import main
 from gpca.model.file import Model
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
+from tests.steps.by_words import main
 
 from .command_lines import POLICY, STEP_OPTIONS, arguments, refused, removed, untouched
 

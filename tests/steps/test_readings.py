@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from gpca.__main__ import main
 from gpca.attribution.metrics import read_metrics
 from gpca.experiments.specification_curve.registry import GROUPS
+from tests.steps.by_words import main
 
 GPC = {"iterations": 2, "inducing": 4, "draws": 20}
 

@@ -5,8 +5,8 @@ import json
 import pandas as pd
 import pytest
 
-from gpca.__main__ import main
 from gpca.pairs.perturbation import CONCEPTS
+from tests.steps.by_words import main
 
 from ..config.test_check import load
 from ..frames.tiny import surfaces

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gpca.__main__ import main
 from gpca.io.arrays import save_arrays
+from tests.steps.by_words import main
 
 from .command_lines import arguments, arrays_changed, refused, removed, settings, untouched
 

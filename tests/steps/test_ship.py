@@ -10,13 +10,13 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.__main__ import main
 from gpca.code_files import ROOT
 from gpca.commands import ship
 from gpca.experiments.diagnosis.intervals import COLUMNS
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.origin import licenses_of
+from tests.steps.by_words import main
 
 from .command_lines import content, removed, written
 

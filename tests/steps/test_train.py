@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from gpca.__main__ import main
 from gpca.code_files import ROOT
+from tests.steps.by_words import main
 
 from .command_lines import arguments, arrays_changed, refused, removed, settings, truncated, untouched
 
@@ -32,7 +32,7 @@ def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
 # Where the tests run in the background of a shell, SIGINT is ignored, and children inherit that.
 STOPPED_IN_EPOCH_3 = """
 import os, signal, sys
-from gpca.__main__ import main
+from tests.steps.by_words import main
 from gpca.encoders import training
 
 class Deleted:

@@ -7,7 +7,7 @@ import sys
 import yaml
 
 import gpca
-from gpca.__main__ import main
+from tests.steps.by_words import main
 
 from ..documents import ROOT, block, code_in, section
 

@@ -8,7 +8,6 @@ import pandas as pd
 import pytest
 
 from baselines.learners import linear_svm
-from gpca.__main__ import main
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.training import train_encoder
@@ -28,6 +27,7 @@ from gpca.experiments.specification_curve.judged import accuracies
 from gpca.experiments.specification_curve.settings import ReadingSizes
 from gpca.pairs.perturbation import CONCEPTS
 from tests.experiments.specification_curve.conftest import SECTIONS, rows_of
+from tests.steps.by_words import main
 
 PROTOCOL = {"inputs": "standardised", "inducing": "kmeans", "lengthscale": "median", "batch": "full"}
 

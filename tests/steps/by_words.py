@@ -1,0 +1,95 @@
+"""Steps and commands called with words, as tests write them: ``["train", "--seed", "0", …]``."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from gpca.__main__ import COMMANDS
+from gpca.__main__ import main as command
+from gpca.process.job import Job, as_process, call
+
+IN = "gpca.experiments."
+MODULES = {  # of steps whose module is not gpca.steps.<name>
+    "active_learning": IN + "active_learning.step",
+    "without": IN + "active_learning.without_step",
+    "controls": IN + "controls.step",
+    "train_control": IN + "controls.train_step",
+    "diagnose": IN + "diagnosis.step",
+    "estimate": IN + "estimators.step",
+    "frame_causes": IN + "frame_causes.step",
+    "frame_labels": IN + "frame_labels.step",
+    "gradients": IN + "gradients.step",
+    "kernel_grid": IN + "kernel_grid.step",
+    "new_concepts": IN + "new_concepts.step",
+    "shift": IN + "out_of_distribution.shift_step",
+    "learners": IN + "out_of_distribution.learners_step",
+    "recover": IN + "recovery.step",
+    "register_methods": IN + "registration_methods.step",
+    "runtime": IN + "runtime.step",
+    "readings": IN + "specification_curve.step",
+    "exchange": IN + "substitution.step",
+}
+LISTS = {  # which names of a step are lists, and not of one seed, file or name
+    "active_learning": "strategies out",
+    "without": "concepts",
+    "controls": "retrained retrained_embeddings others other_registrations",
+    "diagnose": "seeds causes read read_timings predictions timings",
+    "estimate": "seeds estimators causes samples rows timings",
+    "frame_causes": "causes descriptors encoders embeddings",
+    "frame_labels": "backbones embeddings strategies out",
+    "gradients": "seeds registrations encoders embeddings deletions maps tcav",
+    "kernel_grid": "seeds registrations embeddings out",
+    "new_concepts": "encoders encoders_of strategies out",
+    "shift": "seeds registrations other_registrations embeddings encoders out",
+    "learners": "seeds learners sets out",
+    "register_methods": "seeds methods registrations rows timings",
+    "readings": "registrations sets poses predictions embeddings",
+    "exchange": "seeds registrations encoders out",
+    "attribute": "seeds registrations embeddings uncertainty uncertainty_timings input_timings predictions timings",
+    "model": "causes descriptors",
+    "reduce": "seeds embeddings out",
+    "train": "registrations registrations_of",
+    "uncertainty": "seeds registrations outcomes tables timings",
+}
+NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
+TEXTS = set(
+    ["source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of", "registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners", "methods", "encoders_of", "data_dir"]
+)
+SWITCHES = {"stand_in"}
+
+
+def main(words: list[str]) -> int:
+    """Run a step or a command in this process and return its status."""
+    if words[0] in COMMANDS:
+        return command(words)
+    step = words[0]
+    return as_process(f"gpca {step}", lambda: call(module_of(step), job_of(step, words[1:])))
+
+
+def module_of(step: str) -> str:
+    return MODULES.get(step, f"gpca.steps.{step}")
+
+
+def job_of(step: str, words: list[str]) -> Job:
+    values: dict[str, list[str]] = {}
+    for word in words:
+        if word.startswith("--"):
+            name = word[2:].replace("-", "_")
+            values[name] = []
+        else:
+            values[name].append(word)
+    threads = int(os.environ.get("OMP_NUM_THREADS", 1))
+    names = {name: _value(step, name, texts) for name, texts in values.items()}
+    return Job(**{"settings": {}, "threads": threads, "data_dir": None, "downloads": Path("data/downloads")} | names)
+
+
+def _value(step: str, name: str, texts: list[str]) -> object:
+    if name in SWITCHES:
+        return True
+    if name == "settings":
+        return json.loads(texts[0])
+    read = int if name in NUMBERS else str if name in TEXTS else Path
+    values = [read(text) for text in texts]
+    return values if name in LISTS.get(step, "").split() else values[0]
