@@ -8,7 +8,7 @@ from typing import Any
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
@@ -133,7 +133,7 @@ def _pretrained_on(frames: Mapping) -> str:
 EXPERIMENT = Experiment(
     name="real_world",
     sections={"real_world": RealWorldSettings},
-    tidy=("real_world.csv",),
+    tidy=(Tidy("real_world.csv"),),
     names=names,
     shown=shown,
     check=check,
