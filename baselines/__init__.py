@@ -1,1 +1,1 @@
-"""Rival explainers, one per file, found by :mod:`baselines.registry`."""
+"""Rival explainers, one per file, found by :mod:`gpca.explainers.registry`."""

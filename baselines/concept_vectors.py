@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import known_concepts
 from gpca.errors import InputError
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Positive

@@ -12,8 +12,8 @@ from time import perf_counter
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import known_concepts
 from gpca.attribution.scores import Attribution, summarize_marginals
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

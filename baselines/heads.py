@@ -14,8 +14,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import known_concepts
 from gpca.attribution.scores import Attribution, summarize_draws
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

@@ -9,13 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer, ConceptClassifier, standardized_regression
 from gpca.errors import InputError
+from gpca.explainers.concept_classifier import (
+    PAPERS_RANDOM_STATE,
+    ClassifierExplainer,
+    ConceptClassifier,
+    standardized_regression,
+)
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Count, Positive
-
-PAPERS_RANDOM_STATE = 42
 
 
 class Learner(ClassifierExplainer):

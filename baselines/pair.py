@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.classifier.settings import GPCArguments
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.features.settings import DescribedPoints

@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.attribution.scores import Attribution
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of

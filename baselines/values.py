@@ -13,9 +13,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
+from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

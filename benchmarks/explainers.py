@@ -102,7 +102,7 @@ def measure(registrations, icp_seconds_S, settings) -> dict[str, tuple[float, fl
     """Return for every explainer ICP calls and seconds per test sample, and the share of ICP."""
     import inspect
 
-    from baselines.registry import explainers
+    from gpca.explainers.registry import explainers
     from gpca.uncertainty.designs import DESIGNS
     from gpca.uncertainty.evaluation import design_rows, evaluate_design
 

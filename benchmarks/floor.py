@@ -21,9 +21,9 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-from baselines.registry import explainer_entry  # noqa: E402
 from gpca.attribution.metrics import CAUSAL_QUANTILE  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
+from gpca.explainers.registry import explainer_entry  # noqa: E402
 from gpca.pairs.dataset import Registrations  # noqa: E402 (the script runs from a plain checkout)
 from gpca.pairs.perturbation import CONCEPTS  # noqa: E402
 from gpca.uncertainty.designs import DESIGNS  # noqa: E402

@@ -157,7 +157,7 @@ def larger_config(sources: int, seeds: int, explainers: int) -> dict:
     """
     import yaml
 
-    from baselines.registry import explainers as known
+    from gpca.explainers.registry import explainers as known
 
     default = yaml.safe_load((ROOT / "config/config.yaml").read_text(encoding="utf-8"))
     own = yaml.safe_load((ROOT / "config/sources.yaml").read_text(encoding="utf-8"))["sources"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Sequence
 from importlib import import_module
-from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 from gpca.errors import require_known
@@ -18,12 +17,12 @@ class Registry(Generic[Entry]):
 
     Args:
         kind: what an entry is, as messages call it.
-        folder: the package whose modules list them.
+        folder: name of the package whose modules list them.
         variable: of a module, its entries by name; a module without it lists none.
         first: modules elsewhere, whose entries come before those of the folder.
     """
 
-    def __init__(self, kind: str, folder: ModuleType, variable: str, first: Sequence[str] = ()) -> None:
+    def __init__(self, kind: str, folder: str, variable: str, first: Sequence[str] = ()) -> None:
         self.kind = kind
         self._folder = folder
         self._variable = variable
@@ -46,7 +45,8 @@ class Registry(Generic[Entry]):
 
     def by_module(self) -> dict[str, dict[str, Entry]]:
         """Return the entries of each module."""
-        names = sorted(f"{self._folder.__name__}.{each.name}" for each in pkgutil.iter_modules(self._folder.__path__))
+        files = pkgutil.iter_modules(import_module(self._folder).__path__)
+        names = sorted(f"{self._folder}.{file.name}" for file in files)
         return {name: getattr(import_module(name), self._variable, {}) for name in (*self._first, *names)}
 
 

@@ -162,7 +162,7 @@ def _settings_of_arguments(function: Callable, given: int) -> Any:
 
 def _arguments(function: Callable, given: int) -> tuple[dict[str, Any], set[str], bool]:
     """Return the types of the arguments after the first, those without a default, and whether these are all."""
-    bound, plain = (function.keywords, function.func) if isinstance(function, partial) else ({}, function)
+    plain = function.func if isinstance(function, partial) else function
     made = isclass(plain) and not is_dataclass(plain)
     hints = get_type_hints(plain.__init__ if made else plain, include_extras=True)
     kinds: dict[str, Any] = {}
@@ -174,7 +174,7 @@ def _arguments(function: Callable, given: int) -> tuple[dict[str, Any], set[str]
             source = next((note for note in getattr(hint, "__metadata__", ()) if isinstance(note, ArgumentsOf)), None)
             closed = source is not None
             others = _arguments(source.function, 0)[0] if source else {}
-        elif parameter.kind is not Parameter.VAR_POSITIONAL and parameter.name not in bound:
+        elif parameter.kind is not Parameter.VAR_POSITIONAL:
             kinds[parameter.name] = (
                 Annotated[hint, Bounds(minimum=0)] if hint in (int, float) and not default < 0 else hint
             )

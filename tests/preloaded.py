@@ -5,8 +5,8 @@ It is what the steps load before they look at their input, and what each of hund
 
 from importlib import import_module
 
-from baselines.registry import explainers
 from gpca.__main__ import STEPS
+from gpca.explainers.registry import explainers
 
 OURS = ("gpca.config.check", "gpca.encoders.dgcnn", "gpca.objects.uw_rgbd", "gpca.objects.shapes.linemod")
 LIBRARIES = (

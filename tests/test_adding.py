@@ -61,8 +61,8 @@ def test_a_dataset_by_an_entry(config, tmp_path):
 def test_an_explainer(config, added_modules, registrations, tmp_path):
     import pandas as pd
 
-    from baselines.registry import explainer_entry
     from gpca.attribution.predictions import write_predictions
+    from gpca.explainers.registry import explainer_entry
 
     added_modules("baselines/nearest_quality.py")
     update_config(config, yaml.safe_load(block("config/config.yaml", "nearest_quality")))

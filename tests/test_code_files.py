@@ -100,7 +100,7 @@ STEPS = {
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
     "new_concepts": (
-        {"gpca/causes/drawing.py", "gpca/features/dataset.py", "gpca/active_learning/oracle.py"},
+        {"gpca/causes/drawing.py", "gpca/features/dataset.py", "gpca/active_learning/new_concepts.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
     "frame_labels": (

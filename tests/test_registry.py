@@ -1,5 +1,5 @@
 import sys
-from importlib import import_module, invalidate_caches
+from importlib import invalidate_caches
 
 import pytest
 
@@ -16,9 +16,7 @@ def fruits(tmp_path, monkeypatch):
     for name, text in files.items():
         (tmp_path / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
-    folder = import_module("fruits")
-
-    yield Registry("fruit", folder, "FRUITS", first=("exotic",))
+    yield Registry("fruit", "fruits", "FRUITS", first=("exotic",))
     for name in [name for name in sys.modules if name.split(".")[0] in ("fruits", "exotic")]:
         del sys.modules[name]
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.attached import attached
-from baselines.concept_classifier import ClassifierExplainer
 from gpca.causes.labels import LABELS
+from gpca.explainers.concept_classifier import ClassifierExplainer
 from gpca.pairs.dataset import Registrations
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from baselines.attached import attached
 from baselines.causes.described import joined
-from baselines.concept_classifier import known_concepts
 from gpca.causes.labels import LABELS
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.settings import GPCArguments
+from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.features.groups import GROUPS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from baselines.causes.described import DescriptorClassifier
-from baselines.concept_classifier import standardized_regression
+from gpca.explainers.concept_classifier import standardized_regression
 from gpca.explainers.interface import ExplainerEntry
 from gpca.features.groups import DENSITIES, RESIDUALS
 from gpca.settings import Positive

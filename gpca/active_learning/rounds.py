@@ -14,7 +14,6 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, require_strategy, select
-from gpca.active_learning.embedded import Embedded
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
@@ -22,6 +21,33 @@ from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
+
+
+@dataclass(frozen=True)
+class Embedded:
+    """S samples.
+
+    Attributes:
+        embedding: (S, d).
+        concept, split: (S,) label, and ``train`` or ``test``.
+    """
+
+    embedding: np.ndarray
+    concept: np.ndarray
+    split: np.ndarray
+
+    def rows(self, split: str) -> np.ndarray:
+        """Return the row numbers of a split."""
+        return np.flatnonzero(self.split == split)
+
+    def followed_by(self, other: Embedded) -> Embedded:
+        """Return these samples and those of the other after them."""
+        return Embedded(
+            np.concatenate([self.embedding, other.embedding]),
+            np.concatenate([self.concept, other.concept]),
+            np.concatenate([self.split, other.split]),
+        )
+
 
 Inputs = TypeVar("Inputs", np.ndarray, Projection)
 
@@ -38,7 +64,7 @@ class Samples(Generic[Inputs]):
 
 
 @dataclass(frozen=True)
-class Task(Generic[Inputs]):
+class LabelingTask(Generic[Inputs]):
     """What one experiment starts from: the concept held out, labeled samples of the others, pool and test samples."""
 
     held_out: str
@@ -46,10 +72,10 @@ class Task(Generic[Inputs]):
     pool: Samples
     test: Samples
 
-    def project(self, gpc: GPC) -> Task[Projection]:
+    def project(self, gpc: GPC) -> LabelingTask[Projection]:
         """Return the task with every embedding as the GPC's covariance sees it."""
         parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
-        return Task(self.held_out, *parts)
+        return LabelingTask(self.held_out, *parts)
 
 
 def make_task(
@@ -59,7 +85,7 @@ def make_task(
     *axes: object,
     classes: tuple[str, ...] = CONCEPTS,
     new_share: float | None = None,
-) -> Task[np.ndarray]:
+) -> LabelingTask[np.ndarray]:
     """Split the training samples into those labeled at the start and the pool, which holds all the rest.
 
     Args:
@@ -91,11 +117,11 @@ def make_task(
             f"lower active_learning.initial or raise {'registrations' if classes == CONCEPTS else 'causes'}.train",
         )
     rows = (initial, pool, samples.rows("test"))
-    return Task(held_out, *(Samples(samples.embedding[part], concept_S[part]) for part in rows))
+    return LabelingTask(held_out, *(Samples(samples.embedding[part], concept_S[part]) for part in rows))
 
 
 def initial_gpc(
-    task: Task[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
+    task: LabelingTask[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
 ) -> GPC:
     """Fit the GPC that knows all of its concepts but one.
 
@@ -110,7 +136,7 @@ def initial_gpc(
 
 
 def run_rounds(
-    task: Task[Projection],
+    task: LabelingTask[Projection],
     gpc: GPC,
     strategy: str,
     settings: ActiveLearningSettings,
@@ -134,7 +160,7 @@ def run_rounds(
 
 
 def rounds(
-    task: Task[Projection],
+    task: LabelingTask[Projection],
     gpc: GPC,
     strategy: str,
     settings: ActiveLearningSettings,
@@ -157,7 +183,9 @@ def rounds(
         yield step_of(task, gpc, queried, epochs), list(queried)
 
 
-def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True) -> Pool:
+def pool_of(
+    task: LabelingTask[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True
+) -> Pool:
     """Return what a strategy chooses from: the rows `left` of the pool, and what the GPC makes of them."""
     h = task.pool.h[left]
     if needs_scores:
@@ -169,7 +197,7 @@ def pool_of(task: Task[Projection], gpc: GPC, left: np.ndarray, queried: list[in
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labeled, task.pool.concept_N[left])
 
 
-def step_of(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
+def step_of(task: LabelingTask[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
     """Return a step of :func:`run_rounds`, after the labels of these rows of the pool are known."""
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
@@ -181,7 +209,7 @@ def step_of(task: Task[Projection], gpc: GPC, queried: list[int], epochs: int) -
     }
 
 
-def accuracies(task: Task[Projection], classifier) -> tuple[float, float]:
+def accuracies(task: LabelingTask[Projection], classifier) -> tuple[float, float]:
     """Return the accuracy over all test samples and over those of the concept held out; NaN of none.
 
     The classifier is a GPC, or what has its ``classes`` and ``scores``.

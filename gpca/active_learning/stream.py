@@ -11,7 +11,7 @@ from copy import copy
 
 import numpy as np
 
-from gpca.active_learning.rounds import Task, accuracies
+from gpca.active_learning.rounds import LabelingTask, accuracies
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream_learners import LEARNERS, StreamLearner
 from gpca.classifier.gpc import GPC
@@ -20,7 +20,7 @@ from gpca.errors import InputError
 from gpca.seeds import generator
 
 
-def arrival_order(task: Task, stream: StreamSettings, *axes: object) -> np.ndarray:
+def arrival_order(task: LabelingTask, stream: StreamSettings, *axes: object) -> np.ndarray:
     """Return the rows of the pool in the order of arrival: known concepts alone while `quiet`, then all in equal parts.
 
     Raises:
@@ -43,7 +43,7 @@ def arrival_order(task: Task, stream: StreamSettings, *axes: object) -> np.ndarr
 
 
 def run_stream(
-    task: Task[Projection],
+    task: LabelingTask[Projection],
     gpc: GPC,
     strategy: str,
     settings: ActiveLearningSettings,
@@ -102,7 +102,7 @@ def _asks(manager, worth_1: np.ndarray) -> bool:
 
 
 def _row(
-    task: Task[Projection], learner: StreamLearner, right: list[bool], asked: list[int], stream: StreamSettings
+    task: LabelingTask[Projection], learner: StreamLearner, right: list[bool], asked: list[int], stream: StreamSettings
 ) -> dict[str, float]:
     accuracy, accuracy_new = accuracies(task, learner)
     return {

@@ -13,7 +13,7 @@ import numpy as np
 
 from gpca.active_learning.bayesian_layer import BayesianLayer
 from gpca.active_learning.mondrian import MondrianForest
-from gpca.active_learning.rounds import Task
+from gpca.active_learning.rounds import LabelingTask
 from gpca.attribution.scores import entropy
 from gpca.classifier.latents import Projection
 from gpca.pairs.perturbation import CONCEPTS
@@ -47,7 +47,7 @@ class MondrianLearner:
 
     classes = CONCEPTS
 
-    def __init__(self, task: Task[Projection], *axes: object) -> None:
+    def __init__(self, task: LabelingTask[Projection], *axes: object) -> None:
         self._forest = MondrianForest(len(self.classes), generator(*axes, "mondrian"), TREES)
         self.update(task.initial.h, task.initial.concept_N)
 
@@ -76,7 +76,7 @@ class LayerLearner:
 
     classes = CONCEPTS
 
-    def __init__(self, task: Task[Projection], *axes: object) -> None:
+    def __init__(self, task: LabelingTask[Projection], *axes: object) -> None:
         self._layer = BayesianLayer(task.initial.h.inputs_N_d.shape[1], len(self.classes), DEVIATION)
         self._normal_M_C = generator(*axes, "layer").normal(size=(DRAWS, len(self.classes)))
         self.update(task.initial.h, task.initial.concept_N)

@@ -23,9 +23,8 @@ from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.causes.candidate import Candidate
 from gpca.causes.counterfactuals import Registrar, Unmeasurable
 from gpca.causes.dataset import Causes
-from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.measuring import Measuring, as_causes
-from gpca.causes.settings import FEWEST_POINTS, CauseSettings
+from gpca.causes.settings import FEWEST_POINTS, CauseSettings, FrameCauseSettings
 from gpca.causes.shapley import ALL, NONE
 from gpca.causes.subjects import Subject, measure_clean_pairs
 from gpca.errors import InputError

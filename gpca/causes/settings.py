@@ -8,8 +8,24 @@ from typing import Annotated, Any, Literal
 from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import HalfTurn, Hidden, Severities, Shift
-from gpca.settings import Bounds, OpenShare, Positive, Share
+from gpca.settings import Bounds, Count, OpenShare, Positive, Share
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
+
+
+@dataclass(frozen=True)
+class FrameCauseSettings:
+    """Which instances are measured, and with how many points.
+
+    Attributes:
+        seeds: the first so many of the run's, each with other points, starts and explainers.
+        instances: drawn of all, at most; None for all.
+        points: of what was measured, at most, and of the model.
+    """
+
+    seeds: Count = 1
+    instances: Count | None = None
+    points: CloudPoints = 512
+
 
 FEWEST_POINTS = 16  # that a crop leaves of a cloud, at least; as few as Monte-Carlo ICP takes anywhere
 Moved = Literal["model", "observed"]  # the cloud that ICP moves onto the other

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.causes.settings import CauseSettings
 from gpca.encoders.registry import require_backbone
 from gpca.encoders.settings import require_draws
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import LeftOut
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.source import require_place, resolve
 from gpca.pairs.synthesis import RegistrationSettings

@@ -10,11 +10,11 @@ from dataclasses import fields
 from functools import partial
 from typing import Any
 
-from baselines.registry import explainers
 from gpca.config.schema import DESIGNS, Reductions
 from gpca.errors import InputError, require_names
 from gpca.experiments.experiment import EXPLAINERS, Names
 from gpca.experiments.registry import experiments
+from gpca.explainers.registry import explainers
 
 # Mappings of which any entry may be false -> the names that they have.
 LEAVABLE: dict[str, Names] = {

@@ -58,7 +58,7 @@ def _on(device: torch.device, clouds: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Task:
+class TrainingTask:
     """What an encoder sees of a registration, and what its head learns to say of it.
 
     Attributes:
@@ -91,7 +91,7 @@ def train_encoder(
     seed: int,
     settings: EncoderSettings,
     checkpoint: Path | None = None,
-    task: Task = Task(),
+    task: TrainingTask = TrainingTask(),
     start: Mapping[str, torch.Tensor] | None = None,
     group_S: np.ndarray | None = None,
 ) -> tuple[Classifier, list[dict[str, float]]]:
@@ -145,7 +145,7 @@ class _Training:
         model: Classifier,
         registrations: Registrations,
         rows: np.ndarray,
-        task: Task,
+        task: TrainingTask,
         axes: tuple[str, int],
         settings: EncoderSettings,
     ) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.errors import with_key
+from gpca.explainers.registry import explainer_entry, require_settings
 
 
 def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str, str]]:

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import explainer_entry
 from gpca.experiments.real_world.tables import encoder_title
 from gpca.experiments.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.objects.title import dataset_of, title_of
 
@@ -37,28 +37,30 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
 
 def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return what tables and figures show besides numbers: titles by name, and conditions of the protocol."""
-    of_experiments = {name: value for each in experiments() for name, value in each.shown(config, sources).items()}
-    of_frames = of_experiments["frames"]
-    shown = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
+    own = {name: value for each in experiments() for name, value in each.shown(config, sources).items()}
+    frames = {REAL_WORLD: own["frames"]}
+    titled = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
+    titles = {name: title_of(entry) for name, entry in titled.items()}
     datasets = {name: dataset_of(entry) for name, entry in sources.items()}
-    of_model = {**shown, REAL_WORLD: of_frames}[config["model"]["source"]]
-    entries = {name: explainer_entry(name) for name in config["explainers"]}
-    explainers = {name: entry.title for name, entry in entries.items()}
+    model = (titled | frames)[config["model"]["source"]]
+    explainers = {name: explainer_entry(name) for name in config["explainers"]}
+    explainer_titles = {name: entry.title for name, entry in explainers.items()}
+    shown_source = config["figures"]["source"]
     return {
-        "sources": shown,
-        "compared_sources": {**shown, REAL_WORLD: of_frames, ONE_ENCODER: of_frames, "model": of_model},
-        "compared_titles": of_experiments["learners"] | of_experiments["strategies"] | explainers,
-        "source_titles": {name: title_of(entry) for name, entry in shown.items()},
-        "shown_title": title_of(shown[config["figures"]["source"]]),
+        "sources": titled,
+        "compared_sources": {**titled, **frames, ONE_ENCODER: own["frames"], "model": model},
+        "compared_titles": own["learners"] | own["strategies"] | explainer_titles,
+        "source_titles": titles,
+        "shown_title": titles[shown_source],
         "source_datasets": datasets,
-        "shown_dataset": datasets[config["figures"]["source"]],
-        "model": of_model,
-        "model_title": title_of(of_model),
-        "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in entries.items()},
-        "explainer_titles": explainers,
+        "shown_dataset": datasets[shown_source],
+        "model": model,
+        "model_title": title_of(model),
+        "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in explainers.items()},
+        "explainer_titles": explainer_titles,
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "encoder_title": encoder_title(**config["embedding"]),
-        **of_experiments,
+        **own,
     }
 
 

@@ -1,4 +1,4 @@
-"""The interface of every explainer; :mod:`baselines.registry` finds them by name.
+"""The interface of every explainer; :mod:`gpca.explainers.registry` finds them by name.
 
 An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
 ``EXPLAINERS`` by the name under which the config switches it on::

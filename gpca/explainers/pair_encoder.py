@@ -10,7 +10,7 @@ import torch
 
 from gpca.encoders.pair import PAIR_ENCODERS
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import Task, embed, train_encoder
+from gpca.encoders.training import TrainingTask, embed, train_encoder
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import generator
 
@@ -52,6 +52,6 @@ def learn_pair_encoder(
         source, seed: name what is random.
     """
     make = PAIR_ENCODERS[settings.backbone]
-    task = Task(make=lambda: make(**settings.options), draw=draw)
+    task = TrainingTask(make=lambda: make(**settings.options), draw=draw)
     model, _ = train_encoder(registrations, source, seed, settings, task=task)
     return lambda asked: embed(model, asked, source, seed, settings, draw)[0]

@@ -10,16 +10,13 @@ import json
 import mimetypes
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from gpca.errors import InputError
 from gpca.io.files import whole_file
-from gpca.io.json_file import read_json
 
 NAME = "ro-crate-metadata.json"
 RECORD = ".provenance.json"
@@ -28,27 +25,6 @@ PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 CONTEXT = (f"{SPECIFICATION}/context", "https://w3id.org/ro/terms/workflow-run/context")
 PAPER = "https://arxiv.org/abs/2509.18786"
 LICENSE = "The suite is under the MIT license; the datasets that the run read keep their own licenses."
-
-
-@dataclass(frozen=True)
-class Job:
-    """One recorded block of work.
-
-    Attributes:
-        outputs: The files or folders that it wrote, relative to the run's folder.
-        inputs: The SHA-256 of each file that it read, by its path: relative to the run's folder, or as it was given.
-        code: Version and commit of the suite, and whether tracked files differed from it.
-        libraries: The version of each library.
-        ended: When it ended, in UTC.
-        seconds: How long it took.
-    """
-
-    outputs: tuple[str, ...]
-    inputs: Mapping[str, str]
-    code: Mapping[str, Any]
-    libraries: Mapping[str, str]
-    ended: datetime
-    seconds: float
 
 
 def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Sequence[int]) -> None:
@@ -61,7 +37,7 @@ def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Seq
         seeds: The seeds of its repeats.
 
     Raises:
-        InputError: There is no record, or a damaged one.
+        InputError: There is no record.
     """
     description = (
         "Explanations of uncertain point cloud registrations: tables, figures and the numbers behind them, on "
@@ -72,24 +48,32 @@ def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Seq
         half.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def read_jobs(folder: Path) -> list[Job]:
-    """Return the jobs of a run, by their first output; those that wrote several files left one record beside each.
+def read_jobs(folder: Path) -> list[dict[str, Any]]:
+    """Return the records of a run's jobs, by their first output; a job that wrote several files left one beside each.
 
-    The job that writes the crate is left out: what an earlier one has left says nothing of this one.
+    Paths are relative to the run's folder: the ``outputs``, and of the ``inputs`` those that lie in it. The job that
+    writes the crate is left out: what an earlier one has left says nothing of this one.
     """
     paths_of = defaultdict(list)
     for path in sorted(folder.rglob(f"*{RECORD}")):
         paths_of[path.read_bytes()].append(path)
     if not paths_of:
         raise InputError(folder, f"has no *{RECORD}", "name the folder of a finished run")
-    own = {folder / f"{NAME}{RECORD}"}
-    return [_job(folder, paths) for paths in paths_of.values() if own.isdisjoint(paths)]
+    own, jobs = folder / f"{NAME}{RECORD}", []
+    for text, paths in paths_of.items():
+        if own not in paths:
+            record, outputs = json.loads(text), [path.with_name(path.name.removesuffix(RECORD)) for path in paths]
+            record["outputs"] = [_relative(folder, path) + ("/" if path.is_dir() else "") for path in outputs]
+            record["inputs"] = {_relative(folder, Path(path)): sha for path, sha in record["inputs_sha256"].items()}
+            record["ended"] = datetime.fromtimestamp(int(paths[0].stat().st_mtime), UTC)
+            jobs.append(record)
+    return jobs
 
 
-def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
+def crate(jobs: Sequence[Mapping[str, Any]], name: str, description: str) -> dict[str, Any]:
     """Return the metadata document: ``@context`` and the flat ``@graph`` of entities that refer to each other."""
-    hashes = {path: digest for job in jobs for path, digest in job.inputs.items()}
-    parts = sorted({path for job in jobs for path in job.outputs})
+    hashes = {path: digest for job in jobs for path, digest in job["inputs"].items()}
+    parts = sorted({path for job in jobs for path in job["outputs"]})
     named = {path: path for path in parts}
     named |= {path: f"#input-{digest[:16]}" for path, digest in hashes.items() if path not in named}
     entities = [_part(path, hashes.get(path)) for path in parts]
@@ -98,15 +82,15 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
         for path, identifier in named.items()
         if identifier.startswith("#")
     ]
-    entities += [_software(job.code, job.libraries) for job in jobs]
-    entities += [_library(*library) for job in jobs for library in job.libraries.items()]
+    entities += [_software(job["code"], job["libraries"]) for job in jobs]
+    entities += [_library(*library) for job in jobs for library in job["libraries"].items()]
     actions = [_action(job, named) for job in jobs]
     root: dict[str, Any] = {
         "@id": "./",
         "@type": "Dataset",
         "name": name,
         "description": description,
-        "datePublished": max(job.ended for job in jobs).date().isoformat(),
+        "datePublished": max(job["ended"] for job in jobs).date().isoformat(),
         "license": LICENSE,
         "conformsTo": {"@id": PROFILE},
         "citation": {"@id": PAPER},
@@ -128,24 +112,6 @@ def crate(jobs: Sequence[Job], name: str, description: str) -> dict[str, Any]:
     return {"@context": list(CONTEXT), "@graph": list(graph.values())}
 
 
-def _job(folder: Path, paths: Sequence[Path]) -> Job:
-    """Read the record that stands beside all outputs of a job."""
-    read = partial(read_json, what="a record of provenance", remedy="regenerate its result")
-    record = read(paths[0])
-    outputs = [path.with_name(path.name.removesuffix(RECORD)) for path in paths]
-    try:
-        return Job(
-            outputs=tuple(_relative(folder, path) + ("/" if path.is_dir() else "") for path in outputs),
-            inputs={_relative(folder, Path(path)): digest for path, digest in record["inputs_sha256"].items()},
-            code=record["code"],
-            libraries=record["libraries"],
-            ended=datetime.fromtimestamp(int(paths[0].stat().st_mtime), UTC),
-            seconds=float(record["seconds"]),
-        )
-    except (KeyError, TypeError, AttributeError, ValueError) as fault:
-        raise InputError(paths[0], "is not a record of provenance", "regenerate its result") from fault
-
-
 def _relative(folder: Path, path: Path) -> str:
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else str(path)
 
@@ -158,17 +124,17 @@ def _part(path: str, digest: str | None) -> dict[str, Any]:
     return entity | ({"sha256": digest} if digest else {})
 
 
-def _action(job: Job, named: Mapping[str, str]) -> dict[str, Any]:
-    more = f" and {len(job.outputs) - 1} more" if len(job.outputs) > 1 else ""
+def _action(job: Mapping[str, Any], named: Mapping[str, str]) -> dict[str, Any]:
+    first, *others = outputs = job["outputs"]
     return {
-        "@id": f"#job-{sha256(' '.join(job.outputs).encode()).hexdigest()[:16]}",
+        "@id": f"#job-{sha256(' '.join(outputs).encode()).hexdigest()[:16]}",
         "@type": "CreateAction",
-        "name": f"Making {job.outputs[0]}{more}",
-        "description": f"{job.seconds:g} s; settings and machine are in {job.outputs[0].rstrip('/')}{RECORD}",
-        "endTime": job.ended.isoformat(),
-        "instrument": {"@id": _software_id(job.code)},
-        "object": _references(named[path] for path in job.inputs),
-        "result": _references(job.outputs),
+        "name": f"Making {first}{f' and {len(others)} more' if others else ''}",
+        "description": f"{float(job['seconds']):g} s; settings and machine are in {first.rstrip('/')}{RECORD}",
+        "endTime": job["ended"].isoformat(),
+        "instrument": {"@id": _software_id(job["code"])},
+        "object": _references(named[path] for path in job["inputs"]),
+        "result": _references(outputs),
     }
 
 

@@ -136,22 +136,18 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
     facts: dict[str, Counter] = {}
     for path in files:
         record_path = path.with_name(path.name + ".provenance.json")
-        try:
+        values = {"Code": "not recorded"}
+        if record_path.is_file():
             record = json.loads(record_path.read_text(encoding="utf-8"))
-            code = record["code"]
-            libraries = record["libraries"]
-            commit = code["commit"] or "outside a git checkout"
+            commit = record["code"]["commit"] or "outside a git checkout"
             values = {
-                "Code": f"{commit} with uncommitted changes" if code["dirty"] else commit,
+                "Code": f"{commit} with uncommitted changes" if record["code"]["dirty"] else commit,
                 "Config (SHA-256)": _config(record["config_sha256"]),
                 "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],
                 "Device": _device(record["device"]),
                 "Python": record["python"],
-            } | {name: libraries[name] for name in sorted(libraries)}
-        except FileNotFoundError:
-            values = {"Code": "not recorded"}
-        except (ValueError, KeyError, TypeError) as fault:
-            raise InputError(record_path, "is not a record of provenance", "regenerate its result") from fault
+                **dict(sorted(record["libraries"].items())),
+            }
         for fact, value in values.items():
             facts.setdefault(fact, Counter())[value] += 1
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
@@ -176,10 +172,13 @@ def _provenance_files(folder: Path, run: Run) -> list[Path]:
 
 def _content(folder: Path, result: Shown) -> dict:
     """Return one table or figure as the template takes it."""
+    from PIL import Image
+
     common = {"name": result.name, "title": result.title, "caption": rendered_caption(result.name, result.caption)}
     if result.kind == "tables":
         return common | {"table": json.loads((folder / f"tables/{result.name}.json").read_text(encoding="utf-8"))}
-    width, height = _size(folder / f"figures/{result.name}.png")
+    with Image.open(folder / f"figures/{result.name}.png") as image:
+        width, height = image.size
     return common | {"table": None, "width": round(width * _CSS_PIXELS), "height": round(height * _CSS_PIXELS)}
 
 
@@ -199,13 +198,3 @@ def rendered_caption(name: str, caption: str):
         return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
     except SystemMessage as fault:
         raise InputError(f"caption of {name}", f"is not valid reStructuredText ({fault})", "correct it") from fault
-
-
-def _size(path: Path) -> tuple[int, int]:
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            return image.size
-    except OSError as fault:
-        raise InputError(path, "is not a readable image", "regenerate it with snakemake") from fault

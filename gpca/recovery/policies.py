@@ -57,7 +57,7 @@ class PolicyEntry:
     Attributes:
         title: what tables call it.
         make: what makes it.
-        explainer: the one that it reads (:mod:`baselines.registry`), empty for none.
+        explainer: the one that it reads (:mod:`gpca.explainers.registry`), empty for none.
         queues: whether it leaves cases to a person, whose labels its explainer can learn.
         learns: whether it needs rehearsals.
         oracle: whether it is told the cause.

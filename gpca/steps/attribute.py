@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.errors import InputError
 from gpca.explainers.interface import Describing, ExplainerEntry
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.io.axes import Axes
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.arguments import SEED, per_seed

@@ -13,7 +13,7 @@ from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, with_label
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import Task, embed, train_encoder
+from gpca.encoders.training import TrainingTask, embed, train_encoder
 from gpca.encoders.weights import write_weights
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
@@ -47,7 +47,7 @@ def run(options: Namespace) -> None:
         causes = Causes.load(options.causes, axes)
         registrations = causes.registrations
         seconds_S, icp_seconds_S = read_timings(options.causes_timings, registrations)
-        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, Task(LABELS))
+        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, TrainingTask(LABELS))
         started = perf_counter()
         h_S_d, logits_S_C = embed(model, registrations, *axes, settings)
         seconds = (perf_counter() - started) / len(h_S_d)

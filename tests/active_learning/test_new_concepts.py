@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from gpca.active_learning.embedded import Embedded
-from gpca.active_learning.new_concepts import Experiment, run_experiment
+from gpca.active_learning.new_concepts import NewConceptTrial, answers, run_trial
+from gpca.active_learning.rounds import Embedded
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, ActiveLearningSettings, NewConceptSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
@@ -26,8 +26,8 @@ def samples():
 
 @pytest.fixture(scope="module")
 def curves(samples):
-    experiment = Experiment("pair", samples, "geometry", CLASSES, errors=(0.25,))
-    found = run_experiment(experiment, NEW_CONCEPT_STRATEGIES, SETTINGS, "tiny", 0)
+    experiment = NewConceptTrial("pair", samples, "geometry", CLASSES, errors=(0.25,))
+    found = run_trial(experiment, NEW_CONCEPT_STRATEGIES, SETTINGS, "tiny", 0)
     return {(setting, strategy): curve for setting, strategy, curve in found}
 
 
@@ -49,8 +49,8 @@ def test_the_new_concept_is_learned_with_all_labels_at_once(curves):
 
 
 def test_wrong_answers_are_learned_and_counted_by_what_is_true(samples, curves):
-    experiment = Experiment("pair", samples, "geometry", CLASSES, errors=(0.9,))
-    [*_, (setting, _, wrong)] = run_experiment(experiment, ["random"], SETTINGS, "tiny", 0)
+    experiment = NewConceptTrial("pair", samples, "geometry", CLASSES, errors=(0.9,))
+    [*_, (setting, _, wrong)] = run_trial(experiment, ["random"], SETTINGS, "tiny", 0)
     assert setting == "pair_errors_90"
     right = curves["pair", "random"]
     assert [step["new_labels"] for step in wrong] == [step["new_labels"] for step in right]
@@ -66,3 +66,37 @@ def test_samples_follow_each_other(samples):
 def test_embeddings_with_an_erring_oracle_are_among_those_that_are_tried():
     with pytest.raises(InputError, match="erring of new_concepts: 'pair' is not among the embeddings; choose from oth"):
         NewConceptSettings.from_dict({"embeddings": ["other_samples"], "erring": ["pair"]})
+
+
+# The oracle
+
+NAMED = ("noise", "pose", "overlap", "geometry")
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return np.random.default_rng(0).choice(["noise", "pose", "overlap"], 200)
+
+
+@pytest.mark.parametrize(("share", "wrong"), [(0.0, 0), (0.05, 10), (0.3, 60), (0.999, 200)])
+def test_that_share_of_the_answers_is_wrong(truth, share, wrong):
+    named = answers(truth, NAMED, share, "tiny", 0)
+    assert np.sum(named != truth) == wrong
+    assert set(named.tolist()) <= set(NAMED)
+
+
+def test_every_other_concept_is_named_by_mistake(truth):
+    named = answers(truth, NAMED, 0.999, "tiny", 0)
+    assert set(named[truth == "pose"].tolist()) == {"noise", "overlap", "geometry"}
+
+
+def test_a_worse_oracle_repeats_the_errors_of_a_better_one(truth):
+    better, worse = (answers(truth, NAMED, share, "tiny", 0) for share in (0.1, 0.3))
+    wrong = better != truth
+    assert np.array_equal(better[wrong], worse[wrong])
+
+
+def test_errors_are_named_by_the_axes(truth):
+    first, again, other = (answers(truth, NAMED, 0.2, "tiny", seed) for seed in (0, 0, 1))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)

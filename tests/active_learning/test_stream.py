@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.active_learning.acquisition import STREAMS
-from gpca.active_learning.rounds import Samples, Task, initial_gpc
+from gpca.active_learning.rounds import LabelingTask, Samples, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream import arrival_order, run_stream
 from gpca.classifier.settings import GPCSettings
@@ -28,7 +28,7 @@ def blobs(n, seed, concepts=CONCEPTS):
 @pytest.fixture(scope="module")
 def plain():
     """120 samples of known concepts and 60 of the new one to arrive."""
-    return Task("overlap", blobs(40, 1, ("noise", "pose")), blobs(180, 2), blobs(60, 3))
+    return LabelingTask("overlap", blobs(40, 1, ("noise", "pose")), blobs(180, 2), blobs(60, 3))
 
 
 @pytest.fixture(scope="module")

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from baselines.analytical import AnalyticalGPC
-from baselines.registry import explainer_entry, require_settings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry, require_settings
 
 QUICK = {"learning_rate": 0.1, "iterations": 60, "inducing": 16, "draws": 200, "shape_points": 64}
 NAMES = ("analytical_gpc", "analytical_gpc_no_counts")

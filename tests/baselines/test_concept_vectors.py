@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import minimize
 
 from baselines.concept_vectors import ConceptVectors
-from baselines.registry import explainer_entry
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 
 

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry, require_settings
 from baselines.residuals import FLOOR, features, log_residual
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.pairs.dataset import ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.spread import SMALLEST_RESIDUAL

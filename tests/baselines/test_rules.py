@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry, require_settings
 from baselines.rules import ResidualRules
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry, require_settings
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata
 
-from baselines.registry import explainer_entry
 from baselines.sensitivity import local_derivatives, partial_rank_correlations, single_drops, total_indices
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import STEP, sample_knobs
 from gpca.uncertainty.knobs import UNTOUCHED, UPPER

@@ -4,9 +4,9 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry
 from baselines.shap_kl import shapley_values
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import DESIGNS
 

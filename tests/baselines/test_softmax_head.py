@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 
 

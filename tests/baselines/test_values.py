@@ -4,11 +4,11 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry, require_settings
 from baselines.sensitivity import ONE_AT_A_TIME, single_drops
 from baselines.shap_kl import ALL_CORNERS
 from baselines.values import WORTHS, ScaledValues, charged, corners
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.pairs.perturbation import CONCEPTS
 
 SCALED = ("shap_removal", "sa_local_removal")

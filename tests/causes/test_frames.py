@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.frames import chosen_instances, frame_candidate, measure_frames
-from gpca.causes.settings import CauseSettings
+from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.causes.shapley import ALL
 from gpca.errors import InputError
 from gpca.frames.clean_view import clean_view

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import baselines
-from baselines.registry import explainer_entry, explainers
 from gpca.errors import InputError
 from gpca.explainers.gpca import GPCA
+from gpca.explainers.registry import explainer_entry, explainers
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import DESIGNS
 

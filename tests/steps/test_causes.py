@@ -34,7 +34,7 @@ FAULTS = [
     (untouched, settings("causes", icp={"method": "generalized"}), "the target has no normals; use point_to_point"),
     (untouched, settings("causes", points=[128, 64]), "causes points: [128, 64] is in descending order"),
     (untouched, settings("causes", shares={"nominal": 1.0}), "causes shares: add up to 1.7"),
-    (untouched, settings("causes", starts=12), "setting starts: 12 is less than the minimum of 13"),
+    (untouched, settings("causes", starts=12), "setting starts: 12 should be greater than or equal to 13"),
     (untouched, {"--candidates": "causes.npz", "--out": "causes.npz"}, "causes.npz"),
 ]
 

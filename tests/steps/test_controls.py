@@ -11,7 +11,11 @@ from .command_lines import CONTROLS, ENCODER, STEP_OPTIONS, arguments, arrays_ch
 FAULTS = {
     "train_control": [
         (untouched, settings("train_control", control={}), "setting control: unknown; choose one of controls, encoder"),
-        (untouched, settings("train_control", controls={"folds": 1}), "setting folds: 1 is less than the minimum of 2"),
+        (
+            untouched,
+            settings("train_control", controls={"folds": 1}),
+            "setting folds: 1 should be greater than or equal to 2",
+        ),
         (
             untouched,
             settings("train_control", controls={"draw_points": [64, 32]}),

@@ -12,14 +12,14 @@ FAULTS = {
     "describe": [
         (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
         (truncated("causes.npz"), {}, "causes.npz: is not a readable npz archive"),
-        (untouched, settings("describe", restarts=0), "setting restarts: 0 is less than the minimum of 1"),
+        (untouched, settings("describe", restarts=0), "setting restarts: 0 should be greater than or equal to 1"),
         (untouched, settings("describe", restart=3), "setting restart: unknown; did you mean restarts?"),
         (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not contain the times of these samples"),
         (untouched, {"--out": "causes.npz"}, "causes.npz"),
     ],
     "train_on_causes": [
         (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
-        (untouched, settings("train_on_causes", epochs=0), "setting epochs: 0 is less than the minimum of 1"),
+        (untouched, settings("train_on_causes", epochs=0), "setting epochs: 0 should be greater than or equal to 1"),
         (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not contain the times of these samples"),
         (untouched, {"--out": "causes.npz"}, "causes.npz"),
     ],

@@ -93,7 +93,11 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
             [json.dumps(SETTINGS | {"datasets": {"tiny": {"location": "/not/there"}}})],
             "/not/there does not exist",
         ),
-        ("--settings", [json.dumps({"frames": {"points": 3}})], "setting points: 3 is less than the minimum of 64"),
+        (
+            "--settings",
+            [json.dumps({"frames": {"points": 3}})],
+            "setting points: 3 should be greater than or equal to 64",
+        ),
         ("--settings", [json.dumps({"explainers": {"oracle": {}}})], "explainer 'oracle': unknown; choose one of"),
         ("--out", ["objects.npz"], "objects.npz"),
     ],

@@ -18,7 +18,7 @@ FAULTS = [
         settings("reduce", components=19),
         r"19 components are too many for 18 training embeddings of 32 numbers",
     ),
-    (untouched, settings("reduce", components=0), r"setting components: 0 is less than the minimum of 1"),
+    (untouched, settings("reduce", components=0), r"setting components: 0 should be greater than or equal to 1"),
     (
         untouched,
         settings("reduce", neighbours=3),

@@ -16,7 +16,7 @@ FAULTS = [
     (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
     (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
     (arrays_changed("registrations.npz", concept=lambda c: np.full_like(c, "x")), {}, r"unknown concept 'x'"),
-    (untouched, settings("train", epochs="two"), r"setting epochs: 'two' is not of type 'integer'"),
+    (untouched, settings("train", epochs="two"), r"setting epochs: 'two' should be a valid integer"),
     (untouched, settings("train", draw_points=129), r"the largest cloud has \d+ points, fewer than draw_points, 129"),
     (untouched, settings("train", layers=3), r"setting layers: unknown; choose one of backbone, draw_points"),
     (untouched, settings("train", backbone="dgcn"), r"backbone 'dgcn': unknown; choose one of dgcnn"),

@@ -6,7 +6,7 @@ from .command_lines import refused, removed, settings, untouched
 
 FAULTS = [
     (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
-    (untouched, settings("without", epochs=0), r"setting epochs: 0 is less than the minimum of 1"),
+    (untouched, settings("without", epochs=0), r"setting epochs: 0 should be greater than or equal to 1"),
 ]
 
 

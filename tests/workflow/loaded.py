@@ -14,7 +14,7 @@ SKLEARN = (
     "svm",
 )
 LIBRARIES = (
-    *("gpytorch", "jinja2", "jsonschema", "matplotlib.pyplot", "nbformat", "numba", "pandas", "PIL.Image"),
+    *("gpytorch", "jinja2", "matplotlib.pyplot", "nbformat", "numba", "pandas", "PIL.Image", "pydantic"),
     *("SALib.analyze.sobol", "scipy.ndimage", "scipy.optimize", "scipy.spatial.transform", "scipy.stats", "shap"),
     *("skactiveml.pool", "skactiveml.stream", "torch", "torch._dynamo", "trimesh", "yte"),
 )

@@ -115,7 +115,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "controls/ control_embeddings/ transfer",
         "predictions embeddings encoders",
     ),
-    "gpca/experiments/controls/judged.py": (
+    "gpca/experiments/controls/metrics.py": (
         "controls.csv table10_controls transfer",
         "controls/ predictions diagnoses/",
     ),

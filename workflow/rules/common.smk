@@ -2,7 +2,7 @@
 import json
 from pathlib import Path
 
-from baselines.registry import CAUSES, explainer_entry, explainer_module
+from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.objects.procedural import FAMILIES

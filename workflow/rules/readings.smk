@@ -23,6 +23,7 @@ rule reading:
         code=lambda wildcards: code_files(
             "gpca.experiments.specification_curve.step",
             GROUPS[wildcards.reading_group].module,
+            *map(explainer_module, GROUPS[wildcards.reading_group].explainers),
             *(
                 [encoder_module(encoder)]
                 if (encoder := ENCODERS_OF_READINGS.get(wildcards.reading_group))

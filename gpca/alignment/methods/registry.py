@@ -7,14 +7,16 @@ from importlib.util import find_spec
 
 import numpy as np
 
-import gpca.alignment.methods as folder
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.errors import InputError
 from gpca.process.environment import require_open3d
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 
-REGISTRY: Registry[MethodEntry] = Registry("registration method", folder, "METHODS")  # those without their package too
+# Those without their package too.
+REGISTRY: Registry[MethodEntry] = Registry(
+    "registration method", __package__, "METHODS"
+)  # those without their package too
 methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 

@@ -11,7 +11,7 @@ import torch
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
-from gpca.active_learning.rounds import Task, initial_gpc, make_task, run_rounds
+from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, run_rounds
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream import run_stream
 from gpca.classifier.gpc import GPC
@@ -71,7 +71,7 @@ def run(options: Namespace) -> None:
             write_curves(path, curves[strategy], STREAM_COLUMNS if strategy in STREAMS else POOL_COLUMNS)
 
 
-def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, Task[Projection], GPC]]:
+def _tasks(options: Namespace, settings: ActiveLearningSettings) -> Iterator[tuple[str, LabelingTask[Projection], GPC]]:
     """Yield setting, task and the GPC that knows two concepts: for each concept held out, and for a rare one."""
     registrations = Registrations.load(options.registrations, (options.source, options.seed))
     held_out = options.settings.get("held_out", CONCEPTS)

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.experiments.controls.judged import read_controls
-from gpca.experiments.controls.metrics import auroc_error
+from gpca.experiments.controls.metrics import auroc_error, read_controls
 from gpca.experiments.controls.settings import PAPER, TRANSFER, plain_of
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.io.csv_file import read_numbers

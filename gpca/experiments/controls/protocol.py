@@ -40,7 +40,7 @@ Attach = Callable[[Registrations], Registrations]
 
 
 @dataclass(frozen=True)
-class Experiment:
+class ControlRun:
     """What all controls of one source and seed have in common.
 
     Attributes:

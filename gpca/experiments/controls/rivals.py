@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.errors import InputError
 from gpca.explainers.interface import ConceptExplainer, Describing
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.pairs.dataset import Registrations
 
 Embed = Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]  # and the name of their source -> h and logits

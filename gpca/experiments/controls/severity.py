@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
-from gpca.experiments.controls.judged import read_controls
+from gpca.experiments.controls.metrics import read_controls
 from gpca.experiments.controls.samples import OF_CONCEPT, read_samples
 from gpca.experiments.controls.settings import PAPER
 from gpca.io.csv_file import read_numbers

@@ -12,7 +12,7 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
 from gpca.errors import InputError
-from gpca.experiments.controls.protocol import Experiment
+from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.samples import sample_table
 from gpca.experiments.controls.settings import PAPER, RETRAINED, TRAININGS, ControlSettings
@@ -82,7 +82,7 @@ def run(options: Namespace) -> None:
             if not left_out(control, registrations, settings, encoder.backbone):
                 changed = variant(control, registrations, options.source, options.seed, settings, icp)
                 embeddings[control] = read_embedding(path, changed, "train_control", logits=True)
-        experiment = Experiment(
+        experiment = ControlRun(
             source=options.source,
             seed=options.seed,
             settings=settings,

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.causes.dataset import Causes
 from gpca.causes.labels import labeled
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.registry import CAUSES, explainer_entry, require_settings
 from gpca.features.dataset import Descriptors
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.arguments import SEED, per_seed

@@ -13,18 +13,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from baselines.registry import CAUSES, explainer_entry, require_settings
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes
-from gpca.causes.frame_settings import FrameCauseSettings
 from gpca.causes.frames import chosen_instances, measure_frames
 from gpca.causes.labels import LABELS, labeled
-from gpca.causes.settings import CauseSettings
+from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
+from gpca.explainers.registry import CAUSES, explainer_entry, require_settings
 from gpca.features.dataset import Descriptors, describe_all
 from gpca.features.settings import DescriptorSettings
 from gpca.frames.instances import Instances

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
-from gpca.active_learning.embedded import Embedded
-from gpca.active_learning.new_concepts import Experiment, run_experiment
+from gpca.active_learning.new_concepts import NewConceptTrial, run_trial
+from gpca.active_learning.rounds import Embedded
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, ActiveLearningSettings
 from gpca.errors import InputError
 from gpca.experiments.frame_labels.settings import PAIR, FrameLabelSettings
@@ -58,8 +58,8 @@ def run(options: Namespace) -> None:
         curves: dict[str, dict] = {strategy: {} for strategy in options.strategies}
         for name, samples in progress(_embedded(options, own.points), f"labels of {options.source}"):
             for concept in own.held_out:
-                experiment = Experiment(name, samples, concept, CONCEPTS)
-                learnt = run_experiment(experiment, options.strategies, settings, options.source, options.seed)
+                experiment = NewConceptTrial(name, samples, concept, CONCEPTS)
+                learnt = run_trial(experiment, options.strategies, settings, options.source, options.seed)
                 for setting, strategy, curve in learnt:
                     curves[strategy][setting, concept] = curve
         for strategy, path in zip(options.strategies, options.out, strict=True):

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.active_learning.acquisition import EXPANSION, select, top
-from gpca.active_learning.embedded import Embedded
-from gpca.active_learning.rounds import initial_gpc, make_task, pool_of
+from gpca.active_learning.rounds import Embedded, initial_gpc, make_task, pool_of
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.experiments.method.shown_sample import Stages
 from gpca.seeds import generator

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import Task, embed, train_encoder
+from gpca.encoders.training import TrainingTask, embed, train_encoder
 from gpca.pairs.dataset import Registrations
 
 
@@ -29,5 +29,5 @@ def self_supervised(
     name = f"{source} without labels"
     columns = tuple(f"measurement_{i}" for i in range(measured_S_F.shape[1]))
     lessons = registrations.subset(train)
-    model, _ = train_encoder(lessons, name, seed, settings, task=Task(columns, measured_S_F[train]))
+    model, _ = train_encoder(lessons, name, seed, settings, task=TrainingTask(columns, measured_S_F[train]))
     return embed(model, registrations, name, seed, settings)[1]

@@ -12,8 +12,8 @@ import numpy as np
 import torch
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
-from gpca.active_learning.embedded import Embedded
-from gpca.active_learning.new_concepts import Experiment, run_experiment
+from gpca.active_learning.new_concepts import NewConceptTrial, run_trial
+from gpca.active_learning.rounds import Embedded
 from gpca.active_learning.settings import (
     FROM_OTHERS,
     NEW_CONCEPT_STRATEGIES,
@@ -92,7 +92,7 @@ def run(options: Namespace) -> None:
         work = _Work(options, given, own)
         curves: dict[str, dict] = {strategy: {} for strategy in options.strategies}
         for experiment in progress(work.experiments(), f"new concepts of {options.source}"):
-            learnt = run_experiment(experiment, options.strategies, settings, options.source, options.seed)
+            learnt = run_trial(experiment, options.strategies, settings, options.source, options.seed)
             for setting, strategy, curve in learnt:
                 curves[strategy][setting, experiment.held_out] = curve
         for strategy, path in zip(options.strategies, options.out, strict=True):
@@ -122,14 +122,14 @@ class _Work:
         self._seen = _seen(causes, h_S_d, Descriptors.load(options.descriptors, causes.registrations))
         self._objects = ObjectClouds.load(options.objects, options.source)
 
-    def experiments(self) -> Iterator[Experiment]:
+    def experiments(self) -> Iterator[NewConceptTrial]:
         """Yield every new concept, in every embedding."""
         registrations = self._registrations
         for name, h_S_d in self._embeddings(registrations):
             samples = Embedded(h_S_d, registrations.concept, registrations.split)
             errors = self._own.errors if name in self._own.erring else ()
             for concept in self._given["active_learning"].get("held_out", CONCEPTS):
-                yield Experiment(name, samples, concept, CONCEPTS, errors)
+                yield NewConceptTrial(name, samples, concept, CONCEPTS, errors)
         yield from self._of_causes()
 
     def _embeddings(self, registrations: Registrations) -> Iterator[tuple[str, np.ndarray]]:
@@ -147,20 +147,20 @@ class _Work:
             else:
                 _leave_out(self._options.source, name, f"it needs {FROM_OTHERS[name]}")
 
-    def _of_causes(self) -> Iterator[Experiment]:
+    def _of_causes(self) -> Iterator[NewConceptTrial]:
         """Yield what has causes as new concepts: by the encoder of the causes, and by what was measured of the pair."""
         seen = self._seen
         known = tuple(label for label in LABELS if label in seen["encoder"].concept)
         if NOMINAL in self._own.causes:
-            yield Experiment("pretrained", seen["encoder"], NOMINAL, known)
-            yield Experiment("pair", self._normalized(seen["pair"]), NOMINAL, known)
+            yield NewConceptTrial("pretrained", seen["encoder"], NOMINAL, known)
+            yield NewConceptTrial("pair", self._normalized(seen["pair"]), NOMINAL, known)
         if GEOMETRY in self._own.causes and (drawn := self._geometry()) is not None:
             h_G_d = embed(self._cause_model, drawn.registrations, *self._axes, self._cause_encoder)[0]
             icp, descriptors = ICPSettings(**self._given["icp"]), DescriptorSettings(**self._given["descriptors"])
             new = _seen(drawn, h_G_d, describe_all(drawn, *self._axes, descriptors, icp)[0], GEOMETRY)
             both = {name: seen[name].followed_by(new[name]) for name in new}
-            yield Experiment("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
-            yield Experiment("pair", self._normalized(both["pair"]), GEOMETRY, (*known, GEOMETRY))
+            yield NewConceptTrial("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
+            yield NewConceptTrial("pair", self._normalized(both["pair"]), GEOMETRY, (*known, GEOMETRY))
 
     def _geometry(self) -> Causes | None:
         drawn = draw_geometry(

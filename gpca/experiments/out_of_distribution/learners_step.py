@@ -6,10 +6,10 @@ from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
 
-from baselines.registry import explainer_entry, require_settings
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution.learners import predict_sets
 from gpca.experiments.out_of_distribution.sets import ShiftedSets
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.io.csv_file import write_csv
 from gpca.process.arguments import SEED, per_seed, require_files
 from gpca.process.progress import progress

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.registry import require_settings
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
+from gpca.explainers.registry import require_settings
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
@@ -133,7 +133,7 @@ def _pretrained_on(frames: Mapping) -> str:
 EXPERIMENT = Experiment(
     name="real_world",
     sections={"real_world": RealWorldSettings},
-    tidy=("real_world.csv",),
+    tidy=(Tidy("real_world.csv"),),
     names=names,
     shown=shown,
     check=check,

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gpca.causes.frame_settings import FrameCauseSettings
+from gpca.causes.settings import FrameCauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import SceneSettings

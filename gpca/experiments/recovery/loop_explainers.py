@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from baselines.registry import explainer_entry
 from gpca.attribution.scores import Attribution
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.recovery.answers import Explain
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.uncertainty.evaluation import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
@@ -57,7 +57,7 @@ def learn_explainers(
     """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration.
 
     Args:
-        names: explainers (:mod:`baselines.registry`) that read embeddings or the design ``removal``.
+        names: explainers (:mod:`gpca.explainers.registry`) that read embeddings or the design ``removal``.
         settings: explainer -> its settings.
         most_remedied: training samples whose remedies are run, at most; Monte-Carlo ICP is slow.
     """

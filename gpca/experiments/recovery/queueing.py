@@ -30,7 +30,7 @@ BATCH = 4  # cases that are labeled before anything is learned from them
 DRAWS = 5  # random orders
 
 
-class Learner(Protocol):
+class QueueLearner(Protocol):
     """What is in doubt about queued cases, learns their labels, and decides about others."""
 
     def doubts(self) -> np.ndarray:
@@ -113,7 +113,7 @@ def learners_of(
     judged: Sequence[Episode],
     explainers: LoopExplainers,
     budget: int,
-) -> dict[str, Callable[[], Learner]]:
+) -> dict[str, Callable[[], QueueLearner]]:
     """Return what makes the learner of each of these policies that queues cases or learns from rehearsals.
 
     Args:
@@ -126,7 +126,7 @@ def learners_of(
     queued = rehearsal.failures
     trials = [rehearsal.trials[episode.number] for episode in queued]
     entries = {name: policy_entry(name, means.actions) for name in policies}
-    learners: dict[str, Callable[[], Learner]] = {}
+    learners: dict[str, Callable[[], QueueLearner]] = {}
     for name, entry in entries.items():
         if not (entry.learns or entry.queues) or any(entry.learns and entries[other].learns for other in learners):
             continue  # policies of the same chances learn the same
@@ -143,7 +143,7 @@ def learners_of(
 
 
 def error_by_labels(
-    learners: Mapping[str, Callable[[], Learner]],
+    learners: Mapping[str, Callable[[], QueueLearner]],
     solved: Sequence[Mapping[str, bool]],
     rehearsal: Rehearsal | None,
     axes: tuple,

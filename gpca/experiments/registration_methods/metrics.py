@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
-from gpca.experiments.registration_methods.rows import read_trials, row_name
 from gpca.io.csv_file import numbers, read_csv
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 
 if TYPE_CHECKING:
     import pandas as pd
 
+INITIAL, NO_START = "initial", "none"  # where a registration starts, or the name of a global method
+SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
+MEASURED = ("add_relative", "rotation_error_rad", "translation_error")
+COLUMNS = ("sample", "concept", "start", "success", "failure", *SEVERITY_COLUMNS, *MEASURED)
 TABLE = "registration_methods"  # `table` of the tidy rows reads this
 TIMED = "method_"  # with a method behind it, the folder of its seconds
 BINS = ("low", "middle", "high")  # thirds of what is drawn
@@ -27,11 +30,23 @@ DRAWN = {
 }
 
 
+def row_name(method: str, start: str) -> str:
+    """Return e.g. ``gicp``, from its own initial pose, or ``fgr+gicp``, from that of another method."""
+    return method if start in (INITIAL, NO_START) else f"{start}+{method}"
+
+
+def read_trials(path: str | Path) -> pd.DataFrame:
+    """Read a file of the step ``register_methods``: `success` as booleans, numbers as numbers, the rest as text."""
+    rows = read_csv(path, COLUMNS, others=("object", "symmetric", "fitness", "inlier_rmse"))
+    for name in (*SEVERITY_COLUMNS, *MEASURED):
+        rows[name] = numbers(path, rows, name)
+    return rows.assign(success=rows["success"] == "True")
+
+
 def collect_trials(files: Iterable[str | Path], severities: Mapping[str, Iterable[float]]) -> pd.DataFrame:
     """Return the tidy metrics of files named `…/{source}/{method}/seed{seed}.csv`; results/README.md lists them.
 
-    Their `method` is named by :func:`gpca.experiments.registration_methods.rows.row_name`; their `concept` is a cause,
-    a cause and a bin, or all.
+    Their `method` is named by :func:`row_name`; their `concept` is a cause, a cause and a bin, or all.
 
     Args:
         severities: the config's ranges, from which the registrations were drawn.

@@ -11,8 +11,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL
-from gpca.experiments.registration_methods.metrics import BINS, bin_name
-from gpca.experiments.registration_methods.rows import INITIAL, NO_START, row_name
+from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, bin_name, row_name
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, mean_over, missing_packages

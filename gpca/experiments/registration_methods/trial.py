@@ -15,7 +15,7 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry, require_global
 from gpca.errors import InputError
 from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.rows import INITIAL, NO_START, SEVERITY_COLUMNS
+from gpca.experiments.registration_methods.metrics import INITIAL, NO_START, SEVERITY_COLUMNS
 from gpca.experiments.registration_methods.settings import PairSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations

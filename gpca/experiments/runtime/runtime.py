@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.active_learning.rounds import Task, initial_gpc
+from gpca.active_learning.rounds import LabelingTask, initial_gpc
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.experiments.runtime.stage_times import CloudPair, time_explanations, time_labeling, time_stages
 from gpca.model.explainer import Explainer
@@ -30,7 +30,7 @@ SMALL = 512  # points of the smaller explanation
 def measure(
     model: Model,
     registrations: Registrations,
-    task: Task[np.ndarray],
+    task: LabelingTask[np.ndarray],
     settings: ActiveLearningSettings,
     repeats: int,
     threads: int,

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import select
-from gpca.active_learning.rounds import Task, pool_of
+from gpca.active_learning.rounds import LabelingTask, pool_of
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.canonical_frame import CanonicalFrame
@@ -75,7 +75,7 @@ def _draws(model: Model, h_1_d: np.ndarray, random: np.random.Generator) -> np.n
 
 
 def time_labeling(
-    task: Task[Projection], gpc: GPC, settings: ActiveLearningSettings, random: np.random.Generator
+    task: LabelingTask[Projection], gpc: GPC, settings: ActiveLearningSettings, random: np.random.Generator
 ) -> Times:
     """Measure BALD selection from the whole pool, and the update of a copy of the classifier.
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gpca.active_learning.rounds import Task, initial_gpc, make_task, rounds
+from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, rounds
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
@@ -26,7 +26,7 @@ def pool(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Ite
     """Yield labels and epochs to the target under each reading, by BALD with k-means and by random choice."""
     base, target = _base(given)
     for source, seed, _, registrations in given.in_distribution():
-        started: dict[tuple, tuple[Task, GPC] | None] = {}
+        started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
         found: dict[tuple, dict[str, float]] = {}
         for reading in progress(readings, f"pools of {source}, seed {seed}"):
             start = (reading["new_share"], reading["initial"])
@@ -58,7 +58,12 @@ def pool(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Ite
 
 
 def until(
-    accuracy: float, task: Task[np.ndarray], gpc: GPC, strategy: str, settings: ActiveLearningSettings, *axes: object
+    accuracy: float,
+    task: LabelingTask[np.ndarray],
+    gpc: GPC,
+    strategy: str,
+    settings: ActiveLearningSettings,
+    *axes: object,
 ) -> tuple[list[dict[str, float]], list[int]]:
     """Return the rounds to the first of that accuracy, or all of them, and the rows of the pool that they labeled."""
     done = []
@@ -85,7 +90,7 @@ def epochs(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> I
 
 
 def passes(
-    task: Task[np.ndarray], queried: list[int], settings: GPCSettings, target: float, *axes: object
+    task: LabelingTask[np.ndarray], queried: list[int], settings: GPCSettings, target: float, *axes: object
 ) -> dict[str, float]:
     """Return the epochs after which a new classifier on the labels reaches the target, and whether it does."""
     labeled_L_d = np.concatenate([task.initial.h, task.pool.h[queried]])

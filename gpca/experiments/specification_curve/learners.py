@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import softmax
 
-from baselines.learners import PAPERS_RANDOM_STATE, forest
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
@@ -17,10 +16,12 @@ from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.specification_curve.given import Given, Row
 from gpca.experiments.specification_curve.judged import accuracies, table5
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
+from gpca.explainers.concept_classifier import PAPERS_RANDOM_STATE
+from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
-SVM = "learner_linear_svm"
+FOREST, SVM = "learner_forest", "learner_linear_svm"
 
 
 def kernel(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
@@ -88,9 +89,9 @@ def encoder_head(given: Given, readings: Sequence[Reading], sizes: ReadingSizes)
             train, test = (embedded.subset(embedded.rows(split)) for split in ("train", "test"))
             gpc = GPC(CONCEPTS, GPCSettings(**given.sections["gpca_paper"]), source, seed)
             gpc.fit(train.embedding, train.concept)
-            trees = forest(source, seed)
+            trees = explainer_entry(FOREST).make(source, seed)
             trees.fit(train)
-            of_head = {"gpca_paper": gpc.attribute(test.embedding)[0], "learner_forest": trees.explain(test).scores_N_C}
+            of_head = {"gpca_paper": gpc.attribute(test.embedding)[0], FOREST: trees.explain(test).scores_N_C}
             for reading in (reading for reading in readings if reading["head"] == head):
                 svm_S_C = svm_scores(train, test.embedding, "svc", reading["inputs"], "platt")
                 for method, scores_S_C in {**of_head, SVM: svm_S_C}.items():

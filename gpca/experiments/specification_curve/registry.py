@@ -24,6 +24,7 @@ class Group:
         reads: kinds of files, fields of :class:`gpca.experiments.specification_curve.given.Given`.
         sources: of which printed numbers are asked; empty for depth frames.
         methods: whose predictions it reads.
+        explainers: those that it fits itself, found by name.
         costly: it takes minutes a seed, so that it sees the first one alone.
     """
 
@@ -33,6 +34,7 @@ class Group:
     reads: tuple[str, ...]
     sources: tuple[str, ...] = ALL_SOURCES
     methods: tuple[str, ...] = ()
+    explainers: tuple[str, ...] = ()
     costly: bool = False
 
     @property
@@ -67,6 +69,7 @@ GROUPS = {
         "learners:encoder_head",
         ("registrations", "sets"),
         ("linemod",),
+        explainers=("learner_forest",),
     ),
     "diagnostics": Group(
         "Set, distance, score and area of ρ, AUC and ECE",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from baselines.registry import explainer_entry
 from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry
 
 DESIGN = "additive"  # whose conditions estimators are asked about
 

@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-import gpca.uncertainty.estimators as folder
 from gpca.errors import InputError
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import Estimate, EstimatorEntry, Example, FailedEstimate, RegisteredPair
 
-REGISTRY: Registry[EstimatorEntry] = Registry("estimator", folder, "ESTIMATORS")
+REGISTRY: Registry[EstimatorEntry] = Registry("estimator", __package__, "ESTIMATORS")
 estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 

@@ -170,19 +170,19 @@ def test_an_unknown_name_lists_the_known():
 @pytest.mark.parametrize(
     ("name", "settings", "words"),
     [
-        ("gicp", {"voxel": 0.1}, "unexpected keyword argument 'voxel'"),
-        ("gicp", {"max_iterations": 2.5}, "max_iterations: 2.5 is not of type 'integer'"),
-        ("teaser", {"noise": float("nan")}, "noise: nan is not of type 'number'"),
-        ("trimmed", {"overlap": -0.5}, "overlap: -0.5 is less than the minimum"),
-        ("trimmed", {"overlap": 5}, "overlap: 5 is greater than the maximum of 1"),
-        ("reject_worst", {"worst": 1}, "worst: 1 is greater than or equal to the maximum of 1"),
-        ("huber", {"scale": "wide"}, "scale: 'wide' is not of type 'number'"),
+        ("gicp", {"voxel": 0.1}, "setting voxel: unknown"),
+        ("gicp", {"max_iterations": 2.5}, "max_iterations: 2.5 should be a valid integer"),
+        ("teaser", {"noise": float("nan")}, "noise: nan should be a finite number"),
+        ("trimmed", {"overlap": -0.5}, "overlap: -0.5 should be greater than or equal to"),
+        ("trimmed", {"overlap": 5}, "overlap: 5 should be less than or equal to 1"),
+        ("reject_worst", {"worst": 1}, "worst: 1 should be less than 1"),
+        ("huber", {"scale": "wide"}, "scale: 'wide' should be a valid number"),
         (
             "random_sampling",
             {"metric": "point_to_line"},
-            "metric: must be one of point_to_point, point_to_",
+            "metric: 'point_to_line' should be 'point_to_point' or",
         ),
-        ("tukey", {"kernel": "Tukey"}, "kernel: must be one of HuberLoss, CauchyLoss, GMLoss, TukeyLoss, not 'Tukey'"),
+        ("tukey", {"kernel": "Tukey"}, "kernel: 'Tukey' should be 'HuberLoss', 'CauchyLoss', 'GMLoss' or 'TukeyLoss'"),
     ],
 )
 def test_settings_that_a_method_does_not_take_are_refused(name, settings, words):

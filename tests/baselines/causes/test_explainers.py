@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from baselines.causes.nominal import NominalThreshold
-from baselines.registry import CAUSES, explainer_entry, explainer_module, explainers
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.labels import LABELS, labeled
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
+from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
 from gpca.features.dataset import describe_all
 from gpca.features.settings import DescriptorSettings
 

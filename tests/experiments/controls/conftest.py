@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.attribution.scores import Attribution
-from gpca.experiments.controls.protocol import Experiment
+from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import Rival
 from gpca.experiments.controls.settings import ControlSettings
 from gpca.pairs.perturbation import CONCEPTS
@@ -60,7 +60,7 @@ def attached(registrations):
 
 def experiment(registrations, *controls, embeddings=(), rivals=None):
     settings = ControlSettings(controls=controls, draw_points=(32, 64))
-    return Experiment(
+    return ControlRun(
         source="tiny",
         seed=100,
         settings=settings,

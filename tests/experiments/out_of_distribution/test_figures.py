@@ -1,7 +1,6 @@
 import pandas as pd
 import pytest
 
-from baselines.registry import explainer_entry
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution.figures import (
     distance_curve,
@@ -12,6 +11,7 @@ from gpca.experiments.out_of_distribution.figures import (
 from gpca.experiments.out_of_distribution.learners import predict_sets
 from gpca.experiments.out_of_distribution.metrics import read_learner_predictions, sets_of, uncertainty_metrics
 from gpca.experiments.out_of_distribution.sets import DISTANCES
+from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.reporting.figures import style
 from tests.experiments.out_of_distribution.test_learners import quick

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from baselines.registry import explainer_entry
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution.learners import predict_sets
 from gpca.explainers.gpca import GPCA
+from gpca.explainers.registry import explainer_entry
 from tests.experiments.out_of_distribution.test_sets import sets
 
 

@@ -94,7 +94,7 @@ def test_a_policy_does_not_insist_on_what_did_not_help(loop):
 
 
 def test_every_explainer_of_a_policy_exists():
-    from baselines.registry import explainer_entry
+    from gpca.explainers.registry import explainer_entry
 
     reads = {explainer_entry(entry.explainer).reads for entry in POLICIES.values() if entry.explainer}
     assert reads == {"embeddings", "uncertainty/removal"}

@@ -6,8 +6,15 @@ import pytest
 
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.errors import InputError
-from gpca.experiments.registration_methods.metrics import collect_seconds, collect_trials, share_of_milder
-from gpca.experiments.registration_methods.rows import MEASURED, SEVERITY_COLUMNS, read_trials, row_name
+from gpca.experiments.registration_methods.metrics import (
+    MEASURED,
+    SEVERITY_COLUMNS,
+    collect_seconds,
+    collect_trials,
+    read_trials,
+    row_name,
+    share_of_milder,
+)
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 

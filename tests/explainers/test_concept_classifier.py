@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from sklearn.linear_model import LogisticRegression
 
-from baselines.concept_classifier import ConceptClassifier
 from gpca.errors import InputError
+from gpca.explainers.concept_classifier import ConceptClassifier
 from gpca.pairs.perturbation import CONCEPTS
 
 CONCEPT_N = np.array(CONCEPTS)[np.arange(60) % 3]

@@ -1,21 +1,21 @@
-"""Every explainer by name: GP-CA itself and the rivals, one per file of this folder.
+"""Every explainer by name: GP-CA itself and the rivals, one per file of ``baselines/``.
 
-Those of causes have a folder of their own below it, and names of their own.
+Those of causes have a folder of their own below it, and names of their own. Both folders are found by their names, as
+the rivals import this package and not the other way round.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-import baselines.causes
 from gpca.explainers.interface import ExplainerEntry
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 
 CONCEPTS, CAUSES = "concepts", "causes"  # what explainers name: what was perturbed, or what is wrong
 REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
-    CONCEPTS: Registry("explainer", baselines, "EXPLAINERS", first=("gpca.explainers.gpca",)),
-    CAUSES: Registry("explainer", baselines.causes, "EXPLAINERS"),
+    CONCEPTS: Registry("explainer", "baselines", "EXPLAINERS", first=("gpca.explainers.gpca",)),
+    CAUSES: Registry("explainer", "baselines.causes", "EXPLAINERS"),
 }
 
 

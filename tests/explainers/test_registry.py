@@ -8,7 +8,7 @@ from gpca.code_files import ROOT
 
 def test_no_explainer_brings_a_slow_library_before_it_is_made():
     code = (
-        "import sys; from baselines.registry import CAUSES, CONCEPTS, explainer_entry;"
+        "import sys; from gpca.explainers.registry import CAUSES, CONCEPTS, explainer_entry;"
         "[explainer_entry('gpca', kind) for kind in (CAUSES, CONCEPTS)];"
         "print({'gpytorch', 'matplotlib', 'numba', 'open3d', 'shap', 'sklearn', 'torch'} & set(sys.modules))"
     )

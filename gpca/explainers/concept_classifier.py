@@ -9,6 +9,8 @@ from gpca.explainers.interface import ScoringExplainer
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
+PAPERS_RANDOM_STATE = 42  # of the forest and of the linear SVM in Table V
+
 
 class ConceptClassifier:
     """A classifier whose score columns are always the same labels, whichever of them its training rows hold.
