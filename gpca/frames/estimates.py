@@ -1,4 +1,4 @@
-"""What pose estimators said of frames: initial poses, and how far they are off where no estimator spoke of an object.
+"""Results of pose estimators: initial poses, and errors for objects that no estimator found.
 
 A pose error is ``T_true_estimated`` in the frame of the object's model: what takes the true pose to the estimated one.
 """
