@@ -26,7 +26,7 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.arguments import COUNT
 from gpca.process.provenance import record_provenance
-from gpca.reporting.figures.query import draw_query
+from gpca.reporting.figures.cloud_views import draw_query
 from gpca.settings import read_settings
 
 COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this one", "/quit": "stop here"}

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.comparison.published import TIMES, UNITS
-from gpca.comparison.sampling import Printed
 from gpca.comparison.values import Reproduced
-from gpca.comparison.verdicts import CLOSE, JUDGED, REPRODUCED, Tolerance, judged_once, verdict_of
+from gpca.comparison.verdicts import CLOSE, JUDGED, REPRODUCED, Printed, Tolerance, judged_once, verdict_of
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

@@ -8,9 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.comparison.published import Counterpart, Number
-from gpca.comparison.sampling import Printed
 from gpca.comparison.values import Reproduced, value_of_run
-from gpca.comparison.verdicts import CLOSE, NOT_COMPARABLE, NOT_REPRODUCED, REPRODUCED, Tolerance, distance, verdict_of
+from gpca.comparison.verdicts import (
+    CLOSE,
+    NOT_COMPARABLE,
+    NOT_REPRODUCED,
+    REPRODUCED,
+    Printed,
+    Tolerance,
+    distance,
+    verdict_of,
+)
 from gpca.io.csv_file import numbers as numbers_in
 from gpca.io.csv_file import read_csv
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from gpca.comparison.published import TIMES, Counterpart, Number
 from gpca.comparison.reasons import Reason, reason_of
-from gpca.comparison.sampling import Printed, printed_of
-from gpca.comparison.values import RUNTIME, Reproduced, value_of_run
+from gpca.comparison.values import RUNTIME, Reproduced, deviation_interval, value_of_run
 from gpca.errors import InputError
 from gpca.objects.title import STAND_IN, title_of
 from gpca.settings import NotNegative
@@ -46,6 +45,22 @@ class Tolerance:
         if not (1 if self.factor else 0) <= self.reproduced <= self.close:
             least = "1 <= reproduced <= close" if self.factor else "0 <= reproduced <= close"
             raise InputError("tolerance", f"{self.reproduced:g} and {self.close:g}", f"must satisfy {least}")
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A printed number, or the range from `value` to `upper`.
+
+    Attributes:
+        rounding: half of its last digit.
+        low, high: bounds of its 95 % interval; `value` and `upper` where its sampling error cannot be told.
+    """
+
+    value: float
+    upper: float
+    rounding: float
+    low: float
+    high: float
 
 
 def compare(
@@ -105,6 +120,34 @@ def compare(
             }
         )
     return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64"})
+
+
+def printed_of(number: Number, deviation: Number | None = None) -> Printed:
+    """Return the number with the interval that its sampling leaves.
+
+    A share of n samples has Wilson's interval, a standard deviation of n repeats that of its chi-square, a mean whose
+    standard deviation is printed Student's.
+
+    Args:
+        number: the printed one.
+        deviation: the printed standard deviation of the same repeats.
+    """
+    low, high = number.value, number.upper
+    if number.counterpart and number.counterpart.statistic == "deviation" and number.paper_n > 1:
+        low, high = deviation_interval(number.value, number.paper_n)
+    elif deviation and deviation.paper_n > 1:
+        from scipy.stats import t as student_t
+
+        half_width = student_t.ppf(0.975, deviation.paper_n - 1) * deviation.value / math.sqrt(deviation.paper_n)
+        low, high = number.value - half_width, number.upper + half_width
+    elif number.unit == "%" and number.paper_n:
+        from scipy.stats import binomtest
+
+        right = round(number.value / 100 * number.paper_n)
+        interval = binomtest(right, number.paper_n).proportion_ci(method="wilson")
+        # What is printed is rounded, and lies in its own interval nevertheless.
+        low, high = min(100 * interval.low, number.value), max(100 * interval.high, number.value)
+    return Printed(number.value, number.upper, number.rounding, float(low), float(high))
 
 
 def verdict_of(printed: Printed, found: Reproduced, tolerance: Tolerance) -> str:

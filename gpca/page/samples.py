@@ -12,10 +12,10 @@ from gpca.alignment.rigid import inverse
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
 from gpca.errors import InputError
+from gpca.experiments.method.shown_sample import observed_uncertainties, registration_error, state_of_error
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import thinned
-from gpca.reporting.pose_state import observed_uncertainties, registration_error, state_of_error
 
 if TYPE_CHECKING:
     import pandas as pd

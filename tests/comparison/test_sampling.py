@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from scipy.stats import chi2
 
-from gpca.comparison.sampling import printed_of
+from gpca.comparison.verdicts import printed_of
 
 from .made_up import ACCURACY, number
 

@@ -8,13 +8,13 @@ import pandas as pd
 import pytest
 
 from gpca.comparison.reasons import NONE_YET, Reason
-from gpca.comparison.sampling import Printed
 from gpca.comparison.values import Reproduced
 from gpca.comparison.verdicts import (
     COMPARISON_COLUMNS,
     ONE_REPEAT,
     TOO_WIDE,
     VERDICTS,
+    Printed,
     Tolerance,
     compare,
     counts,

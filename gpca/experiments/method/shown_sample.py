@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.alignment.pose_error import adds_error
 from gpca.alignment.rigid import inverse, transform
+from gpca.attribution.metrics import read_uncertainties
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
-from gpca.causes.truth import FAILED
+from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.method.concepts import severity_text
 from gpca.experiments.real_world.frame_views import draw_scores
@@ -21,7 +23,6 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.style import GREY, SMALL_PT, blues
-from gpca.reporting.pose_state import observed_uncertainties, registration_error, state_of_error
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -136,6 +137,33 @@ class Stages:
             return severity_text(self.registrations, row, str(self.registrations.concept[row]))
         uncertain = "" if np.isnan(self.u_S[row]) else f"\n$u$ = {self.u_S[row]:.1f} nats (clean: < {self.u_clean:.1f})"
         return f"{self.state(row)}, ADD-S {100 * self.error(row):.1f} % $d${uncertain}"
+
+
+def registration_error(registrations: Registrations, row: int) -> float:
+    """Return the ADD-S of a row's pose after ICP in diameters; of clouds this sparse it is about 0.01 at best."""
+    T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
+    return adds_error(transform(inverse(T_true), registrations.target(row)), T_icp, T_true)
+
+
+def state_of_error(error: float, limits: Limits) -> str:
+    """Return ``nominal``, ``borderline`` or ``failed`` by the limits of docs/causes.md, without the uncertainty's."""
+    if error < limits.nominal:
+        return NOMINAL
+    return FAILED if error > limits.failed else BORDERLINE
+
+
+def observed_uncertainties(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, float]:
+    """Return u (S,) of the registrations in nats, NaN where the file has none, and the limit of the clean ones.
+
+    Raises:
+        InputError: see :func:`gpca.attribution.metrics.read_uncertainties`; also a file without any of the samples.
+    """
+    observed, limit = read_uncertainties(path)
+    samples = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
+    u_S = observed.reindex(samples).to_numpy(float)
+    if np.isnan(u_S).all():
+        raise InputError(path, "its samples differ from those of the registrations", "regenerate both")
+    return u_S, limit
 
 
 def _median(rows: pd.DataFrame, concept: str) -> int:

@@ -4,7 +4,7 @@ import pytest
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.errors import InputError
 from gpca.experiments.active_learning.figure import STYLES, draw_learning_curves, mean_curves
-from gpca.reporting.figures.query import draw_query
+from gpca.reporting.figures.cloud_views import draw_query
 
 TITLES = {"random": "Random", "bald_kmeans": "BALD + k-means", "mine": "Mine"}
 SOURCES = {"ycb": "YCB (procedural stand-in)", "linemod": "LINEMOD"}
