@@ -7,23 +7,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.process.environment import require_open3d
+from gpca.process.environment import open3d_cloud, require_open3d
 
 RADIUS = 0.25  # diameters: five times the spacing of some 500 points on an object
 MOST_NEIGHBORS = 100
 
 
-def cloud_with_normals(points_N_3: np.ndarray, normals_N_3: np.ndarray) -> Any:
-    """Return Open3D's cloud of points and normals."""
-    o3d = require_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.asarray(points_N_3, np.float64)))
-    cloud.normals = o3d.utility.Vector3dVector(np.asarray(normals_N_3, np.float64))
-    return cloud
-
-
 def fpfh_of_pair(pair: Any, radius: float = RADIUS) -> tuple[list[Any], list[Any]]:
     """Return Open3D's clouds of a pair's source and target, and the features of each."""
-    clouds = [cloud_with_normals(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
+    clouds = [open3d_cloud(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
     return clouds, [fpfh(cloud, radius) for cloud in clouds]
 
 

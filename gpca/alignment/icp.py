@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.settings import Bounds, Count
 
 Method = Literal["point_to_point", "point_to_plane", "generalized"]
@@ -55,13 +56,11 @@ class ICP:
     def __init__(
         self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings, kernel: Any = None
     ) -> None:
-        from gpca.process.environment import require_open3d
-
         self._o3d = require_open3d()
         self._settings = settings
         if settings.method != "point_to_point" and target_normals is None:
             raise InputError(f"ICP method '{settings.method}'", "the target has no normals", "use point_to_point")
-        self._target = self._cloud(target, target_normals)
+        self._target = open3d_cloud(target, target_normals)
         registration = self._o3d.pipelines.registration
         self._estimation = {
             "point_to_point": registration.TransformationEstimationPointToPoint,
@@ -82,7 +81,7 @@ class ICP:
         if self._settings.method == "generalized":
             align = registration.registration_generalized_icp
         result = align(
-            self._cloud(source),
+            open3d_cloud(source),
             self._target,
             self._settings.correspondence_distance,
             T_target_source_init,
@@ -90,12 +89,6 @@ class ICP:
             self._criteria,
         )
         return Registration(np.array(result.transformation), result.fitness, result.inlier_rmse)
-
-    def _cloud(self, points: np.ndarray, normals: np.ndarray | None = None):
-        cloud = self._o3d.geometry.PointCloud(self._o3d.utility.Vector3dVector(np.asarray(points, np.float64)))
-        if normals is not None:
-            cloud.normals = self._o3d.utility.Vector3dVector(np.asarray(normals, np.float64))
-        return cloud
 
 
 def require_cloud(name: str, points: np.ndarray) -> None:

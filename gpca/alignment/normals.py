@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.process.environment import require_open3d
+from gpca.process.environment import open3d_cloud, require_open3d
 
 NEIGHBORS = 20  # as Open3D takes for the covariances of generalized ICP
 
@@ -15,9 +15,8 @@ def estimate_normals(points_N_3: np.ndarray, neighbours: int = NEIGHBORS) -> np.
     The neighbors leave the sign open. Away from the center is outward on a convex object, and elsewhere at least the
     same side in two clouds of one object.
     """
-    o3d = require_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.asarray(points_N_3, np.float64)))
-    cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(neighbours))
+    cloud = open3d_cloud(points_N_3)
+    cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(neighbours))
     normals_N_3 = np.array(cloud.normals)
     outward_N_3 = points_N_3 - points_N_3.mean(axis=0)
     inward_N = np.einsum("ni,ni->n", normals_N_3, outward_N_3) < 0

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
 from gpca.explainers.registry import explainers
+from gpca.reporting.registry import expand
 
 ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own
 ByRun = Callable[[Mapping[str, Any], Mapping[str, Mapping]], dict[str, Any]]  # of the config, and of its sources
@@ -36,6 +39,38 @@ class Names:
 EXPLAINERS = Names("explainer", explainers)
 
 
+@dataclass(frozen=True)
+class Tidy:
+    """A file of tidy numbers; what has a collector is collected from other files of the run by a rule of its own.
+
+    Attributes:
+        file: its name.
+        collector: ``module:function`` that returns its rows; empty where another rule of the experiment writes it.
+        files: the collector's arguments -> patterns of files below the folder of a run, with names in braces.
+        arguments: its other arguments -> keys of the config.
+        rule: name of the rule, if it is not that of the file.
+    """
+
+    file: str
+    collector: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
+    arguments: Mapping[str, str] = field(default_factory=dict)
+    rule: str = ""
+
+    @property
+    def target(self) -> str:
+        """The rule that collects it."""
+        return self.rule or self.file.removesuffix(".csv")
+
+    def inputs(self, names: Mapping[str, Any]) -> dict[str, list[str] | str]:
+        """Return the files that the collector is given, by argument."""
+        return {argument: expand((pattern,), names) for argument, pattern in self.files.items()}
+
+    def settings(self, config: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the collector's other arguments."""
+        return {argument: reduce(getitem, key.split("."), config) for argument, key in self.arguments.items()}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
     """The declaration of an experiment. Keys of the config are paths with dots, such as ``real_world.backbones``.
@@ -45,7 +80,7 @@ class Experiment:
         folder: of its code, where that is named otherwise.
         summary: files that its step reads -> those that it writes, in a line.
         sections: its sections of the config -> their types; every key has to be given.
-        tidy: its files of tidy numbers, which every run makes that has the experiment.
+        tidy: its files of numbers, which every run makes that has the experiment.
         needs: names that must not be empty, or a run does without it.
         names: what it adds to the names in the braces of paths (:func:`gpca.experiments.run.names_of`).
         shown: what it adds to what tables and figures are told (:func:`gpca.experiments.run.settings_of`).
@@ -60,7 +95,7 @@ class Experiment:
     folder: str = ""
     summary: str = ""
     sections: Mapping[str, Any] = field(default_factory=dict)
-    tidy: tuple[str, ...] = ()
+    tidy: tuple[Tidy, ...] = ()
     needs: tuple[str, ...] = ()
     names: ByRun = lambda config, sources: {}
     shown: ByRun = lambda config, sources: {}

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from gpca.alignment.rigid import inverse, random_direction, rigid_motion, rotate, transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import HalfTurn, Shift
+from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.settings import Count, PositiveShare
 
 Form = Literal["results", "true_pose", "global_registration"]
@@ -62,12 +63,10 @@ class GlobalRegistration:
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):
-        from gpca.process.environment import require_open3d
-
         self._o3d = require_open3d()
         self._settings = settings
         self._voxel_m = settings.voxel * diameter_m
-        self._model = self._features(self._cloud(points_m, normals))
+        self._model = self._features(open3d_cloud(points_m, normals))
 
     def register(self, points_m: np.ndarray, seed: int) -> np.ndarray:
         """Return ``T_camera_object`` of the measured points (P, 3), which are in the camera's frame.
@@ -75,8 +74,8 @@ class GlobalRegistration:
         The same seed gives the same pose where Open3D runs on one thread (``OMP_NUM_THREADS=1``).
         """
         o3d = self._o3d
-        registration = self._o3d.pipelines.registration
-        cloud = self._cloud(points_m)
+        registration = o3d.pipelines.registration
+        cloud = open3d_cloud(points_m)
         cloud.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(radius=2 * self._voxel_m, max_nn=30))
         cloud.orient_normals_towards_camera_location(np.zeros(3))
         (source, source_features), (model, model_features) = self._features(cloud), self._model
@@ -118,12 +117,6 @@ class GlobalRegistration:
             if share > best_share:
                 best, best_share = T_camera_object, share
         return best
-
-    def _cloud(self, points_m: np.ndarray, normals: np.ndarray | None = None):
-        cloud = self._o3d.geometry.PointCloud(self._o3d.utility.Vector3dVector(np.asarray(points_m, np.float64)))
-        if normals is not None:
-            cloud.normals = self._o3d.utility.Vector3dVector(np.asarray(normals, np.float64))
-        return cloud
 
     def _features(self, cloud):
         thinned = cloud.voxel_down_sample(self._voxel_m)

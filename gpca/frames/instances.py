@@ -7,11 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
-from gpca.frames.scene_files import require_camera
 from gpca.io.arrays import TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.files import MOST_PIXELS
 from gpca.seeds import generator
 
 MADE_BY = "python -m gpca instances"
@@ -96,11 +93,4 @@ class Instances:
         whole = len(offsets) == len(arrays["scene"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays["points_m"])
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
             raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", remedy)
-        pixels = arrays["pixels"]
-        if pixels.min() < 0 or np.prod(pixels.max(axis=0) + 1.0) > MOST_PIXELS:
-            raise InputError(path, "'pixels' lie outside any image", remedy)
-        for i in range(len(arrays["scene"])):
-            for name in ("T_camera_object_true", "T_camera_object_init"):
-                require_rigid(arrays[name][i], f"{path}: instance {i}, {name}")
-            require_camera(arrays["camera_3_3"][i], f"{path}: instance {i}, camera_3_3")
         return cls(**{name: arrays[name] for name in shapes})

@@ -19,28 +19,19 @@ FRAME_COLUMNS = (  # all that the file may hold
     *COLUMNS,
     *("concept", "scene", "image", "object", "symmetric", "init_from", "init_error", "icp_error", "lost_to"),
 )
-_TRUTH = {"True": True, "False": False}
 
 
 def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
-    """Read the columns that tell samples apart, as text but for `in_training`.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, `in_training` that is neither True nor False.
-    """
+    """Read the columns that tell samples apart, as text but for `in_training`."""
     rows = read_csv(path, COLUMNS, others=FRAME_COLUMNS)
-    rows["in_training"] = rows["in_training"].map(_TRUTH)
-    if rows["in_training"].isna().any():
-        raise InputError(path, "column 'in_training' contains values other than True and False", "regenerate it")
-    rows["in_training"] = rows["in_training"].astype(bool)
-    return rows
+    return rows.assign(in_training=rows["in_training"] == "True")
 
 
 def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndarray:
     """Return the instance (S,) that each registration shows.
 
     Raises:
-        InputError: as :func:`read_samples_of_frames` raises it, and for a file of other samples.
+        InputError: the file is of other samples.
     """
     rows = read_samples_of_frames(path)
     for name in ("sample", "split"):

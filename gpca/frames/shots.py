@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from gpca.alignment.rigid import inverse, rotate, transform
 from gpca.frames.bop import back_project
 from gpca.frames.camera import Camera
-from gpca.process.environment import require_open3d
+from gpca.process.environment import open3d_cloud
 
 NEIGHBORS, OUTLIER_RATIO = 20, 2.0  # Open3D's usual values for the removal of statistical outliers
 NEAR = 0.05  # diameters; a measured point that is so near lies on the model
@@ -76,9 +76,7 @@ def fuse(shots: Sequence[Shot], diameter_m: float, filtered: bool) -> np.ndarray
 
 def without_outliers(points: np.ndarray) -> np.ndarray:
     """Remove points that are far from their neighbors by the cloud's own measure (Rusu et al. 2008), by Open3D."""
-    o3d = require_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    _, rows = cloud.remove_statistical_outlier(NEIGHBORS, OUTLIER_RATIO)
+    _, rows = open3d_cloud(points).remove_statistical_outlier(NEIGHBORS, OUTLIER_RATIO)
     return points[np.asarray(rows)]
 
 

@@ -10,7 +10,6 @@ import os
 import shutil
 import stat
 import tarfile
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator
@@ -21,7 +20,7 @@ from pathlib import Path, PureWindowsPath
 from typing import IO, Any
 
 from gpca.errors import InputError
-from gpca.io.files import sha256_of_file, whole_file
+from gpca.io.files import sha256_of_file, whole_file, whole_folder
 from gpca.io.json_file import read_json
 from gpca.io.limits import LARGEST_FILE_BYTES, is_bounded, require_file
 
@@ -70,10 +69,9 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterat
 
 
 def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_BYTES) -> Path:
-    """Unpack an archive into a new folder, whole or not at all; of an existing folder, every file is checked.
+    """Unpack an archive into a folder, whole or not at all; where that was done before, every file is checked.
 
-    Beside the folder stands a list of its files with their SHA-256. Where the list is missing, it is made of the
-    archive, which stays what the folder has to agree with.
+    Beside the folder stands a list of its files with their SHA-256.
 
     Returns:
         The folder.
@@ -84,48 +82,32 @@ def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_BY
     """
     folder = Path(folder)
     listed = folder.with_name(f"{folder.name}.sha256.json")
-    if folder.is_dir():
-        if not listed.is_file():
-            with open_archive(path, largest_bytes) as members:
-                _write_list(listed, {member.name: _copy(member, len) for member in members})
+    if folder.is_dir() and listed.is_file():
         _require_listed(folder, listed)
         return folder
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".unpacking-") as temporary:
-        content = Path(temporary, "content")
-        content.mkdir()
-        with open_archive(path, largest_bytes) as members:
-            needed, free = sum(member.size for member in members), shutil.disk_usage(temporary).free
-            if needed > free:
-                found = f"unpacks to {needed / 1e9:.3g} GB, but {free / 1e9:.3g} GB of the disk are free"
-                raise InputError(path, found, f"free some space or keep downloads outside {folder.parent}")
-            _write_list(listed, {member.name: _write(member, content / member.name) for member in members})
-        os.replace(content, folder)
+    with open_archive(path, largest_bytes) as members, whole_folder(folder) as content:
+        needed, free = sum(member.size for member in members), shutil.disk_usage(content).free
+        if needed > free:
+            fault = f"unpacks to {needed / 1e9:.3g} GB, but {free / 1e9:.3g} GB of the disk are free"
+            raise InputError(path, fault, f"free some space or keep downloads outside {folder.parent}")
+        sha256_of = {os.path.normpath(member.name): _write(member, content / member.name) for member in members}
+    with whole_file(listed) as partial:
+        partial.write_text(json.dumps(sha256_of, indent=0))
     return folder
 
 
 def _write(member: Member, target: Path) -> str:
+    """Write a member, piece by piece, and return its SHA-256."""
+    digest = hashlib.sha256()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with target.open("wb") as file:
-            return _copy(member, file.write)
+        with _damage_named(member.archive), member.open() as stream, target.open("wb") as file:
+            while piece := stream.read(1 << 20):
+                digest.update(piece)
+                file.write(piece)
     except (FileExistsError, IsADirectoryError, NotADirectoryError) as fault:
         raise InputError(member.archive, f"member '{member.name}' is both a file and a folder", REMEDY) from fault
-
-
-def _copy(member: Member, write: Callable[[bytes], object]) -> str:
-    """Hand a member on, piece by piece, and return its SHA-256."""
-    digest = hashlib.sha256()
-    with _damage_named(member.archive), member.open() as stream:
-        while piece := stream.read(1 << 20):
-            digest.update(piece)
-            write(piece)
     return digest.hexdigest()
-
-
-def _write_list(path: Path, sha256_of: dict[str, str]) -> None:
-    with whole_file(path) as partial:
-        partial.write_text(json.dumps({os.path.normpath(name): sha256_of[name] for name in sha256_of}, indent=0))
 
 
 def _require_listed(folder: Path, listed: Path) -> None:

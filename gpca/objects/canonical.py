@@ -14,7 +14,7 @@ from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import is_name
 from gpca.objects.surface import Surface
-from gpca.process.environment import require_open3d
+from gpca.process.environment import open3d_cloud, require_open3d
 
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
@@ -163,9 +163,8 @@ def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tupl
 
 def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
     """Return unit normals (P, 3) by the nearest neighbors of points (P, 3), turned towards a camera at the origin."""
-    o3d = require_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
-    cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBORS))
+    cloud = open3d_cloud(points_m)
+    cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBORS))
     cloud.orient_normals_towards_camera_location(np.zeros(3))
     return np.asarray(cloud.normals)
 

@@ -8,6 +8,9 @@ from __future__ import annotations
 import re
 import sys
 from types import ModuleType
+from typing import Any
+
+import numpy as np
 
 from gpca.errors import InputError
 
@@ -46,6 +49,15 @@ def require_open3d() -> ModuleType:
         remedy = system_library_hint(str(fault)) or "run 'make environment', on Python 3.11 or 3.12"
         raise InputError("Open3D", f"cannot be imported ({fault})", remedy) from fault
     return open3d
+
+
+def open3d_cloud(points_N_3: np.ndarray, normals_N_3: np.ndarray | None = None) -> Any:
+    """Return Open3D's cloud of points, with normals where they are given."""
+    o3d = require_open3d()
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.asarray(points_N_3, np.float64)))
+    if normals_N_3 is not None:
+        cloud.normals = o3d.utility.Vector3dVector(np.asarray(normals_N_3, np.float64))
+    return cloud
 
 
 def check() -> None:

@@ -97,7 +97,7 @@ class Result:
     def files(self, names: Names) -> dict[str, list[str] | str]:
         """Return the files of each input, a path where there can be but one; see :func:`input_name` for the keys."""
         return {
-            input_name(given.argument, keyword): _expand(patterns, self._shown(names))
+            input_name(given.argument, keyword): expand(patterns, self._shown(names))
             for given in self.inputs
             for keyword, patterns in given.files.items()
         }
@@ -187,6 +187,17 @@ def input_name(argument: str, keyword: str) -> str:
     return f"{argument}_{keyword}" if keyword else argument
 
 
+def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
+    """Return the files of all combinations of the names in braces; a path where none of these is listed."""
+    files = []
+    listed = [name for name in _braced(patterns) if not isinstance(names[name], str)]
+    for pattern in patterns:
+        in_pattern = [name for name in _braced([pattern]) if name in listed]
+        for values in product(*(names[name] for name in in_pattern)):
+            files.append(pattern.format(**{**names, **dict(zip(in_pattern, values, strict=True))}))
+    return files if listed or len(patterns) > 1 else files[0]
+
+
 def build(builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any], arguments: Mapping[str, Any]) -> Any:
     """Read the inputs and call the builder.
 
@@ -232,17 +243,6 @@ def _input(argument: str, given: str | Mapping) -> Input:
     of_key = files if isinstance(files, Mapping) else {"": files}
     patterns = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in of_key.items()}
     return Input(argument, patterns, given.get("read", ""))
-
-
-def _expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
-    """Return the files of all combinations of the listed names; a path where nothing is listed."""
-    files = []
-    listed = [name for name in _braced(patterns) if not isinstance(names[name], str)]
-    for pattern in patterns:
-        in_pattern = [name for name in _braced([pattern]) if name in listed]
-        for values in product(*(names[name] for name in in_pattern)):
-            files.append(pattern.format(**{**names, **dict(zip(in_pattern, values, strict=True))}))
-    return files if listed or len(patterns) > 1 else files[0]
 
 
 def _braced(patterns: Iterable[str]) -> list[str]:

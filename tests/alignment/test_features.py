@@ -1,21 +1,22 @@
 import numpy as np
 
-from gpca.alignment.features import cloud_with_normals, fpfh, mutual_matches
+from gpca.alignment.features import fpfh, mutual_matches
 from gpca.alignment.rigid import rotate, transform
 from gpca.alignment.twist import exp
+from gpca.process.environment import open3d_cloud
 
 from .methods.pairs import clouds
 
 
 def test_features_move_with_the_cloud_and_matches_are_each_others_nearest(objects):
     source, target, source_normals, target_normals = clouds(objects, 0)
-    features = fpfh(cloud_with_normals(source, source_normals)).data
+    features = fpfh(open3d_cloud(source, source_normals)).data
     assert features.shape == (33, len(source))
     T = exp(np.array([[0.5, -1.0, 2.0, 3.0, 2.0, 1.0]]))[0]
-    moved = fpfh(cloud_with_normals(transform(T, source), rotate(T, source_normals))).data
+    moved = fpfh(open3d_cloud(transform(T, source), rotate(T, source_normals))).data
     assert np.abs(moved - features).max() < 0.1 * np.abs(features).max()
 
-    others = fpfh(cloud_with_normals(target, target_normals)).data
+    others = fpfh(open3d_cloud(target, target_normals)).data
     distance = np.linalg.norm(features.T[:, None] - others.T, axis=2)
     rows = mutual_matches(features.T, others.T, 1000)
     assert 10 < len(rows) < len(source)

@@ -12,11 +12,7 @@ SETTINGS = {
     "downwards": ({"objects": [5, 2]}, "scenes objects: [5, 2] is in descending order"),
     "a family that is none": ({"families": ["spoons"]}, "family 'spoons': no such procedural family"),
     "no family": ({"families": []}, "families"),
-    "no scene": ({"count": 0}, "count"),
     "a camera without pixels": ({"camera": {"width": 0}}, "camera.width"),
-    "negative focal length": ({"camera": {"focal_px": -570}}, "camera.focal_px"),
-    "too near": ({"distance_m": [0, 1]}, "distance_m"),
-    "noise without end": ({"noise": {"scale": 1e9}}, "noise.scale"),
     "unknown": ({"lamps": 3}, "lamps: unknown"),
 }
 

@@ -45,31 +45,23 @@ def flipped(path):
 
 IMAGES = {
     "depth of 8 bits": (DEPTH, lambda p: save(p, (FLAT / 30).astype(np.uint8)), "is 8-bit depth: 16 bits expected"),
-    "depth of 1 bit": (DEPTH, lambda p: save(p, FLAT > 0), "is 8-bit depth: 16 bits expected"),
     "depth of a palette": (
         DEPTH, lambda p: Image.fromarray(COLOURS).quantize(16).save(p), "is 8-bit depth: 16 bits expected"
     ),
     "depth of colours": (DEPTH, lambda p: save(p, COLOURS), "is a color image, not depth"),
-    "depth with opacity": (DEPTH, lambda p: Image.new("LA", SHAPE[::-1]).save(p), "is a color image, not depth"),
-    "depth as JPEG": (DEPTH, lambda p: Image.fromarray(COLOURS[..., 0]).save(p, "JPEG"), "is 8-bit depth"),
     "no depth anywhere": (DEPTH, lambda p: save(p, 0 * FLAT), "has no depth: every pixel is 0"),
     "NaN depth": (DEPTH, as_tiff(np.full(SHAPE, np.nan, np.float32)), "has no depth: every pixel is 0"),
     "negative depth": (DEPTH, as_tiff(np.full(SHAPE, -0.7, np.float32)), "contains negative or infinite depth"),
     "infinite depth": (DEPTH, as_tiff(np.full(SHAPE, np.inf, np.float32)), "contains negative or infinite depth"),
     "depth cut": (DEPTH, halves, "is truncated or not a readable image"),
-    "depth empty": (DEPTH, lambda p: p.write_bytes(b""), "is empty"),
     "depth a flipped byte": (DEPTH, flipped, "is truncated or not a readable image"),
     "depth a script": (DEPTH, postscript, "is truncated or not a readable image"),
-    "depth a GIF": (DEPTH, lambda p: Image.fromarray(COLOURS).save(p, "GIF"), "is truncated or not a readable image"),
     "depth a bomb": (DEPTH, bomb(8500), "too many for a frame"),
     "depth turned": (DEPTH, lambda p: save(p, FLAT.T), "is 160×120 but depth is 120×160"),
     "mask small": (MASK, lambda p: save(p, np.full((60, 80), 255, np.uint8)), "is 80×60 but depth is 160×120"),
-    "depth a larger bomb": (DEPTH, bomb(9500), "too many for a frame"),
     "mask a bomb": (MASK, bomb(13_500, "L"), "too many for a frame"),
-    "mask cut": (MASK, halves, "is truncated or not a readable image"),
     "mask of text": (MASK, lambda p: p.write_text("255"), "is truncated or not a readable image"),
     "mask a picture": (MASK, lambda p: save(p, COLOURS), "is not a mask: most of its pixel values differ"),
-    "mask of depth": (MASK, lambda p: save(p, np.arange(19200, dtype=np.uint16).reshape(SHAPE)), "is not a mask"),
     "mask everywhere": (MASK, lambda p: save(p, np.full(SHAPE, 255, np.uint8)), "lie", "check its pose, mask"),
 }  # fmt: skip
 
@@ -181,36 +173,23 @@ def other_image(folder):
 METRES, CENTIMETRES = "is cam_t_m2c in meters? the format requires millimeters", "is cam_t_m2c in centimeters?"
 PLACES = {
     "t in metres": (of_all(scaled(1e-3)), METRES),
-    "one t in metres": (of_one(scaled(1e-3)), METRES),
     "t in centimetres": (of_all(scaled(0.1)), CENTIMETRES),
     "one t in micrometres": (of_one(scaled(1e3)), "is cam_t_m2c in micrometers?"),
     "one t of zeros": (of_one(scaled(0)), "check its pose, mask, cam_K and depth_scale"),
-    "one t mirrored": (of_one(scaled(-1)), ""),
     "one t beside": (of_one(moved), "check its pose"),
     "R by columns": (of_all(turned), "is cam_R_m2c listed by columns? the format requires rows"),
     "OpenGL": (of_all(to_opengl), "camera axes OpenGL's?"),
     "camera to model": (of_all(inverted), "is the pose from camera to model?"),
-    "half the scale": (
-        with_camera(depth_scale(0.5)),
-        "is depth_scale wrong? the depth fits when it is 2 times as large",
-    ),
     "twice the scale": (
         with_camera(depth_scale(2)),
         "is depth_scale wrong? the depth fits when it is 0.5 times as large",
-    ),
-    "tenfold scale": (
-        with_camera(depth_scale(10)),
-        "is depth_scale wrong? the depth fits when it is 0.1 times as large",
     ),
     "scale in metres": (
         with_camera(depth_scale(1e-3)),
         "is depth_scale wrong? the depth fits when it is 1000 times as large",
     ),
-    "no centre": (with_camera(corner), "check its pose, mask, cam_K"),
     "centre outside": (with_camera(outside), "check its pose, mask, cam_K"),
-    "too long a lens": (with_camera(long), "check its pose, mask, cam_K"),
     "a lens a tenth too long": (with_camera(focal_length(1.1)), "focal lengths are about 0.9 times as long"),
-    "a lens a tenth too short": (with_camera(focal_length(1 / 1.1)), "focal lengths are about 1.1 times as long"),
     "30 mm beside": (of_all(beside), "above the limit of 3 % or 4 mm, whichever is more; check cam_R_m2c"),
     "R left out": (of_all(untold), "every cam_R_m2c is the identity: fill in the rotations"),
     "images mirrored": (flip, "is the image mirrored?"),

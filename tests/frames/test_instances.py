@@ -5,6 +5,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.frames.instances import Instances
+from gpca.frames.plausibility import require_of_objects
 from gpca.io.arrays import save_arrays
 
 
@@ -50,22 +51,37 @@ def test_instances_survive_their_file(tiny, tmp_path):
         assert np.array_equal(getattr(loaded, field.name), getattr(instances, field.name))
 
 
+def save(tiny, path, **changes):
+    arrays = {field.name: getattr(tiny[0], field.name) for field in fields(Instances)}
+    save_arrays(path, arrays | {name: change(arrays[name]) for name, change in changes.items()}, ("tiny", None))
+
+
 @pytest.mark.parametrize(
-    ("spoilt", "expected"),
+    ("name", "change", "expected"),
     [
-        ({"offsets": lambda a: a[:-1]}, "'offsets' do not match"),
-        ({"points_m": lambda a: np.full_like(a, np.nan)}, "'points_m' contains NaN"),
-        ({"T_camera_object_init": lambda a: a[:, :3]}, "'T_camera_object_init' is"),
-        ({"colour": None}, "'colour' is missing"),
+        ("offsets", lambda a: a[:-1], "'offsets' do not match"),
+        ("offsets", lambda a: a[::-1], "'offsets' do not match"),
+        ("points_m", lambda a: np.full_like(a, np.nan), "'points_m' contains NaN"),
+        ("T_camera_object_init", lambda a: a[:, :3], "'T_camera_object_init' is"),
+        ("symmetric", lambda a: a.astype(str), "array 'symmetric' has type <U"),
     ],
 )
-def test_a_faulty_file_is_refused(tiny, tmp_path, spoilt, expected):
-    arrays = {field.name: getattr(tiny[0], field.name) for field in fields(Instances)}
-    for name, change in spoilt.items():
-        if change is None:
-            del arrays[name]
-        else:
-            arrays[name] = change(arrays[name])
-    save_arrays(tmp_path / "instances.npz", arrays)
+def test_a_faulty_file_is_refused(tiny, tmp_path, name, change, expected):
+    save(tiny, tmp_path / "instances.npz", **{name: change})
     with pytest.raises(InputError, match=expected):
         Instances.load(tmp_path / "instances.npz")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "expected"),
+    [
+        ("object_index", lambda a: a + 99, "objects that the object file does not contain"),
+        ("object_index", lambda a: a - 99, "objects that the object file does not contain"),
+        ("points_m", lambda a: 1000 * a, "was measured"),
+        ("T_camera_object_true", lambda a: np.broadcast_to(a[0], a.shape), "was measured"),
+    ],
+)
+def test_instances_of_other_objects_are_refused(tiny, name, change, expected):
+    changed = changed_columns(tiny[0], {name: change(getattr(tiny[0], name))})
+    with pytest.raises(InputError, match=expected):
+        require_of_objects(changed, tiny[1], "instances.npz")

@@ -7,7 +7,7 @@ import pytest
 
 from gpca.io.files import whole_file, whole_folder
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_file_appears_whole_under_its_name_and_makes_its_folder(tmp_path):

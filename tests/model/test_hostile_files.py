@@ -1,4 +1,4 @@
-"""Model and weight files that are damaged, or no such files, through ``explain`` and ``embed``."""
+"""Model files that are damaged, or no such files, through ``explain``."""
 
 import zipfile
 
@@ -10,7 +10,7 @@ from gpca.errors import InputError
 from gpca.model.file import Model
 
 from ..hostile import refusal
-from .spoiled import EXPLAIN, NAN
+from .spoiled import EXPLAIN
 
 
 def members(path, change):
@@ -97,58 +97,3 @@ def test_a_flipped_bit_anywhere_is_found_or_harmless(saved, tmp_path):
         for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in", "concepts"):
             assert getattr(loaded, name) == getattr(expected, name)
     assert found > 200
-
-
-SETTINGS = '{"draw_points": 64, "draws": 2, "options": {"k": 8, "point_features": 16}}'
-EMBED = ["embed", "--source", "tiny", "--seed", 0, "--registrations", "registrations.npz", "--registration-timings",
-         "seconds.csv", "--encoder", "weights.pt", "--out", "new.npz", "--timings", "new.csv",
-         "--settings", SETTINGS]  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def trained(registrations, tmp_path_factory):
-    from gpca.encoders.settings import EncoderSettings
-    from gpca.encoders.training import make_model
-    from gpca.encoders.weights import write_weights
-
-    folder = tmp_path_factory.mktemp("trained")
-    registrations.save(folder / "registrations.npz")
-    rows = zip(registrations.sample, registrations.split, strict=True)
-    lines = [f"{sample},{split},0.5,0.5" for sample, split in rows]
-    (folder / "seconds.csv").write_text("\n".join(["sample,split,seconds,icp_seconds", *lines, ""]))
-    settings = EncoderSettings(draw_points=64, draws=2, options={"k": 8, "point_features": 16})
-    write_weights(folder / "weights.pt", make_model(settings), registrations.axes)
-    return folder
-
-
-def of_weights(spoil):
-    def change(path):
-        content = torch.load(path, weights_only=True)
-        spoil(content["weights"])
-        torch.save(content, path)
-
-    return change
-
-
-def flip_middle(path):
-    path.write_bytes(flip(path.read_bytes(), path.stat().st_size // 2))
-
-
-WEIGHTS = {
-    **{name: FILES[name] for name in FILES if name != "a member that is gone"},
-    "NaN": of_weights(lambda state: state["head.weight"].fill_(NAN)),
-    "huge": of_weights(lambda state: state["head.weight"].fill_(1e30)),
-    "another head": of_weights(lambda state: state.update({"head.weight": torch.zeros(7, 32)})),
-    "no head": of_weights(lambda state: state.pop("head.bias")),
-    "more": of_weights(lambda state: state.update({"more": torch.zeros(1)})),
-    "numbers": of_weights(lambda state: state.update({"head.bias": 7})),
-    "a flipped bit": flip_middle,
-}
-
-
-@pytest.mark.parametrize("fault", WEIGHTS)
-def test_weights_that_cannot_be_are_refused(fault, trained, tmp_path):
-    for name in ("registrations.npz", "seconds.csv", "weights.pt"):
-        (tmp_path / name).write_bytes((trained / name).read_bytes())
-    WEIGHTS[fault](tmp_path / "weights.pt")
-    refusal(EMBED, tmp_path, "weights.pt", "python -m gpca train")

@@ -81,41 +81,30 @@ MESHES = {
     # rows that are too wide: the coordinates would be others
     "every_wide.ply": ply([f"1051 {row}" for row in VERTICES]),
     "one_wide.ply": ply(changed(VERTICES, f"1051 {VERTICES[5]}")),
-    "tail.ply": ply([f"{row} 7" for row in VERTICES]),
-    "narrow.ply": ply(changed(VERTICES, "1 2")),
     "words.ply": ply(changed(VERTICES, "1 2 x")),
-    "wide_face.ply": ply(faces=[f"{row} 9" for row in FACES]),
     "list_too_long.ply": ply(faces=changed(FACES, "4 1 2 3")),
     "two_corners.ply": ply(faces=changed(FACES, "2 1 2")),
-    "half_corner.ply": ply(faces=changed(FACES, "3 1.5 2 3")),
     "negative_corner.ply": ply(faces=changed(FACES, "3 1 2 -1")),
     "far_corner.ply": ply(faces=changed(FACES, "3 1 2 162")),
     # counts
     "more_rows.ply": ply(n_faces=len(FACES) - 5),
     "fewer_rows.ply": ply(n_faces=len(FACES) + 5),
-    "moved_counts.ply": ply(n_vertices=len(VERTICES) - 10, n_faces=len(FACES) + 10),
     "negative_count.ply": ply(n_vertices=-5),
     "huge_count.ply": ply(n_vertices=10**15),
-    "no_count.ply": ply(n_vertices="many"),
     "no_vertices.ply": ply([], []),
     "two_axes.ply": ply([row.rsplit(" ", 1)[0] for row in VERTICES], properties=XYZ.replace("property float z\n", "")),
     "no_end.ply": ply()[:100],
-    "empty.ply": "",
     "vertices_twice.ply": ply().replace("element face", f"element vertex {len(VERTICES)}\n{XYZ}element face"),
     "x_twice.ply": ply([f"{row} 1" for row in VERTICES], properties=f"{XYZ}property float x\n"),
     "property_of_nothing.ply": ply().replace("element vertex", "property float x\nelement vertex"),
-    "no_name.ply": ply().replace("element face", "element"),
     "middle_endian.ply": binary(lambda content, start: write(content, 0, content[:40].replace(b"little", b"middle"))),
     "no_format.ply": binary(lambda content, start: write(content, 4, b"comment")),
     "two_corners_binary.ply": cornered(2),
-    "zeros.ply": "\0" * 3_000_000,
     # numbers
     "nan.ply": ply(changed(VERTICES, "nan 0 0")),
     "infinite.ply": ply(changed(VERTICES, "1e39 0 0")),
     "huge.ply": ply([f"{row}e30" for row in VERTICES]),
     "one_point.ply": ply(["1 2 3"] * len(VERTICES)),
-    "line.ply": ply([f"{i} 0 0" for i in range(len(VERTICES))]),
-    "binary_nan.ply": binary(lambda content, start: write(content, start, NAN)),
     "binary_count.ply": binary(lambda content, start: write(content, 0, content[:start].replace(b" 162", b" 163"))),
     "binary_list.ply": binary(lambda content, start: write(content, len(content) + LAST_LIST, b"\x04")),
     "binary_corner.ply": binary(lambda content, start: write(content, len(content) - 4, b"\xff\xff\xff\x7f")),
@@ -123,26 +112,18 @@ MESHES = {
     # OFF
     "every_wide.off": off([f"1051 {row}" for row in VERTICES]),
     "two_corners.off": off(faces=changed(FACES, "2 1 2")),
-    "zeros.off": "\0" * 3_000_000,
-    "narrow.off": off(changed(VERTICES, "1 2")),
     "list_too_long.off": off(faces=changed(FACES, "5 1 2 3")),
     "more_rows.off": off(faces=[*FACES, *FACES]),
     "cut.off": off(faces=FACES[:-1]),
     "nan.off": off(changed(VERTICES, "nan 0 0")),
-    "no_counts.off": "OFF\n",
     "not.off": off(head="ABC"),
     # OBJ
     "index_0.obj": obj(faces=BALL.faces),
     "cut_between_faces.obj": obj(faces=BALL.faces[:160] + 1),
-    "cut_within_a_face.obj": obj(faces=[*(BALL.faces[:300] + 1), [12]]),
     "far_corner.obj": obj(faces=[*(BALL.faces + 1), [1, 2, 163]]),
-    "far_back.obj": obj(faces=[*(BALL.faces + 1), [1, 2, -163]]),
     "counts_back.obj": obj(faces=BALL.faces - 162) + "v 1 2 3\n",
     "weights.obj": obj([f"1051 {row}" for row in VERTICES]),
-    "narrow.obj": obj(changed(VERTICES, "1 2")),
-    "nan.obj": obj(changed(VERTICES, "nan 0 0")),
     "zeros.obj": "\0" * 3_000_000,
-    "half_corner.obj": obj(faces=[*(BALL.faces + 1), [1, 2, 3.5]]),
     # STL
     "cut.stl": stl_text()[:4000],
     "cut_between_faces.stl": "\n".join(stl_text().splitlines()[:351]),
@@ -152,8 +133,6 @@ MESHES = {
     "binary_cut.stl": stl(lambda content: content.__delitem__(slice(84 + 2000, None))),
     "misspelled_vertex.stl": stl_text().replace("vertex", "vertx"),
     "misspelled_normal.stl": stl_text().replace("facet normal", "facet norml", 1),
-    "misspelled_loop.stl": stl_text().replace("outer loop", "outter loop"),
-    "misspelled_end.stl": stl_text().replace("endfacet", "endfacets"),
     "two_vertices.stl": re.sub("vertex .*\n", "", stl_text(), count=1),
     "two_numbers.stl": re.sub(r"(vertex \S+ \S+) \S+", r"\1", stl_text(), count=1),
     "no_end.stl": stl_text().replace("endsolid", ""),
@@ -164,13 +143,25 @@ CLOUDS = {
     "empty.pcd": pcd(()),
     "two_columns.pcd": pcd(FIELDS="x y", SIZE="4 4", TYPE="F F", COUNT="1 1"),
     "nan.pcd": pcd(("nan 0 0",) * 70),
-    "infinite.pcd": pcd(("0 0 inf",) * 70),
     "complex.pcd": pcd(("1+2j 0 0",) * 70),
     "huge_count.pcd": pcd(COUNT="1 1 99999999999"),
-    "huge_field.pcd": pcd(FIELDS="x y z w", SIZE="4 4 4 4", TYPE="F F F F", COUNT="1 1 1 99999999999"),
     "huge_width.pcd": pcd(WIDTH=10**15, POINTS=10**15),
     "bomb.pcd": compressed(6 * 10**7),
     "longer_than_said.pcd": compressed(70),
+}
+
+FAULTS = {
+    "middle_endian.ply": "its format 'binary_middle_endian' is unknown",
+    "no_format.ply": "its format '' is unknown",
+    "vertices_twice.ply": "declares element vertex twice",
+    "x_twice.ply": "declares property 'x' twice",
+    "two_corners.ply": f"row 6 of {len(FACES)} of element face has 2 corners",
+    "two_corners_binary.ply": "element face has rows of 2 corners",
+    "two_corners.off": f"face 6 of {len(FACES)} has 2 corners",
+    "misspelled_vertex.stl": "line 4: 'vertx' stands where 'vertex' should",
+    "misspelled_normal.stl": "line 2: 'facet norml' stands where 'facet normal' should",
+    "two_numbers.stl": "line 4: 'vertex' has 2 numbers",
+    "zeros.obj": "a line is longer than 1048576 bytes, so it is not text",
 }
 
 
@@ -183,7 +174,7 @@ def arguments(kind, **options):
 def test_a_mesh_that_is_not_what_it_says_is_refused(name, tmp_path):
     content = MESHES[name]
     (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    refusal(arguments("mesh_folder"), tmp_path, name.split(".")[0])
+    refusal(arguments("mesh_folder"), tmp_path, name.split(".")[0], FAULTS.get(name, ""))
 
 
 @pytest.mark.parametrize("name", CLOUDS)
@@ -207,28 +198,6 @@ def test_more_text_than_can_be_parsed_is_not_read(name, tmp_path):
         file.truncate(9 * 10**8)
     line = refusal(arguments("mesh_folder"), tmp_path, name, "has 900 MB of text, more than the limit of 250 MB")
     assert "truncated" not in line
-
-
-FAULTS = {
-    "middle_endian.ply": "its format 'binary_middle_endian' is unknown",
-    "no_format.ply": "its format '' is unknown",
-    "vertices_twice.ply": "declares element vertex twice",
-    "x_twice.ply": "declares property 'x' twice",
-    "two_corners.ply": f"row 6 of {len(FACES)} of element face has 2 corners",
-    "two_corners_binary.ply": "element face has rows of 2 corners",
-    "two_corners.off": f"face 6 of {len(FACES)} has 2 corners",
-    "misspelled_vertex.stl": "line 4: 'vertx' stands where 'vertex' should",
-    "misspelled_normal.stl": "line 2: 'facet norml' stands where 'facet normal' should",
-    "two_numbers.stl": "line 4: 'vertex' has 2 numbers",
-    "zeros.obj": "a line is longer than 1048576 bytes, so it is not text",
-}
-
-
-@pytest.mark.parametrize("name", FAULTS)
-def test_the_line_names_the_fault(name, tmp_path):
-    content = MESHES[name]
-    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    refusal(arguments("mesh_folder"), tmp_path, name, FAULTS[name])
 
 
 @pytest.mark.parametrize("points", [0, 63, -5])

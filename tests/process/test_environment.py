@@ -7,7 +7,7 @@ import pytest
 
 from gpca.process.environment import require_open3d, system_library_hint
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize(

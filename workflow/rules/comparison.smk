@@ -7,7 +7,7 @@ from gpca.comparison.published import read_published
 from gpca.experiments.registry import experiments
 
 COLLECTED = [
-    name for each in experiments() if each.is_run(NAMES) for name in each.tidy
+    tidy.file for each in experiments() if each.is_run(NAMES) for tidy in each.tidy
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

@@ -10,7 +10,7 @@ from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.encoders.settings import EncoderChanges, require_draws
 from gpca.errors import require_names
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.pairs.perturbation import Concept
 from gpca.settings import Count, Distinct, OpenShare, PositiveShare
 
@@ -58,7 +58,14 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 EXPERIMENT = Experiment(
     name="active_learning",
     sections={"active_learning": Section},
-    tidy=("active_learning.csv",),
+    tidy=(
+        Tidy(
+            "active_learning.csv",
+            "gpca.active_learning.metrics:collect_curves",
+            {"files": "active_learning/{source}/{strategy}/seed{seed}.csv"},
+            {"target": "active_learning.target"},
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

@@ -8,7 +8,7 @@ from typing import Any
 
 from gpca.errors import InputError, with_key
 from gpca.experiments.controls.settings import TRANSFER, UNSEEN, ControlSettings
-from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
+from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Tidy
 from gpca.experiments.explained import require_explained, titles
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
@@ -59,10 +59,25 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
     }
 
 
+CONTROLLED = "controls/{source}/seed{control_seed}.csv"
 EXPERIMENT = Experiment(
     name="controls",
     sections={"controls": Section},
-    tidy=("controls.csv",),
+    tidy=(
+        Tidy(
+            "controls.csv",
+            "gpca.experiments.controls.metrics:collect",
+            {"prediction_files": CONTROLLED},
+            rule="control_metrics",
+        ),
+        Tidy("control_intervals.csv", "gpca.experiments.controls.intervals:collect", {"prediction_files": CONTROLLED}),
+        Tidy(
+            "control_severities.csv",
+            "gpca.experiments.controls.severity:collect",
+            {"prediction_files": CONTROLLED, "sample_files": "control_samples/{source}/seed{control_seed}.csv"},
+            {"severities": "registrations.severities", "bins": "controls.bins", "success": "controls.success"},
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from gpca.encoders.registry import require_backbone
 from gpca.encoders.settings import NamedEncoder, require_draws
 from gpca.errors import with_key
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.features.settings import DescriptorSettings
 from gpca.settings import part_of
@@ -44,8 +44,16 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     return {"cause_explainers": titles}
 
 
+DIAGNOSED = {
+    "prediction_files": "diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
+    "causes_files": "causes/{source}/seed{seed}.npz",
+}
 EXPERIMENT = Experiment(
     name="diagnosis",
+    tidy=(
+        Tidy("causes.csv", "gpca.experiments.diagnosis.metrics:collect", DIAGNOSED, rule="cause_metrics"),
+        Tidy("cause_intervals.csv", "gpca.experiments.diagnosis.intervals:collect", DIAGNOSED),
+    ),
     sections={"diagnosis": Section},
     names=names,
     shown=shown,

@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 from gpca.alignment.methods.registry import method_entry, methods, require_local
 from gpca.errors import InputError, with_key
+from gpca.experiments.estimators.covariances import REFERENCE
 from gpca.experiments.estimators.settings import EstimatorPairSettings
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.settings import part_of
 from gpca.uncertainty.estimators.registry import estimator_entry, estimators, require_estimator_settings
 
@@ -24,8 +25,9 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the estimators."""
-    return {"estimator": list(config["estimators"])}
+    """Return the estimators, and with the reference before them those that have files of estimates."""
+    compared = list(config["estimators"])
+    return {"estimator": compared, "estimate": [REFERENCE, *compared]}
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -40,7 +42,14 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 EXPERIMENT = Experiment(
     name="estimators",
     sections={"estimators": ByName, "estimator_pairs": Annotated[dict, part_of(EstimatorPairSettings)]},
-    tidy=("estimators.csv",),
+    tidy=(
+        Tidy(
+            "estimators.csv",
+            "gpca.experiments.estimators.calibration:collect_estimates",
+            {"files": "estimates/{source}/{estimate}/seed{seed}.csv"},
+            rule="estimator_metrics",
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gpca.experiments.experiment import Experiment
+from gpca.experiments.experiment import Experiment, Tidy
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -13,4 +13,18 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     return {"frame_cause_seed": list(config["seeds"])[: config["real_world"]["causes"]["seeds"]]}
 
 
-EXPERIMENT = Experiment(name="frame_causes", names=names)
+EXPERIMENT = Experiment(
+    name="frame_causes",
+    tidy=(
+        Tidy(
+            "frame_causes.csv",
+            "gpca.experiments.frame_causes.metrics:collect",
+            {
+                "causes_files": "frame_causes/seed{frame_cause_seed}.npz",
+                "sample_files": "frame_causes/seed{frame_cause_seed}.csv",
+                "prediction_files": "frame_diagnoses/seed{frame_cause_seed}.csv",
+            },
+        ),
+    ),
+    names=names,
+)

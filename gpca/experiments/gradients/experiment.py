@@ -8,7 +8,7 @@ from typing import Any
 from gpca.encoders.registry import DIFFERENTIABLE
 from gpca.encoders.settings import DGCNNOptions, EncoderSettings
 from gpca.errors import InputError
-from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.gradients.settings import GradientSettings
 
 
@@ -33,7 +33,17 @@ EXPERIMENT = Experiment(
     name="gradients",
     summary="registrations, encoder and embeddings -> what GP-CA's scores respond to: saliency maps and TCAV",
     sections={"gradients": GradientSettings},
-    tidy=("gradients.csv",),
+    tidy=(
+        Tidy(
+            "gradients.csv",
+            "gpca.experiments.gradients.metrics:collect",
+            {
+                "deletion_files": "saliency/{gradient_source}/seed{seed}.csv",
+                "tcav_files": "tcav/{gradient_source}/seed{seed}.csv",
+            },
+            rule="gradient_metrics",
+        ),
+    ),
     needs=("gradient_source",),
     names=names,
     shown=lambda config, _sources: {"gradients": config["gradients"]},

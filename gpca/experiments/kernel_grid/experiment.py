@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gpca.errors import require_names
-from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.kernel_grid.grid import KernelGrid
 from gpca.experiments.kernel_grid.tables import PRINTED
 from gpca.objects.title import title_of
@@ -55,7 +55,13 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="kernel_grid",
     sections={"kernel_grid": Section},
-    tidy=("kernels.csv",),
+    tidy=(
+        Tidy(
+            "kernels.csv",
+            "gpca.experiments.kernel_grid.grid:collect_grids",
+            {"files": "kernels/{kernel_source}/seed{seed}.csv"},
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

@@ -8,7 +8,7 @@ from typing import Any
 
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, NewConceptSettings
 from gpca.encoders.settings import EncoderChanges, require_draws
-from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,14 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="new_concepts",
     sections={"new_concepts": Section},
-    tidy=("new_concepts.csv",),
+    tidy=(
+        Tidy(
+            "new_concepts.csv",
+            "gpca.active_learning.metrics:collect_curves",
+            {"files": "new_concepts/{source}/{new_concept_strategy}/seed{new_concept_seed}.csv"},
+            {"target": "active_learning.target"},
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from gpca.encoders.settings import EncoderChanges, require_draws
 from gpca.errors import InputError, with_key
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import require_explained
 from gpca.experiments.out_of_distribution.settings import ShiftSettings
 from gpca.explainers.registry import explainer_entry, explainers
@@ -50,7 +50,16 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 EXPERIMENT = Experiment(
     name="out_of_distribution",
     sections={"learners": ByName, "shift": Shift},
-    tidy=("diagnostics.csv",),
+    tidy=(
+        Tidy(
+            "diagnostics.csv",
+            "gpca.experiments.out_of_distribution.metrics:collect_diagnostics",
+            {
+                "prediction_files": "learners/{source}/{learner}/seed{seed}.csv",
+                "set_files": "shifted/{source}/seed{seed}.npz",
+            },
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

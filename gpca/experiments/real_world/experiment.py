@@ -8,7 +8,7 @@ from typing import Any
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
@@ -37,8 +37,8 @@ def check(config: dict, left_out: LeftOut) -> None:
         fault = "form 'results' needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
     _check_training(config)
-    names = section["condition_backbones"]
-    require_names("real_world.condition_backbones", names, section["backbones"], "backbone", encoders_left_out)
+    key, backbones = "real_world.condition_backbones", section["backbones"]
+    require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
     _check_reductions(config)
@@ -133,7 +133,7 @@ def _pretrained_on(frames: Mapping) -> str:
 EXPERIMENT = Experiment(
     name="real_world",
     sections={"real_world": RealWorldSettings},
-    tidy=("real_world.csv",),
+    tidy=(Tidy("real_world.csv"),),
     names=names,
     shown=shown,
     check=check,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.recovery.settings import RecoverySettings
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.situations import SituationSettings
@@ -86,7 +86,14 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="recovery",
     sections={"recovery": RecoverySettings},
-    tidy=("recovery.csv",),
+    tidy=(
+        Tidy(
+            "recovery.csv",
+            "gpca.experiments.recovery.metrics:collect_recovery",
+            {"files": "recovery/seed{seed}.csv"},
+            {"treatments": "recovery.treatments", "costs": "recovery.costs", "budget": "recovery.loop.budget"},
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

@@ -14,7 +14,7 @@ from gpca.alignment.methods.registry import (
     require_settings,
 )
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.registration_methods.settings import PairSettings
 from gpca.settings import part_of
 
@@ -49,7 +49,14 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 EXPERIMENT = Experiment(
     name="registration_methods",
     sections={"method_pairs": Annotated[dict, part_of(PairSettings)], "methods": ByName},
-    tidy=("registration_methods.csv",),
+    tidy=(
+        Tidy(
+            "registration_methods.csv",
+            "gpca.experiments.registration_methods.metrics:collect_trials",
+            {"files": "methods/{source}/{method}/seed{seed}.csv"},
+            {"severities": "registrations.severities"},
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,

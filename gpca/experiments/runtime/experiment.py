@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from gpca.experiments.experiment import Experiment
+from gpca.experiments.experiment import Experiment, Tidy
 from gpca.settings import Bounds
 
 
@@ -16,4 +16,4 @@ class RuntimeSettings:
     repeats: Annotated[int, Bounds(minimum=2)] = 100
 
 
-EXPERIMENT = Experiment(name="runtime", sections={"runtime": RuntimeSettings}, tidy=("runtime.csv",))
+EXPERIMENT = Experiment(name="runtime", sections={"runtime": RuntimeSettings}, tidy=(Tidy("runtime.csv"),))

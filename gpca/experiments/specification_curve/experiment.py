@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from gpca.experiments.experiment import Experiment, Names
+from gpca.experiments.experiment import Experiment, Names, Tidy
 from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
 from gpca.experiments.specification_curve.settings import ReadingSizes
 from gpca.settings import Bounds, Keys
@@ -41,7 +41,14 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 EXPERIMENT = Experiment(
     name="specification_curve",
     sections={"readings": Section},
-    tidy=("readings.csv",),
+    tidy=(
+        Tidy(
+            "readings.csv",
+            "gpca.attribution.metrics:read_all_metrics",
+            {"paths": "readings/{reading_group}.csv"},
+            rule="reading_values",
+        ),
+    ),
     names=names,
     shown=shown,
     leavable={"readings.groups": Names("group of readings", lambda: GROUPS)},

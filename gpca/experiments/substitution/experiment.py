@@ -8,7 +8,7 @@ from typing import Any
 
 from gpca.alignment.methods.registry import installed, left_out, method_entry
 from gpca.errors import require_names, with_key
-from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
+from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Tidy
 from gpca.experiments.explained import require_explained, titles
 from gpca.experiments.substitution.asked import require_exchangeable
 from gpca.experiments.substitution.settings import ExchangeSettings
@@ -66,7 +66,14 @@ EXPERIMENT = Experiment(
     summary="registrations -> explanations based on other registration methods and estimators",
     folder="substitution",
     sections={"exchange": Section},
-    tidy=("exchange.csv",),
+    tidy=(
+        Tidy(
+            "exchange.csv",
+            "gpca.experiments.substitution.metrics:collect",
+            {"prediction_files": "exchange/{exchange_source}/seed{exchange_seed}.csv"},
+            rule="exchange_metrics",
+        ),
+    ),
     names=names,
     shown=shown,
     check=check,
