@@ -31,9 +31,9 @@ class NominalThreshold:
         if nominal_N.all() or not nominal_N.any():
             self._threshold = float(np.median(alarm_N))
         else:
-            found_N = np.cumsum(nominal_N[order]) / nominal_N.sum()
+            kept_N = np.cumsum(nominal_N[order]) / nominal_N.sum()
             lost_N = np.cumsum(~nominal_N[order]) / (~nominal_N).sum()
-            best = int(np.argmax(found_N - lost_N))
+            best = int(np.argmax(kept_N - lost_N))
             following = min(best + 1, len(order) - 1)
             self._threshold = float(alarm_N[order[[best, following]]].mean())
         self._scale = max(float(np.quantile(alarm_N, 0.75) - np.quantile(alarm_N, 0.25)), 1e-9)
