@@ -37,8 +37,8 @@ def check(config: dict, left_out: LeftOut) -> None:
         fault = "form 'results' needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
     _check_training(config)
-    names = section["condition_backbones"]
-    require_names("real_world.condition_backbones", names, section["backbones"], "backbone", encoders_left_out)
+    key, backbones = "real_world.condition_backbones", section["backbones"]
+    require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
     _check_reductions(config)

@@ -12,8 +12,14 @@ import torch
 
 from gpca.attribution.metrics import TIDY_COLUMNS, write_metrics
 from gpca.errors import InputError
-from gpca.experiments.specification_curve.given import SECTIONS, Given, by_backbone, by_method, by_source_and_seed
 from gpca.experiments.specification_curve.registry import GROUPS
+from gpca.experiments.specification_curve.run_files import (
+    SECTIONS,
+    RunFiles,
+    by_backbone,
+    by_method,
+    by_source_and_seed,
+)
 from gpca.experiments.specification_curve.settings import ReadingSizes, name_of, readings_of
 from gpca.process.provenance import record_provenance
 from gpca.settings import check_settings, checked_sections
@@ -57,9 +63,9 @@ def run(options: Namespace) -> None:
     files: dict[str, Any] = {kind: by_name(getattr(options, kind)) for kind, by_name in KINDS.items()}
     inputs = [path for of_kind in files.values() for path in of_kind.values()]
     with record_provenance([options.out], inputs, options.settings):
-        given = Given(**files, sections=sections)
+        run_files = RunFiles(**files, sections=sections)
         readings = readings_of({name: choices[name] for name in names})
-        rows = group.function()(given, readings, ReadingSizes(**sizes))
+        rows = group.function()(run_files, readings, ReadingSizes(**sizes))
         records = [(name_of(options.group, reading), *value) for reading, *value in rows]
         if not records:
             remedy = f"raise registrations.train, or real_world.train, or set readings.groups.{options.group} to false"
