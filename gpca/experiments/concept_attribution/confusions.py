@@ -44,9 +44,6 @@ def draw_confusions_figure(
 
     Args:
         metrics_csv: The file that :func:`gpca.attribution.metrics.collect` makes.
-
-    Raises:
-        InputError: an unusable file, or one without metrics of these explainers and sources.
     """
     confusions = pooled_confusions(read_metrics(metrics_csv))
     rows = [name for name in explainers if any((source, name) in confusions for source in sources)]

@@ -38,9 +38,6 @@ def draw_estimators(
     Args:
         estimates: rows by source, estimator and seed; the reference is among the estimators.
         samples_npz: the reference's samples of the shown source and seed, which its path names.
-
-    Raises:
-        InputError: an unusable file, or files that do not belong together.
     """
     source, seed = Path(samples_npz).parent.name, seed_of_file(samples_npz)
     samples = ReferenceSamples.load(samples_npz)

@@ -29,9 +29,6 @@ def draw_saliency(registrations_npz: str | Path, maps_npz: str | Path, deletions
 
     Args:
         registrations_npz, maps_npz, deletions_csv: Of one source and seed.
-
-    Raises:
-        InputError: an unusable file, or files that do not belong together.
     """
     registrations = Registrations.load(registrations_npz)
     shapes: dict[str, tuple[int | str, ...]] = {"sample": ("S",), "points": ("S", "N", 3), "saliency": ("S", "N")}

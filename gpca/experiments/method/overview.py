@@ -51,16 +51,7 @@ def draw_overview(
     person and a new training.
 
     Args:
-        registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
-            sample of the concept `CONCEPT` that :meth:`gpca.experiments.method.shown_sample.Stages.choose` returns.
-        uncertainty_csv: The uncertainties of the design ``causal``.
-        limits: Those of the errors that states are told apart by, from the config.
-        encoder: The name that the figure gives the encoder.
         treatments: The action of recovery for each concept.
-        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
-
-    Raises:
-        InputError: an unusable file, files of different samples, or a concept without a treatment.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(CONCEPT, registrations_npz)

@@ -58,15 +58,9 @@ def draw_pipeline(
     """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
 
     Args:
-        registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
-            sample that :meth:`gpca.experiments.method.shown_sample.Stages.choose` returns for `ORDER`.
-        uncertainty_csv: The uncertainties of the design ``causal``.
-        limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
             :func:`gpca.experiments.active_learning.figure.draw_learning_curves`.
-        encoder: The name that the figure gives the encoder.
         active_learning: The config's section; the figure repeats the first round of the run.
-        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])

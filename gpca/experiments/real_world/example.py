@@ -44,9 +44,6 @@ def draw_real_world_example(
 
     The figure shows a test sample that an occluder covers (else any overlap sample) and that is attributed rightly: of
     the half of such samples that are the largest in their images, the one with the median score.
-
-    Raises:
-        InputError: an unusable file, or no test sample of the concept overlap.
     """
     instances = Instances.load(instances_npz)
     objects = ObjectClouds.load(objects_npz)

@@ -50,9 +50,6 @@ def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = ""
 
     Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
     object's name in words follows from its `dataset` of the BOP benchmark.
-
-    Raises:
-        InputError: an unusable file.
     """
     found = load_arrays(example_npz, SHAPES, "python -m gpca recover")
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 2.0), layout="constrained")

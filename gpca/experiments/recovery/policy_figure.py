@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.errors import InputError
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, TEXT_WIDTH_IN, write_title
 from gpca.reporting.words import in_words, plural
@@ -27,31 +26,13 @@ ASKED = {
 }
 
 
-def read_policy(path: str | Path) -> dict:
-    """Read the JSON of the step ``recover``; InputError where it is missing or lacks a threshold."""
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-        content["thresholds"] = {
-            name: float(content["thresholds"][name]) for name in ("uncertain", "dominant", "improvement", "attempts")
-        }
-        content["treatments"] = dict(content["treatments"])
-    except FileNotFoundError as fault:
-        raise InputError(path, "no such file", "make it with 'python -m gpca recover'") from fault
-    except (ValueError, KeyError, TypeError) as fault:
-        raise InputError(
-            path, "is not a policy with its thresholds", "make it with 'python -m gpca recover'"
-        ) from fault
-    return content
-
-
 def draw_mitigation(title: str, policy_json: str | Path) -> Figure:
     """Draw the mapping of one policy: what it reads, its branches in the order of asking, and the ways back.
 
     An action leads to new scores; what is queued leads to a label and to a classifier that has learned it.
     """
-    policy = read_policy(policy_json)
-    limits = policy["thresholds"]
-    treatments = policy["treatments"]
+    policy = json.loads(Path(policy_json).read_text(encoding="utf-8"))
+    limits, treatments = policy["thresholds"], policy["treatments"]
     canvas = Canvas(TEXT_WIDTH_IN, 2.62)
     write_title(canvas.figure, f"{title}: thresholds of this run")
     words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"

@@ -100,7 +100,6 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, dataset: str = "") -
     Args:
         objects_npz: The clouds as `gpca objects` writes them.
         title: The line on top, which says so when the objects are stand-ins.
-        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
         InputError: the npz is missing, unreadable or not of that format.
