@@ -8,8 +8,8 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.encoders.training import Classifier, make_model
 from gpca.errors import InputError
-from gpca.io.axes import Axes, require_axes
 from gpca.io.limits import require_file
+from gpca.io.names import Axes, require_axes
 from gpca.pairs.perturbation import CONCEPTS
 
 

@@ -11,7 +11,7 @@ from gpca.attribution.predictions import read_timings, write_predictions, write_
 from gpca.errors import InputError
 from gpca.explainers.interface import Describing, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, require_settings
-from gpca.io.axes import Axes
+from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.arguments import SEED, per_seed
 from gpca.process.provenance import record_provenance

@@ -24,7 +24,7 @@ from gpca.experiments.specification_curve.frames import of_objects, values
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.frames.sample_file import read_instances_of
-from gpca.io.axes import Axes
+from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.reading import read_as
