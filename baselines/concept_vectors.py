@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.attached import attached
 from gpca.errors import InputError
 from gpca.explainers.concept_classifier import known_concepts
-from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Positive
 
@@ -41,7 +40,7 @@ class ConceptVectors(ScoringExplainer):
         from sklearn.linear_model import LogisticRegression
         from sklearn.preprocessing import StandardScaler
 
-        embedding_N_d = attached(registrations, "embedding", None)
+        embedding_N_d = attached(registrations, "embedding")
         self._known = known_concepts(registrations.concept, self.labels)
         if (embedding_N_d == embedding_N_d[0]).all():
             raise InputError("array 'embedding'", "is the same for all training registrations", "train the encoder")
@@ -56,7 +55,7 @@ class ConceptVectors(ScoringExplainer):
         """Score every registration by its position along the CAVs."""
         from scipy.special import softmax
 
-        scaled_N_d = self._embedding_scaler.transform(attached(registrations, "embedding", None))
+        scaled_N_d = self._embedding_scaler.transform(attached(registrations, "embedding"))
         positions_N_C = np.full((len(registrations), len(self.labels)), -np.inf)
         columns = [self.labels.index(concept) for concept in self._known]
         positions_N_C[:, columns] = self._projection_scaler.transform(scaled_N_d @ self.vectors_K_d.T)

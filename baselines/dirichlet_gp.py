@@ -7,14 +7,11 @@ likelihood, and the softmax of its draws are the probabilities.
 
 from __future__ import annotations
 
-from time import perf_counter
-
 import numpy as np
 
-from baselines.attached import attached
-from gpca.attribution.scores import Attribution, summarize_marginals
+from gpca.attribution.scores import summarize_marginals
 from gpca.explainers.concept_classifier import known_concepts
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
@@ -22,7 +19,7 @@ from gpca.seeds import generator
 JITTER = 1e-6
 
 
-class DirichletGP:
+class DirichletGP(DrawingExplainer):
     """Exact GPs with RBF kernels of one scale and lengthscale per concept.
 
     Args:
@@ -54,7 +51,7 @@ class DirichletGP:
         from gpca.adam import Adam
 
         known_concepts(registrations.concept)
-        h_N_d = attached(registrations, "embedding", None)
+        h_N_d = attached(registrations, "embedding")
         self._scaler = StandardScaler().fit(h_N_d)
         self._inputs_N_d = self._scaler.transform(h_N_d)
         squared_N_N = _squared_distances(self._inputs_N_d, self._inputs_N_d)
@@ -75,13 +72,10 @@ class DirichletGP:
             optimizer.step()
         self._factors = [self._factor(*of_concept)[1:] for of_concept in data]
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every embedding and summarize, as GP-CA does."""
-        started = perf_counter()
+    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Summarize draws from the posterior at every embedding, as GP-CA does."""
         normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, len(CONCEPTS)))
-        scores_N_C, variances_N_C, bald_N = summarize_marginals(*self._posterior(registrations), normal_M_C)
-        seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
+        return summarize_marginals(*self._posterior(registrations), normal_M_C)
 
     def _gradient(
         self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray
@@ -120,7 +114,7 @@ class DirichletGP:
         """Return mean and standard deviation (N, C) of the latents."""
         from scipy.linalg import solve_triangular
 
-        inputs_N_d = self._scaler.transform(attached(registrations, "embedding", None))
+        inputs_N_d = self._scaler.transform(attached(registrations, "embedding"))
         squared_T_N = _squared_distances(self._inputs_N_d, inputs_N_d)
         means, deviations = [], []
         for c, (cholesky_T_T, whitened_T) in enumerate(self._factors):

@@ -8,15 +8,13 @@ follow draws of the logits, and from those scores, variances and BALD as GP-CA's
 from __future__ import annotations
 
 from itertools import pairwise
-from time import perf_counter
 from typing import Annotated, Any
 
 import numpy as np
 
-from baselines.attached import attached
-from gpca.attribution.scores import Attribution, summarize_draws
+from gpca.attribution.scores import summarize_draws
 from gpca.explainers.concept_classifier import known_concepts
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator, seed_of
@@ -118,7 +116,7 @@ class Heads:
 HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # of a function that hands them on
 
 
-class HeadLearner:
+class HeadLearner(DrawingExplainer):
     """What such learners share: heads, and draws of the logits from them. Training takes `training`'s settings."""
 
     def __init__(self, source: str, seed: int, **training: HeadArguments) -> None:
@@ -128,17 +126,13 @@ class HeadLearner:
     def fit(self, registrations: Registrations) -> None:
         """Train on the labeled embeddings; fewer than two concepts among the labels raise an InputError."""
         known_concepts(registrations.concept)
-        h_N_d = attached(registrations, "embedding", None)
+        h_N_d = attached(registrations, "embedding")
         target_N = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
         self._train(h_N_d, target_N)
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw the logits of every registration and summarize, as GP-CA does."""
-        started = perf_counter()
-        logits_M_N_C = self._draw_logits(attached(registrations, "embedding", None))
-        scores_N_C, variances_N_C, bald_N = summarize_draws(logits_M_N_C)
-        seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.of_scores(CONCEPTS, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
+    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Summarize draws of the logits of every registration, as GP-CA does."""
+        return summarize_draws(self._draw_logits(attached(registrations, "embedding")))
 
     def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
         self._heads.fit(h_N_d, target_N)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.attached import attached
 from gpca.errors import InputError
 from gpca.explainers.concept_classifier import (
     PAPERS_RANDOM_STATE,
@@ -16,7 +15,7 @@ from gpca.explainers.concept_classifier import (
     ConceptClassifier,
     standardized_regression,
 )
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Count, Positive
 
@@ -26,7 +25,7 @@ class Learner(ClassifierExplainer):
 
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the embeddings."""
-        return attached(registrations, "embedding", None)
+        return attached(registrations, "embedding")
 
 
 def forest(source: str, seed: int, trees: Count = 50) -> Learner:

@@ -12,10 +12,9 @@ from functools import partial
 
 import numpy as np
 
-from baselines.attached import attached
 from gpca.attribution.scores import Attribution
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
-from gpca.explainers.interface import ExplainerEntry, measured
+from gpca.explainers.interface import ExplainerEntry, attached, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
@@ -66,7 +65,7 @@ def features(registrations: Registrations, floor: float) -> np.ndarray:
     """
     from gpca.uncertainty.spread import log_determinant
 
-    log_determinant_N = log_determinant(attached(registrations, "covariance", None, 6, 6)[:, OBSERVED], floor)
+    log_determinant_N = log_determinant(attached(registrations, "covariance")[:, OBSERVED], floor)
     found = measured(registrations, "residuals_", lambda: {"both_ways": residuals(registrations)})
     return np.column_stack([found.attached["residuals_both_ways"], log_determinant_N])
 
@@ -87,7 +86,7 @@ def log_residual(from_P_3: np.ndarray, to_Q_3: np.ndarray) -> float:
 
 
 def _observed(registrations: Registrations, name: str) -> np.ndarray:
-    return attached(registrations, name, None)[:, OBSERVED]
+    return attached(registrations, name)[:, OBSERVED]
 
 
 def residuals_logistic(

@@ -44,8 +44,8 @@ def partial_rank_correlations(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -
         input_K = rank_K - basis @ (basis.T @ rank_K)
         outputs_left_N_K = ranks_N_K - ranks_N_K @ basis @ basis.T
         lengths_N = np.linalg.norm(outputs_left_N_K, axis=1)
-        told_N = lengths_N > 1e-9 * np.linalg.norm(ranks_N_K, axis=1)  # the rest is rounding
-        values_N_3[told_N, i] = outputs_left_N_K[told_N] @ input_K / (lengths_N[told_N] * np.linalg.norm(input_K))
+        varies_N = lengths_N > 1e-9 * np.linalg.norm(ranks_N_K, axis=1)  # the rest is rounding
+        values_N_3[varies_N, i] = outputs_left_N_K[varies_N] @ input_K / (lengths_N[varies_N] * np.linalg.norm(input_K))
     return values_N_3
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.attached import attached
-from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 
 
@@ -28,7 +27,7 @@ class SoftmaxHead(ScoringExplainer):
         """Return the softmax of the logits."""
         from scipy.special import softmax
 
-        return softmax(attached(registrations, "head_logits", len(self.labels)), axis=1)
+        return softmax(attached(registrations, "head_logits"), axis=1)
 
 
 EXPLAINERS = {"softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, reads="embeddings")}

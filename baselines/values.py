@@ -12,11 +12,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from baselines.attached import attached
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
-from gpca.explainers.interface import ScoringExplainer
+from gpca.explainers.interface import ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -54,7 +53,7 @@ class KnobValues(ChargedValues):
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Return the values of the uncertainty."""
-        return self._values(attached(registrations, "uncertainty", None))
+        return self._values(attached(registrations, "uncertainty"))
 
 
 class ScaledValues(ChargedValues):
@@ -101,7 +100,7 @@ class LearnedValues(ChargedValues, ClassifierExplainer):
 
 def corners(registrations: Registrations, worth: str) -> np.ndarray:
     """Return that worth of the 8 corners (S, 8): corner b has feature i present where bit i of b is set."""
-    return attached(registrations, worth, None)[:, :8]
+    return attached(registrations, worth)[:, :8]
 
 
 def charged(
@@ -113,7 +112,7 @@ def charged(
     """
     own_seconds = (perf_counter() - started) / len(registrations)
     cost = {
-        name: attached(registrations, name, None)[:, slice(None) if conditions is None else conditions].sum(axis=1)
+        name: attached(registrations, name)[:, slice(None) if conditions is None else conditions].sum(axis=1)
         for name in ("seconds", "icp_seconds", "icp_calls")
     }
     return Attribution.of_scores(

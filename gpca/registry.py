@@ -1,4 +1,4 @@
-"""What is found by its name: entries that the modules of a folder list, and functions written ``module:name``."""
+"""Things found by name: entries that the modules of a folder list, and functions written ``module:name``."""
 
 from __future__ import annotations
 

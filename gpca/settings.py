@@ -11,6 +11,7 @@ from dataclasses import is_dataclass
 from difflib import get_close_matches
 from functools import cache, partial
 from inspect import Parameter, isclass, signature
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_type_hints
 
 from gpca.errors import InputError
@@ -261,6 +262,7 @@ def check_settings(settings: Mapping, *section: str) -> None:
 
     adapter = _adapter(import_module("gpca.config.schema").whole_config())
     whole: Any = settings
+    section = tuple("causal" if (name, key) == ("*", "uncertainty") else name for key, name in pairwise(("", *section)))
     for key in reversed(section):
         whole = {key: whole}
     try:

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 import gpca
+from gpca.__main__ import COMMANDS
 from gpca.code_files import ROOT
 from tests.steps.by_words import main
 

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 import pytest
 import yaml
 
-from gpca.__main__ import STEPS
+from gpca.__main__ import STEPS, module_of
 from gpca.experiments.controls.settings import CONTROLS
 from gpca.experiments.results import registered
 from gpca.objects.entry import Source
@@ -64,7 +64,7 @@ def options_of(program):
     """The options that a step of `python -m gpca`, or a script, has."""
     if program in STEPS:
         parser = ArgumentParser()
-        import_module(f"gpca.steps.{program.replace('-', '_')}").add_arguments(parser)
+        import_module(module_of(program)).add_arguments(parser)
         return {"--threads", "--settings", *parser._option_string_actions}
     shown = subprocess.run([sys.executable, program, "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
     return set(re.findall(r"--[\w-]+", shown.stdout))

@@ -36,7 +36,7 @@ class ICPSettings:
 
 @dataclass(frozen=True)
 class Registration:
-    """What ICP returns: pose (4×4), share of source points with a correspondence, RMSE over those."""
+    """The result of ICP: pose (4×4), share of source points with a correspondence, RMSE over those."""
 
     T_target_source: np.ndarray
     fitness: float

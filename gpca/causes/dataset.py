@@ -10,7 +10,7 @@ import numpy as np
 from gpca.causes.shapley import SUBSETS
 from gpca.causes.truth import Truth
 from gpca.io.arrays import REAL, load_arrays, save_arrays
-from gpca.io.axes import Axes
+from gpca.io.names import Axes
 from gpca.pairs.dataset import CLOUDS, REGISTRATION_COLUMNS, Registrations
 from gpca.pairs.perturbation import CONCEPTS
 

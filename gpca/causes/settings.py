@@ -125,7 +125,6 @@ class CauseSettings(UncertaintySettings):
     candidates: Annotated[int, Bounds(minimum=1, maximum=1000)] = 20
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         for name in ("points", "several"):
             low, high = getattr(self, name)
             if low > high:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
-from gpca.errors import require_known
 from gpca.settings import ArgumentsOf, Bounds, Count
 
 Kernel = Literal["rbf", "matern32", "polynomial"]
-KERNELS = get_args(Kernel)
 LearningRate = Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)]
 Draws = Annotated[int, Bounds(minimum=2)]
 
@@ -30,9 +28,6 @@ class GPCSettings:
     iterations: Count = 100
     inducing: Count = 64
     draws: Draws = 1000
-
-    def __post_init__(self) -> None:
-        require_known("kernel", self.kernel, KERNELS)
 
 
 GPCArguments = Annotated[Any, ArgumentsOf(GPCSettings)]  # of a function that hands them on

@@ -65,7 +65,7 @@ def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dic
         hits_B = fits_K_K[np.arange(len(group)), order_B_K].sum(axis=1)
         for name in (table, ALL):
             shuffled[name] = shuffled.get(name, 0) + hits_B
-            ranked.setdefault(name, []).append(_centred_ranks(group))
+            ranked.setdefault(name, []).append(_centered_ranks(group))
             expected[name] = expected.get(name, 0.0) + fits_K_K.sum() / len(group)
             agree[name] = agree.get(name, 0) + int(fits_K_K.trace())
             movable[name] = movable.get(name, False) or len(group) > 1
@@ -104,7 +104,7 @@ def _reproduced(row) -> Reproduced:
     )
 
 
-def _centred_ranks(group: pd.DataFrame) -> np.ndarray:
+def _centered_ranks(group: pd.DataFrame) -> np.ndarray:
     """Return (K, 2): ranks of the printed numbers and of the run's, less their mean; times in seconds."""
     factor = group["unit"].map(lambda unit: UNITS[unit].factor)
     ranks_K_2 = np.stack([(group[name] / factor).rank() for name in ("published", "reproduced")], axis=1)

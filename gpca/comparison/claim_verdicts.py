@@ -20,7 +20,6 @@ from gpca.comparison.claims import PREDICTIONS, Claim, Compared
 from gpca.comparison.published import UNITS, Counterpart
 from gpca.comparison.values import RUNTIME, of_seeds, runtime_mean
 from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
-from gpca.errors import InputError
 from gpca.io.csv_file import read_numbers
 
 if TYPE_CHECKING:
@@ -206,11 +205,7 @@ def read_verdicts(path: str | Path) -> pd.DataFrame:
     """Read what :func:`judge` returned; claims that were not run have no numbers.
 
     Raises:
-        InputError: missing, empty or unreadable file, missing column, a number that is none, an unknown verdict.
+        InputError: missing, empty or unreadable file, missing column, a number that is none.
     """
     measured = ("value", "low", "high", "n")
-    rows = read_numbers(path, CLAIM_COLUMNS, measured, optional=measured)
-    for column in ("verdict", "claim_verdict"):
-        if unknown := set(rows[column]) - set(CLAIM_VERDICTS):
-            raise InputError(path, f"unknown {column} '{min(unknown)}'", "regenerate it")
-    return rows
+    return read_numbers(path, CLAIM_COLUMNS, measured, optional=measured)

@@ -119,7 +119,7 @@ def asked_about(judged: pd.DataFrame) -> pd.DataFrame:
     return judged[judged["verdict"].isin([NOT_REPRODUCED, NOT_COMPARABLE])]
 
 
-def summarise(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGroup]]:
+def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGroup]]:
     """Return number -> group -> what its readings say, of the numbers of :func:`asked_about`."""
     joint = {}
     for group, rows in judged.groupby("group", sort=False):
@@ -160,7 +160,7 @@ def sentence(groups: Mapping[str, OfGroup]) -> str:
 
 def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFrame:
     """Return the comparison in which the reasons of misses say what the readings give."""
-    found = summarise(judged[judged["verdict"] == NOT_REPRODUCED])
+    found = summarize(judged[judged["verdict"] == NOT_REPRODUCED])
     reasons = [
         f"{reason} {sentence(found[key])}" if key in found else reason
         for *key, reason in comparison[["table", "row", "column", "reason"]].itertuples(index=False)

@@ -97,7 +97,8 @@ def _of_config(outcome: FileCheck, run: Path, reference: Path) -> FileCheck:
     Equal values stay `IDENTICAL`, since the record names the whole config, also sections that the file does not depend
     on. A section that the reference's record does not name is newer than the reference.
     """
-    here, there = (_config_of(folder / f"{outcome.file}.provenance.json") for folder in (run, reference))
+    records = (_record(folder / f"{outcome.file}.provenance.json") for folder in (run, reference))
+    here, there = (record.get("config_sha256") or {} for record in records)
     others = sorted(section for section in there if here and here.get(section) != there[section])
     if outcome.verdict == IDENTICAL or not others:
         return outcome
@@ -136,30 +137,14 @@ def _difference(difference: float, allowed: float, mean: Mean) -> str:
 
 def device_of(folder: Path, file: str) -> str:
     """Return the processor that a file was made on, and the level of instructions that its libraries were held to."""
-    device = _record(folder / f"{file}.provenance.json").get("device") or {}
-    if isinstance(device, str):  # records of earlier versions have no more than the name
-        return device
+    device = _record(folder / f"{file}.provenance.json").get("device", {})
     known = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
     return ", ".join(filter(None, [*known, device.get("instructions")])) or "on an unrecorded processor"
 
 
-def _config_of(path: Path) -> dict[str, str]:
-    """The hash of each section of the config, where the record has them: those of earlier versions have one for all."""
-    sections = _record(path).get("config_sha256")
-    return sections if isinstance(sections, dict) else {}
-
-
 def _record(path: Path) -> dict:
-    """A record of provenance, or an empty one where there is none."""
-    if not path.is_file():
-        return {}
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as fault:
-        raise InputError(path, "is not a provenance record", "regenerate its result") from fault
-    if not isinstance(record, dict):
-        raise InputError(path, "is not a provenance record", "regenerate its result")
-    return record
+    """Return a record of provenance, or an empty one where there is none."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
 
 def _named(key: tuple[str, ...]) -> str:

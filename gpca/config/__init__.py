@@ -1,1 +1,1 @@
-"""The configuration of a run and its schema."""
+"""How the configuration of a run is read and checked."""

@@ -33,7 +33,7 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
 
 
 def check(config: dict) -> dict[str, dict]:
-    """Check a configuration against the schema and against what exists.
+    """Check a configuration against its settings classes and against what exists.
 
     Args:
         config: as it was given; what it leaves out with ``false`` is not checked, and it stays as it is.

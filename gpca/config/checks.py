@@ -10,7 +10,6 @@ from gpca.experiments.experiment import LeftOut
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.source import require_place, resolve
-from gpca.pairs.synthesis import RegistrationSettings
 
 # Folders of results/ that no run may take: reference runs are kept in one, logs beside all runs in the other.
 TAKEN = ("reference", "logs")
@@ -49,7 +48,6 @@ def _check_registrations(config: dict) -> None:
         fault = f"is '{method}', but uncertainty and causes are measured by reruns of point-to-point ICP"
         remedy = "use point_to_point; exchange.methods puts other methods beneath the explainers"
         raise InputError("config key registrations.icp.method", fault, remedy)
-    with_key("registrations.severities", RegistrationSettings.from_dict, config["registrations"])
     for key, causes in {"causes": {}, "model.causes": config["model"]["causes"]}.items():
         with_key(key, CauseSettings.from_dict, config["causes"] | causes, config["registrations"]["icp"])
     cloud_points = "registrations.cloud_points", config["registrations"]["cloud_points"]

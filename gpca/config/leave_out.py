@@ -83,10 +83,10 @@ def _names_switched_on(key: str, switches: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _at(config: Mapping[str, Any], key: str) -> Any:
-    found: Any = config
+    value: Any = config
     for name in key.split("."):
-        found = found.get(name) if isinstance(found, Mapping) else None
-    return found
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return value
 
 
 def _without(names: list | dict, gone: Collection[str]) -> list | dict:

@@ -7,15 +7,10 @@ LockException until ``--unlock``. So each Snakemake also holds a lock that the k
 from __future__ import annotations
 
 import fcntl
-import os
 import shutil
-import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import IO
-
-from gpca.process.provenance import CONFIG_VARIABLE
 
 LEFT = ("locks", "scripts/*", "shadow/*", "shell_tmp.*")  # by a killed Snakemake in its own folder
 _held: list[IO[str]] = []  # until this process ends
@@ -25,8 +20,8 @@ def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: 
     """Note that a Snakemake lives in the working directory; if it is the only one, clear what dead ones have left.
 
     All that live share a lock of ``running`` in `folder`, so who gets it alone is alone. Only then are Snakemake's own
-    locks removed, those of another Snakemake never. Jobs may outlive a Snakemake that was killed alone: they are waited
-    for, or two would write the same files. On a file system without such locks nothing is known, and nothing is done.
+    locks removed, those of another Snakemake never. On a file system without such locks nothing is known, and nothing
+    is done.
 
     Args:
         temporary: the folders that this Snakemake has made elsewhere, which it removes unless it is killed.
@@ -41,7 +36,6 @@ def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: 
         return
     try:
         if main and _is_alone(file):
-            _wait_for_jobs()
             file.seek(0)
             _clear(folder, file.read().splitlines(), own)
             file.truncate(0)
@@ -73,26 +67,3 @@ def _clear(folder: Path, recorded: list[str], own: list[Path]) -> None:
             shutil.rmtree(path, ignore_errors=True)
         else:
             path.unlink(missing_ok=True)
-
-
-def _wait_for_jobs() -> None:
-    if jobs := " ".join(map(str, _living_jobs())):
-        print(f"gpca: waiting for jobs of a killed run to end; 'kill {jobs}' ends them at once", file=sys.stderr)
-    while _living_jobs():
-        time.sleep(1)
-
-
-def _living_jobs() -> list[int]:
-    """Return the processes that are jobs of this folder; none where this one is, as a job may run a workflow."""
-    jobs = [int(process.name) for process in Path("/proc").glob("[0-9]*") if _is_job(process)]
-    return [] if os.getpid() in jobs else sorted(jobs)
-
-
-def _is_job(process: Path) -> bool:
-    """Return whether a process runs in the working directory with the variable that the Snakefile sets for jobs."""
-    try:
-        variables = (process / "environ").read_bytes().split(b"\0")
-        marked = any(variable.startswith(f"{CONFIG_VARIABLE}=".encode()) for variable in variables)
-        return marked and (process / "cwd").samefile(".")
-    except OSError:  # it ended meanwhile, or is somebody else's
-        return False

@@ -8,8 +8,8 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.encoders.training import Classifier, make_model
 from gpca.errors import InputError
-from gpca.io.axes import Axes, require_axes
 from gpca.io.limits import require_file
+from gpca.io.names import Axes, require_axes
 from gpca.pairs.perturbation import CONCEPTS
 
 
@@ -46,11 +46,11 @@ def load_model(
     require_file(path, "no such weights", remedy)
     try:
         content = read_tensors(path)
-        found = content["source"], content["seed"]
+        own_axes = content["source"], content["seed"]
         model.load_state_dict(content["weights"])
     except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
         raise InputError(path, f"not the weights of backbone '{settings.backbone}', or damaged", remedy) from fault
-    require_axes(path, found, axes, made_by)
-    if found == unlike:
+    require_axes(path, own_axes, axes, made_by)
+    if own_axes == unlike:
         raise InputError(path, "was trained on the same samples", "give weights of another source or seed")
     return model.eval()

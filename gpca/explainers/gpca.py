@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from time import perf_counter
-
 import numpy as np
 
-from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCArguments
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import DrawingExplainer, ExplainerEntry
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 
 
-class GPCA:
-    """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds.
-
-    Attributes:
-        labels: what it names.
-    """
-
-    labels: tuple[str, ...] = CONCEPTS
+class GPCA(DrawingExplainer):
+    """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds."""
 
     def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
         from gpca.classifier.gpc import (  # here, because the workflow imports this file only to know its entries
@@ -38,14 +28,9 @@ class GPCA:
         """Learn further labels, see :meth:`gpca.classifier.gpc.GPC.update`."""
         self._gpc.update(self._inputs(registrations), registrations.concept)
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw from the posterior at every embedding and summarize (Eqs. 4 to 7)."""
-        started = perf_counter()
-        scores_N_C, variances_N_C, bald_N = self._gpc.attribute(self._inputs(registrations))
-        seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.of_scores(
-            self.labels, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N
-        )
+    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Summarize draws from the posterior at every embedding."""
+        return self._gpc.attribute(self._inputs(registrations))
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
         """Return what the GPC reads of each registration (N, d)."""

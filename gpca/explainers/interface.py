@@ -16,6 +16,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from gpca.attribution.scores import Attribution
+from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -69,6 +70,28 @@ class ScoringExplainer:
         raise NotImplementedError
 
 
+class DrawingExplainer:
+    """What explainers share that draw from a posterior: scores with variances and BALD, and the time that they take.
+
+    Attributes:
+        labels: what it names.
+    """
+
+    labels: tuple[str, ...] = CONCEPTS
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Draw for every registration and summarize (Eqs. 4 to 7)."""
+        started = perf_counter()
+        scores_N_C, variances_N_C, bald_N = self.summary(registrations)
+        seconds = (perf_counter() - started) / len(registrations)
+        more = {"variances_N_C": variances_N_C, "bald_N": bald_N}
+        return Attribution.of_scores(self.labels, scores_N_C, seconds=seconds, **more)
+
+    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return scores and variances (N, C) of the labels, and BALD (N,)."""
+        raise NotImplementedError
+
+
 def measured(
     registrations: Registrations, prefix: str, measure: Callable[[], Mapping[str, np.ndarray]]
 ) -> Registrations:
@@ -80,6 +103,13 @@ def measured(
         return registrations
     own = {prefix + name: array for name, array in measure().items()}
     return replace(registrations, attached={**registrations.attached, **own})
+
+
+def attached(registrations: Registrations, name: str) -> np.ndarray:
+    """Return an array (S, …) that an earlier step made for the registrations, as float64; InputError without it."""
+    if name not in registrations.attached:
+        raise InputError(f"array '{name}'", "is not attached to the registrations", "see Registrations.attached")
+    return np.asarray(registrations.attached[name], float)
 
 
 BARE = "registrations"  # what an explainer reads to which nothing is attached

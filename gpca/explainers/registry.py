@@ -1,7 +1,7 @@
 """Every explainer by name: GP-CA itself and the rivals, one per file of ``baselines/``.
 
-Those of causes have a folder of their own below it, and names of their own. Both folders are found by their names, as
-the rivals import this package and not the other way round.
+A file lists those of concepts as ``EXPLAINERS`` and those of causes as ``CAUSE_EXPLAINERS``, which have names of their
+own. The folder is found by its name, as the rivals import this package and not the other way round.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from gpca.settings import require_arguments
 CONCEPTS, CAUSES = "concepts", "causes"  # what explainers name: what was perturbed, or what is wrong
 REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
     CONCEPTS: Registry("explainer", "baselines", "EXPLAINERS", first=("gpca.explainers.gpca",)),
-    CAUSES: Registry("explainer", "baselines.causes", "EXPLAINERS"),
+    CAUSES: Registry("explainer", "baselines", "CAUSE_EXPLAINERS"),
 }
 
 
 def explainers(kind: str = CONCEPTS) -> dict[str, ExplainerEntry]:
-    """Return all explainers of a kind by name: GP-CA itself and those of every file in its folder."""
+    """Return all explainers of a kind by name: GP-CA itself and those of every file of rivals."""
     return REGISTRIES[kind].entries()
 
 

@@ -20,7 +20,7 @@ from gpca.features.pair import ObservedPair, observed_pair
 from gpca.features.remedied import REMEDIED, describe_remedied
 from gpca.features.settings import DescriptorSettings
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.axes import Axes
+from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
 

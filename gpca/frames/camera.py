@@ -44,7 +44,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class View:
-    """What a camera without noise sees.
+    """The view of a camera without noise.
 
     Attributes:
         depth_m: (H, W), infinite where there is nothing.

@@ -1,4 +1,4 @@
-"""What a perfect sensor would have seen of an instance: its mesh, rendered at the true pose with nothing in front."""
+"""The view of a perfect sensor: an instance's mesh, rendered at the true pose with nothing in front."""
 
 from __future__ import annotations
 

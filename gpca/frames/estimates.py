@@ -1,4 +1,4 @@
-"""What pose estimators said of frames: initial poses, and how far they are off where no estimator spoke of an object.
+"""Results of pose estimators: initial poses, and errors for objects that no estimator found.
 
 A pose error is ``T_true_estimated`` in the frame of the object's model: what takes the true pose to the estimated one.
 """
@@ -21,35 +21,30 @@ COLUMNS = ("obj_id", "rx", "ry", "rz", "tx", "ty", "tz")
 FARTHEST_MM = 1e4  # no estimator is off by more
 
 
-@dataclass(frozen=True)
-class Estimators:
-    """What several estimators said of the frames of one dataset.
+def choose_estimate(
+    poses_by_estimator: Mapping[str, PosesByObject],
+    place: tuple[int, int, int],
+    alone: bool,
+    seen: Mapping,
+    random: np.random.Generator,
+) -> tuple[str, np.ndarray] | None:
+    """Return one estimator that found an object and its pose ``T_camera_model``, drawn of all that did.
 
-    Attributes:
-        by_name: of each results file its estimates.
+    Args:
+        poses_by_estimator: of one dataset.
+        place: scene, image, object id.
+        alone: no other object of this id is in the image. Else an estimate that lies farther than a diameter from what
+            was measured is of another one.
+        seen: ``points_m`` (P, 3) in the camera's frame, ``pixels`` (P, 2), ``camera_3_3`` and ``diameter_m``.
     """
-
-    by_name: Mapping[str, PosesByObject]
-
-    def choose(
-        self, place: tuple[int, int, int], alone: bool, seen: Mapping, random: np.random.Generator
-    ) -> tuple[str, np.ndarray] | None:
-        """Return one estimator that spoke of an object and its pose ``T_camera_model``, drawn of all that did.
-
-        Args:
-            place: scene, image, object id.
-            alone: no other object of this id is in the image. Else an estimate that lies farther than a diameter from
-                what was measured is of another one.
-            seen: ``points_m`` (P, 3) in the camera's frame, ``pixels`` (P, 2), ``camera_3_3`` and ``diameter_m``.
-        """
-        spoke = []
-        for name in sorted(self.by_name):
-            if poses := self.by_name[name].get(place):
-                pose = nearest_to(poses, seen["pixels"], seen["camera_3_3"])
-                away_m = np.linalg.norm(pose[:3, 3] - np.median(seen["points_m"], axis=0))
-                if alone or away_m <= seen["diameter_m"]:
-                    spoke.append((name, pose))
-        return spoke[int(random.integers(len(spoke)))] if spoke else None
+    candidates = []
+    for name in sorted(poses_by_estimator):
+        if poses := poses_by_estimator[name].get(place):
+            pose = nearest_to(poses, seen["pixels"], seen["camera_3_3"])
+            away_m = np.linalg.norm(pose[:3, 3] - np.median(seen["points_m"], axis=0))
+            if alone or away_m <= seen["diameter_m"]:
+                candidates.append((name, pose))
+    return candidates[int(random.integers(len(candidates)))] if candidates else None
 
 
 @dataclass

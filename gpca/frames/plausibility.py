@@ -1,4 +1,4 @@
-"""What was measured of an object lies where its annotation says, or the data is refused with the likeliest reason."""
+"""Data is refused, with the likeliest reason, where an object was measured elsewhere than its annotation says."""
 
 from __future__ import annotations
 

@@ -14,11 +14,11 @@ from scipy.spatial import cKDTree
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, without_background
-from gpca.frames.estimates import EstimatorErrors, Estimators, error_of, read_pose_errors
+from gpca.frames.estimates import EstimatorErrors, choose_estimate, error_of, read_pose_errors
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
 from gpca.frames.instances import Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
-from gpca.frames.results_file import read_bop_results
+from gpca.frames.results_file import PosesByObject, read_bop_results
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_center
 from gpca.objects.surface import Surface
@@ -189,7 +189,7 @@ def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], see
         alone = Counter(of.object_id for of in frame.annotations)[number] == 1
         random = generator(found.name, *frame.place, n, "estimator")
         shown = row | {"diameter_m": found.diameter_m(number)}
-        if chosen := estimators[found.name].choose((*frame.place, number), alone, shown, random):
+        if chosen := choose_estimate(estimators[found.name], (*frame.place, number), alone, shown, random):
             said[place] = chosen
             errors.add((found.name, number), error_of(annotation.T_camera_model, chosen[1]))
     places = {(found.name, *frame.place, n): place for place, (found, frame, n, _) in enumerate(seen)}
@@ -280,13 +280,14 @@ class _Objects:
         )
 
 
-def _estimators(dataset: Dataset) -> Estimators:
+def _estimators(dataset: Dataset) -> dict[str, PosesByObject]:
+    """Return the poses of each results file of a dataset, by the name of the file."""
     if not dataset.results:
-        return Estimators({})
+        return {}
     # Against all images, not only the drawn ones: a results file covers the whole dataset.
     distances_m = {
         frame.place: [float(np.linalg.norm(annotation.T_camera_model[:3, 3])) for annotation in frame.annotations]
         for frame in read_frames(dataset.folders, dataset.split)
     }
     known = bop.read_models_info(dataset.models_folder() / "models_info.json").keys()
-    return Estimators({path.stem: read_bop_results(path, distances_m, known) for path in dataset.results})
+    return {path.stem: read_bop_results(path, distances_m, known) for path in dataset.results}

@@ -32,7 +32,7 @@ TABLE_COLOR = (0.72, 0.65, 0.55)
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """What is on the table and from where it is seen.
+    """Settings of scenes: the objects on the table, and the cameras.
 
     Attributes:
         families: of procedural objects; none where the objects are others.

@@ -12,7 +12,7 @@ import numpy as np
 
 from gpca.alignment.rigid import require_rotation, rigid_motion
 from gpca.errors import InputError
-from gpca.io.json_file import read_json
+from gpca.io.json_file import finite_numbers, read_json
 from gpca.numerals import whole
 
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
@@ -77,16 +77,6 @@ def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
 
 
 def _numbers(entry: Any, key: str, count: int, subject: str) -> np.ndarray:
-    """Return the finite numbers of a list, or of a list of rows; one number may stand by itself."""
     if not isinstance(entry, dict) or key not in entry:
         raise InputError(subject, f"has no {key}", REMEDY)
-    given = entry[key] if isinstance(entry[key], list) and count > 1 else [entry[key]]
-    flat = [number for row in given for number in (row if isinstance(row, list) and count > 1 else [row])]
-    for number in flat:
-        if isinstance(number, bool) or not isinstance(number, int | float):
-            raise InputError(subject, f"{key} contains {repr(number)[:40]}, which is not a number", REMEDY)
-        if not abs(number) < 1e300:  # also NaN, and an integer that no float holds
-            raise InputError(subject, f"{key} contains a number that is not finite", REMEDY)
-    if len(flat) != count:
-        raise InputError(subject, f"{key} has {len(flat)} numbers, not {count}", REMEDY)
-    return np.array(flat, float)
+    return finite_numbers(entry[key], count, subject, key, REMEDY)

@@ -32,7 +32,7 @@ OCCLUDER_TURN_DEG = 20.0  # the occluder stands so far off the line to the camer
 
 @dataclass(frozen=True)
 class SituationSettings:
-    """What disturbs a registration, and the scenes.
+    """Settings of situations: the scenes, and how strongly causes disturb a registration.
 
     Attributes:
         scenes: tables, cameras and the sensor's usual noise; its camera is the region of interest about the object.

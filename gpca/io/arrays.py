@@ -12,10 +12,9 @@ from typing import IO
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.axes import Axes, require_axes
 from gpca.io.files import whole_file
 from gpca.io.limits import LARGEST_NUMBER, is_bounded, require_file, require_memory
-from gpca.io.names import SPLITS, is_name
+from gpca.io.names import SPLITS, Axes, is_name, require_axes
 
 TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy
 _KNOWN = f"b{REAL}{TEXT}"

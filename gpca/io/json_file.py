@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
+
 from gpca.errors import InputError
 from gpca.io.limits import require_file
 
@@ -42,6 +44,24 @@ def parse_json(text: str) -> Any:
         return json.loads(text, object_pairs_hook=_without_duplicates, parse_constant=_no_constant)
     except RecursionError as fault:
         raise ValueError("nested too deeply") from fault
+
+
+def finite_numbers(value: Any, count: int, subject: object, name: str, remedy: str) -> np.ndarray:
+    """Return the numbers of a list, or of a list of rows; one number may stand by itself.
+
+    Raises:
+        InputError: another count, something else than a number, or one that is not finite; it says that `name` has it.
+    """
+    rows = value if isinstance(value, list) and count > 1 else [value]
+    numbers = [number for row in rows for number in (row if isinstance(row, list) and count > 1 else [row])]
+    for number in numbers:
+        if type(number) not in (int, float):
+            raise InputError(subject, f"{name} contains {repr(number)[:40]}, which is not a number", remedy)
+        if not abs(number) < 1e300:  # also NaN, and an integer that no float holds
+            raise InputError(subject, f"{name} contains a number that is not finite", remedy)
+    if len(numbers) != count:
+        raise InputError(subject, f"{name} has {len(numbers)} numbers, not {count}", remedy)
+    return np.array(numbers, float)
 
 
 def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

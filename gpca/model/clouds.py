@@ -20,7 +20,7 @@ FARTHEST_START = 10.0
 
 @dataclass(frozen=True)
 class Clouds:
-    """What is registered.
+    """The clouds that are registered, and ICP between them.
 
     Attributes:
         seen: (N, 3) the source as it was given, thinned.

@@ -1,4 +1,4 @@
-"""What can stand in a model file: settings within their bounds, and numbers that fit together.
+"""Checks of a model file: settings within their bounds, and numbers that fit together.
 
 A model may come from anywhere. What is wrong in it has to be found when it is loaded, not when it hangs or explains.
 """

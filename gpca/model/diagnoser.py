@@ -1,4 +1,4 @@
-"""What is wrong with one registration, if anything: the part of a model that learned from measured causes."""
+"""The diagnosis of one registration, by the part of a model that learned from measured causes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LIKELY = 0.5  # probability from which a concept is called one of the causes
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What is said of one registration.
+    """The diagnosis of one registration.
 
     Attributes:
         failure: probability that it failed.

@@ -99,37 +99,39 @@ class Explainer:
         seconds: dict[str, float] = {}
         notes: list[str] = []
         with _timed(seconds, "preparation"):
-            given = (source_points, target_points, T_target_source_init, unit, frame)
-            clouds = Clouds.prepared(*given, self.model.cloud_points, self.model.icp, notes)
+            inputs = (source_points, target_points, T_target_source_init, unit, frame)
+            clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes)
         with _timed(seconds, "icp"):
             at_pose = self._aligned(clouds, register, method, notes)
         voids = voids_of(clouds.source, clouds.target, at_pose.fitness, self.model.familiar)
-        found = None
+        diagnosis = None
         if diagnose and self.model.diagnoser is not None:
             with _timed(seconds, "diagnosis"):
-                found = self.model.diagnoser.diagnose(clouds.source, clouds.target, at_pose.T_target_source)
-            found = replace(found, expected_error=found.expected_error * clouds.frame.diameter, void=bool(voids))
+                diagnosis = self.model.diagnoser.diagnose(clouds.source, clouds.target, at_pose.T_target_source)
+            diagnosis = replace(
+                diagnosis, expected_error=diagnosis.expected_error * clouds.frame.diameter, void=bool(voids)
+            )
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(at_pose.T_target_source, clouds.source))
         with _timed(seconds, "attribution"):
             (scores_C,), (variances_C,), (bald,) = self.model.gpc.attribute(h_1_d)
-        told = [*scores_C, *((found.failure, *found.causes.values()) if found else ())]
-        if not np.isfinite(h_1_d).all() or not np.isfinite(told).all():
+        numbers = [*scores_C, *((diagnosis.failure, *diagnosis.causes.values()) if diagnosis else ())]
+        if not np.isfinite(h_1_d).all() or not np.isfinite(numbers).all():
             raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
-            warnings = [*map(str, voids), *self._warnings(clouds, found)]
+            warnings = [*map(str, voids), *self._warnings(clouds, diagnosis)]
             if T_target_source_init is not None and register is None:
                 warnings += self._inverted(clouds, at_pose)
         spread = None
         if uncertainty is not None and estimate is not None:
             with _timed(seconds, "uncertainty"):
                 spread = self._spread(clouds, at_pose, method, estimator, estimate, uncertainty, notes)
-        decision = self._decision(scores_C, float(bald), found, voids)
+        decision = self._decision(scores_C, float(bald), diagnosis, voids)
         return Explanation(
             T_target_source=clouds.frame.pose_outside(at_pose.T_target_source) @ clouds.T_target_source_init,
             fitness=at_pose.fitness,
             inlier_rmse=at_pose.inlier_rmse * clouds.frame.diameter,
-            diagnosis=found,
+            diagnosis=diagnosis,
             method=method or self.model.icp.method,
             scores=dict(zip(self.model.concepts, scores_C.tolist(), strict=True)),
             variances=dict(zip(self.model.concepts, variances_C.tolist(), strict=True)),
@@ -165,14 +167,14 @@ class Explainer:
         Raises:
             InputError: as :meth:`explain`, when the pair's turn comes; the line names the number of the pair, from 0.
         """
-        asked = uncertainty, diagnose, method, estimator
+        options = uncertainty, diagnose, method, estimator
         known, frame = None, None
         for number, (source_points, target_points, *init) in enumerate(pairs):
             try:
                 if frame is None or target_points is not known:
                     known, frame = target_points, CanonicalFrame.of(np.asarray(target_points, np.float64), unit)
                 T_init = init[0] if init else None
-                yield self.explain(source_points, target_points, T_init, unit, frame, *asked)
+                yield self.explain(source_points, target_points, T_init, unit, frame, *options)
             except InputError as fault:
                 raise InputError(f"pair {number}", str(fault)) from fault
 
@@ -205,9 +207,9 @@ class Explainer:
         if register is None:
             poses_1, fitness_1, rmse_1 = clouds.icp.register(clouds.source, np.eye(4)[None])
             return Outcome(poses_1[0], float(fitness_1[0]), float(rmse_1[0]))
-        found = register(Pair(clouds.source, clouds.target, seed=seed_of("explanation", method)).with_normals())
-        notes += [] if found.converged else [f"{method} failed: {found.failure}"]
-        return Outcome(found.T_target_source, float(found.fitness), float(found.inlier_rmse))
+        outcome = register(Pair(clouds.source, clouds.target, seed=seed_of("explanation", method)).with_normals())
+        notes += [] if outcome.converged else [f"{method} failed: {outcome.failure}"]
+        return Outcome(outcome.T_target_source, float(outcome.fitness), float(outcome.inlier_rmse))
 
     def _spread(
         self,
@@ -223,28 +225,28 @@ class Explainer:
         diameter = clouds.frame.diameter
         if method is None and estimator == MONTE_CARLO:
             return spread_of_icp(clouds.icp, clouds.source, at_pose.T_target_source, settings, diameter)
-        found_by = method or NAMES[self.model.icp.method]
-        of_pair = (clouds.source, clouds.target, at_pose, found_by, settings, diameter)
+        name = method or NAMES[self.model.icp.method]
+        of_pair = (clouds.source, clouds.target, at_pose, name, settings, diameter)
         spread, fault = estimated_spread(estimate, estimator, *of_pair)
         notes += [fault] if fault else []
         return spread
 
-    def _decision(self, scores_C: np.ndarray, bald: float, found: Diagnosis | None, voids: list[Void]) -> Decision:
+    def _decision(self, scores_C: np.ndarray, bald: float, diagnosis: Diagnosis | None, voids: list[Void]) -> Decision:
         """Return what to do: by the diagnosis where there is one, otherwise by the scores alone."""
         if voids:
             return Decision(CHECK, "", ", ".join(void.check for void in voids))
-        if found is None:
+        if diagnosis is None:
             return self.policy.decide(scores_C, bald, concepts=self.model.concepts)
-        if found.state == NOMINAL:
+        if diagnosis.state == NOMINAL:
             return Decision(NOTHING, "", "nothing is wrong")
-        return self.policy.decide(np.array([*found.causes.values()]), found.bald, concepts=(*found.causes,))
+        return self.policy.decide(np.array([*diagnosis.causes.values()]), diagnosis.bald, concepts=(*diagnosis.causes,))
 
-    def _warnings(self, clouds: Clouds, found: Diagnosis | None) -> list[str]:
+    def _warnings(self, clouds: Clouds, diagnosis: Diagnosis | None) -> list[str]:
         """Return what makes the scores doubtful, in words."""
         warnings = list(self.model.familiar.warnings(clouds.source, clouds.target)) if self.model.familiar else []
-        if found is not None and found.unlikeness > 1:
+        if diagnosis is not None and diagnosis.unlikeness > 1:
             warnings.append(
-                f"the pair is {found.unlikeness:.1f} times as far from the registrations that the diagnosis was "
+                f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis was "
                 "trained on as 99 % of these are from one another"
             )
         return warnings

@@ -1,4 +1,4 @@
-"""What is said of one registration: pose, whether it is right, the causes where it is not, and what to do."""
+"""An explanation of one registration: pose, whether it is right, the causes where it is not, and what to do."""
 
 from __future__ import annotations
 
@@ -118,8 +118,8 @@ class Explanation:
             f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
         )
         doubts = [f"warning   {line}" for line in self.warnings]
-        said = [*self._diagnosed(), action, "", *self._attributed()]
-        lines = [*doubts, *([f"state     {UNKNOWN}", action] if self.unknown else said), "", registered]
+        body = [*self._diagnosed(), action, "", *self._attributed()]
+        lines = [*doubts, *([f"state     {UNKNOWN}", action] if self.unknown else body), "", registered]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
             by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"
@@ -132,13 +132,13 @@ class Explanation:
     def _diagnosed(self) -> list[str]:
         if self.diagnosis is None:
             return []
-        found = self.diagnosis
-        named = " and ".join(found.named) or "nothing is wrong"
+        diagnosis = self.diagnosis
+        named = " and ".join(diagnosis.named) or "nothing is wrong"
         return [
-            f"state     {found.state}: {named}",
-            f"failure   probability {found.failure:.3f}, called a failure from {found.threshold:.3f}",
-            f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in found.causes.items())}, if it failed",
-            f"error     about {found.expected_error:.2g} {self.unit}",
+            f"state     {diagnosis.state}: {named}",
+            f"failure   probability {diagnosis.failure:.3f}, called a failure from {diagnosis.threshold:.3f}",
+            f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in diagnosis.causes.items())}, if it failed",
+            f"error     about {diagnosis.expected_error:.2g} {self.unit}",
         ]
 
     def _attributed(self) -> list[str]:

@@ -91,23 +91,16 @@ class Familiarity:
     def warnings(self, source: np.ndarray, target: np.ndarray) -> list[str]:
         """Return a line for each measure of the pair that lies outside its range; see :func:`measure`."""
         measured = measure(source, target)
-        below, above = (
-            {name for name, (low, high) in self.ranges.items() if beyond(measured[name], low, high)}
-            for beyond in (lambda value, low, _: value < low, lambda value, _, high: value > high)
-        )
-        said = []
-        if "size" in below | above:
-            between = " to ".join(f"{end:.2g}" for end in self.ranges["size"])
-            said.append(
-                f"the source is {measured['size']:.2g} times as large as the target; in training it was {between} "
-                "times: are both in the same unit and scale?"
-            )
-        if "depth" in above:
-            said.append("the source shows the object from all sides, but GP-CA was trained on partial views")
-        if "depth" in below:
-            said.append(
-                "the source shows the object from one side alone, but GP-CA was trained on clouds that show more of it"
-            )
-        if "closure" in below:
-            said.append("the target looks like a view from one side: give the whole object")
-        return said
+        below = {name for name, (low, _) in self.ranges.items() if measured[name] < low}
+        above = {name for name, (_, high) in self.ranges.items() if measured[name] > high}
+        between = " to ".join(f"{end:.2g}" for end in self.ranges["size"])
+        lines = {
+            f"the source is {measured['size']:.2g} times as large as the target; in training it was {between} times: "
+            "are both in the same unit and scale?": "size" in below | above,
+            "the source shows the object from all sides, but GP-CA was trained on partial views": "depth" in above,
+            "the source shows the object from one side alone, but GP-CA was trained on clouds that show more of it": (
+                "depth" in below
+            ),
+            "the target looks like a view from one side: give the whole object": "closure" in below,
+        }
+        return [line for line, holds in lines.items() if holds]

@@ -28,7 +28,7 @@ FORMAT, VERSION = "GP-CA model", 3
 
 @dataclass(frozen=True)
 class Model:
-    """What says whether a registration is right and why it is not; and the paper's GP-CA, which it learned besides.
+    """A diagnoser, which says whether a registration is right and why it is not, and the paper's GP-CA.
 
     Attributes:
         diagnoser: of the pair after ICP, learned from measured causes of all sources; None where there is GP-CA alone.
@@ -65,7 +65,9 @@ class Model:
             "version": VERSION,
             "diagnoser": self.diagnoser and self.diagnoser.state(),
             "encoder": self.encoder.state_dict(),
-            "encoder_settings": _renamed(_given(asdict(self.encoder_settings)), "draw_points", "points"),
+            "encoder_settings": _renamed(
+                {k: v for k, v in asdict(self.encoder_settings).items() if v is not None}, "draw_points", "points"
+            ),
             "gpc": self.gpc.state(),
             "icp": asdict(self.icp),
             "points": self.cloud_points,
@@ -99,6 +101,7 @@ class Model:
         try:
             settings = EncoderSettings(**_renamed(content["encoder_settings"], "points", "draw_points"))
             require_possible(content, settings)
+            familiar = content.get("familiar")
             encoder = make_encoder(settings.backbone, settings.options)
             encoder.load_state_dict(content["encoder"])
             return cls(
@@ -109,24 +112,13 @@ class Model:
                 icp=ICPSettings(**content["icp"]),
                 policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
                 cloud_points=content["points"],
-                familiar=_familiarity(content),
+                familiar=familiar and Familiarity({name: (low, high) for name, (low, high) in familiar.items()}),
                 **{name: content[name] for name in ("title", "stand_in")},
             )
         except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
             raise InputError(path, f"is a model with missing or damaged parts ({fault})", REMEDY) from fault
 
 
-def _familiarity(content: Mapping) -> Familiarity | None:
-    if "familiar" not in content:
-        return None
-    return Familiarity({name: (low, high) for name, (low, high) in content["familiar"].items()})
-
-
 def _renamed(settings: Mapping, old: str, new: str) -> dict:
     """Rename one setting in its place: files of this version say `points`, whatever the config calls it now."""
     return {new if name == old else name: value for name, value in settings.items()}
-
-
-def _given(settings: dict) -> dict:
-    """Return the settings that have a value."""
-    return {name: value for name, value in settings.items() if value is not None}

@@ -20,7 +20,7 @@ _READ = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # am
 
 @dataclass(frozen=True)
 class License:
-    """What is known of the license of a dataset.
+    """The license of a dataset, as far as it is known.
 
     Attributes:
         dataset, license: their names.

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.errors import InputError
-from gpca.io.csv_file import numbers, read_csv
+from gpca.io.csv_file import read_numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,14 +26,5 @@ OF_ONE_EXPLANATION = ("icp", "features", "sampling", "scores")
 
 
 def read_runtime(path: str | Path) -> pd.DataFrame:
-    """Read the rows.
-
-    Raises:
-        InputError: missing or unreadable file, missing column, unknown component, seconds that are no numbers.
-    """
-    rows = read_csv(path, RUNTIME_COLUMNS)
-    if unknown := set(rows["component"]) - set(COMPONENTS):
-        raise InputError(path, f"unknown component '{sorted(unknown)[0]}'", f"expected one of {', '.join(COMPONENTS)}")
-    for column in ("threads", "repeats", "mean_s", "deviation_s", "median_s"):
-        rows[column] = numbers(path, rows, column)
-    return rows
+    """Read the rows."""
+    return read_numbers(path, RUNTIME_COLUMNS, ("threads", "repeats", "mean_s", "deviation_s", "median_s"))

@@ -1,4 +1,4 @@
-"""What leaves an explanation without meaning: nothing that a model says of such a pair counts, whatever it is.
+"""Pairs whose explanation has no meaning: nothing that a model says of them counts.
 
 Unlike a warning of what was rare in the training, each of these leaves no state but `UNKNOWN`, and nothing to do but to
 check what was given.

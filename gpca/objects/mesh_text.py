@@ -1,4 +1,4 @@
-"""What a mesh file of text declares, held against what it holds: PLY, OFF, OBJ and STL.
+"""Mesh files of text, PLY, OFF, OBJ and STL, must hold what they declare.
 
 trimesh reads a row that is too wide, a list of another length, an index 0, a misspelled keyword or a file that ends
 early as another mesh, without a word.

@@ -10,7 +10,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.errors import InputError
+from gpca.io.json_file import finite_numbers
 
+REMEDY = "write it as the BOP format does"
 TOLERANCE = 0.01  # diameters
 SOUGHT_POINTS = 4096  # of a cloud, the first ones, on which symmetries are sought
 DISCRETE_DEG = (90.0, 180.0)
@@ -38,16 +40,16 @@ def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
     """
     for n, matrix in enumerate(_entries(listed, "symmetries_discrete", subject)):
         place = f"{subject}, symmetries_discrete {n}"
-        T = _numbers(matrix, 16, place).reshape(4, 4)
+        T = finite_numbers(matrix, 16, place, "it", REMEDY).reshape(4, 4)
         R = T[:3, :3]
         if not (np.allclose(R @ R.T, np.eye(3), atol=1e-3) and np.linalg.det(R) > 0 and (T[3] == (0, 0, 0, 1)).all()):
             raise InputError(place, "is not a rotation and a shift", "give a rigid transform, row by row")
     for n, turn in enumerate(_entries(listed, "symmetries_continuous", subject)):
         place = f"{subject}, symmetries_continuous {n}"
         axis, offset = (turn.get(key) if isinstance(turn, Mapping) else None for key in ("axis", "offset"))
-        if not np.linalg.norm(_numbers(axis, 3, f"{place}: axis")) > 0:
-            raise InputError(f"{place}: axis", "has no direction", "give the axis of revolution, such as 0 0 1")
-        _numbers(offset, 3, f"{place}: offset")
+        if not np.linalg.norm(finite_numbers(axis, 3, place, "axis", REMEDY)) > 0:
+            raise InputError(place, "axis has no direction", "give the axis of revolution, such as 0 0 1")
+        finite_numbers(offset, 3, place, "offset", REMEDY)
 
 
 def _entries(listed: Mapping[str, Any], key: str, subject: str) -> list:
@@ -55,14 +57,6 @@ def _entries(listed: Mapping[str, Any], key: str, subject: str) -> list:
     if not isinstance(entries, list):
         raise InputError(f"{subject}, {key}", "is not a list", "list the symmetries, or leave the key out")
     return entries
-
-
-def _numbers(value: Any, count: int, subject: str) -> np.ndarray:
-    rows = value if isinstance(value, list) else []
-    numbers = [number for row in rows for number in (row if isinstance(row, list) else [row])]
-    if len(numbers) != count or any(type(n) not in (int, float) or not abs(n) < 1e12 for n in numbers):
-        raise InputError(subject, f"is not {count} finite numbers", "write it as the BOP format does")
-    return np.array(numbers, float)
 
 
 def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:

@@ -1,4 +1,4 @@
-"""What a source is called wherever it is shown: a stand-in always says that it is one."""
+"""Titles of sources, wherever they are shown: a stand-in always says that it is one."""
 
 from __future__ import annotations
 

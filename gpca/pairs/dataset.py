@@ -12,8 +12,7 @@ import numpy as np
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, axes_in, load_arrays, save_arrays
-from gpca.io.axes import Axes
-from gpca.io.names import SPLITS
+from gpca.io.names import SPLITS, Axes
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 

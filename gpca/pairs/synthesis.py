@@ -10,8 +10,7 @@ import numpy as np
 
 from gpca.alignment.icp import ICP, ICPSettings
 from gpca.alignment.rigid import scale_translation, transform
-from gpca.io.axes import Axes
-from gpca.io.names import SPLITS
+from gpca.io.names import SPLITS, Axes
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, Perturbed, Severities

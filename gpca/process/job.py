@@ -44,6 +44,11 @@ class Job:
         settings = dict(self.settings)
         return settings, settings.pop("icp", {})
 
+    def files(self, name: str) -> list[Path]:
+        """Return the files of that name where a rule may give one or several."""
+        files = getattr(self, name)
+        return files if isinstance(files, list) else [files]
+
     def per_seed(self, *names: str) -> Iterator[tuple]:
         """Yield each of ``seeds`` with its file from each of the named lists."""
         return zip(self.seeds, *(getattr(self, name) for name in names), strict=True)

@@ -10,7 +10,7 @@ from gpca.attribution.predictions import read_timings, write_predictions, write_
 from gpca.errors import InputError
 from gpca.explainers.interface import Describing, ExplainerEntry
 from gpca.explainers.registry import explainer_entry
-from gpca.io.axes import Axes
+from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance

@@ -26,17 +26,19 @@ def run(job: Job) -> None:
     given, of_icp = job.settings_and_icp()
     settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
     poses, weights = job.get("poses"), job.get("start")
-    files = zip(job.registrations, job.get("registrations_of", [job.source]), strict=True)
+    files = zip(job.files("registrations"), job.get("registrations_of", [job.source]), strict=True)
     registrations = joined([Registrations.load(path, (source, job.seed)) for path, source in files])
     # Clouds of frames are as small as objects look, so some of their points are drawn twice; others are as configured.
     if poses is None and settings.draw_points > (most := int(np.diff(registrations.offsets).max())):
         fault = f"the largest cloud has {most} points, fewer than draw_points, {settings.draw_points}"
-        raise InputError(job.registrations[0], fault, "lower draw_points, or raise cloud_points of registrations")
+        raise InputError(
+            job.files("registrations")[0], fault, "lower draw_points, or raise cloud_points of registrations"
+        )
     instance_S = read_instances_of(poses, registrations) if poses else None
     start = load_model(weights, settings).state_dict() if weights else None
     # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = job.weights.with_suffix(".checkpoint")
-    inputs = [*job.registrations, *(path for path in (poses, weights) if path)]
+    inputs = [*job.files("registrations"), *(path for path in (poses, weights) if path)]
     with record_provenance([job.weights, job.curve], inputs, job.settings, seed=job.seed):
         seen = read_as(settings.reading, registrations, icp)
         model, curve = train_encoder(seen, job.source, job.seed, settings, checkpoint, start=start, group_S=instance_S)

@@ -10,8 +10,8 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.axes import Axes
 from gpca.io.csv_file import read_numbers, write_csv
+from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations
 
 

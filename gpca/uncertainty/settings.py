@@ -8,7 +8,6 @@ from typing import Annotated
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.errors import InputError
 from gpca.settings import Bounds
 
 MONTE_CARLO = "monte_carlo"  # the estimator that these are settings of
@@ -38,13 +37,6 @@ class UncertaintySettings:
     icp_points: Annotated[int, Bounds(minimum=16, maximum=65536)] = 512
     floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-6
     icp: ICPSettings = field(default_factory=ICPSettings)
-
-    def __post_init__(self) -> None:
-        if self.starts < FEWEST_STARTS:
-            remedy = f"give at least {FEWEST_STARTS}: fewer do not determine a 6×6 covariance"
-            raise InputError("uncertainty setting 'starts'", f"{self.starts}", remedy)
-        if self.floor <= 0:
-            raise InputError("uncertainty setting 'floor'", f"{self.floor}", "give a positive variance")
 
     def deviation_6(self) -> np.ndarray:
         """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""

@@ -66,13 +66,8 @@ def test_a_concept_absent_from_training_scores_0(embedded, absent):
 
 def test_an_embedding_that_tells_nothing_is_refused(embedded):
     train = embedded.subset(embedded.rows("train"))
-    for h, fault in (
-        (np.full((36, 4), np.nan), "contains NaN"),
-        (np.zeros((36, 0)), "has shape"),
-        (np.ones((36, 4)), "is the same for all training registrations"),
-    ):
-        with pytest.raises(InputError, match=f"array 'embedding': {fault}"):
-            ConceptVectors("tiny", 0).fit(replace(train, attached={"embedding": h}))
+    with pytest.raises(InputError, match="array 'embedding': is the same for all training registrations"):
+        ConceptVectors("tiny", 0).fit(replace(train, attached={"embedding": np.ones((36, 4))}))
 
 
 def test_one_concept_alone_is_refused(embedded):

@@ -94,14 +94,6 @@ def test_a_seed_repeats_every_byte_and_a_concept_absent_from_training_scores_0(n
     assert first.sum(axis=1) == pytest.approx(1)
 
 
-def test_a_covariance_of_nan_or_none_at_all_is_refused(attached):
-    nan = np.full_like(attached.attached["covariance"], np.nan)
-    with pytest.raises(InputError, match="array 'covariance': contains NaN"):
-        features(replace(attached, attached={"covariance": nan}), FLOOR)
-    with pytest.raises(InputError, match="array 'covariance': is not attached"):
-        features(replace(attached, attached={}), FLOOR)
-
-
 def test_the_config_may_set_what_they_take():
     require_settings("residuals_logistic", {"inverse_regularisation": 0.1, "floor": 1e-5})
     require_settings("residuals_forest", {"trees": 20, "floor": 1e-5})

@@ -5,7 +5,6 @@ import pytest
 from scipy.stats import rankdata
 
 from baselines.sensitivity import local_derivatives, partial_rank_correlations, single_drops, total_indices
-from gpca.errors import InputError
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import STEP, sample_knobs
@@ -149,14 +148,3 @@ def test_where_no_knob_changes_anything_no_concept_is_named(name, registrations)
     assert np.flatnonzero(attribution.abstained_N).tolist() == [0, 5]
     assert np.flatnonzero(attribution.predicted_N == "").tolist() == [0, 5]
     assert np.isfinite(attribution.scores_N_C).all()
-
-
-@pytest.mark.parametrize("name", ADDITIVE)
-def test_an_uncertainty_that_is_missing_or_nan_is_refused(name, registrations):
-    arrays = dict(with_uncertainty(name, registrations).attached)
-    nan = np.full_like(arrays["uncertainty"], np.nan)
-    with pytest.raises(InputError, match="array 'uncertainty': contains NaN"):
-        explain(name, replace(registrations, attached={**arrays, "uncertainty": nan}))
-    del arrays["uncertainty"]
-    with pytest.raises(InputError, match="array 'uncertainty': is not attached"):
-        explain(name, replace(registrations, attached=arrays))

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from baselines.shap_kl import shapley_values
-from gpca.errors import InputError
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import DESIGNS
@@ -143,15 +142,3 @@ def test_the_oracle_gives_the_true_concept_all_of_the_value(attached):
     attribution = explain("shap_oracle", with_uncertainty(attached, 0.2 + height_S[:, None] * present_S_8))
     assert attribution.scores_N_C == pytest.approx(height_S[:, None] * true_S_3, abs=1e-9)
     assert attribution.predicted_N.tolist() == attached.concept.tolist()
-
-
-@pytest.mark.parametrize("name", ["uncertainty", "icp_calls", "icp_seconds", "seconds"])
-def test_an_array_that_is_missing_or_nan_is_refused(attached, name):
-    arrays = dict(attached.attached)
-    arrays[name] = arrays[name].astype(float)
-    arrays[name][3, 2] = np.nan
-    with pytest.raises(InputError, match=f"array '{name}': contains NaN"):
-        explain("shap_additive", replace(attached, attached=arrays))
-    del arrays[name]
-    with pytest.raises(InputError, match=f"array '{name}': is not attached"):
-        explain("shap_additive", replace(attached, attached=arrays))

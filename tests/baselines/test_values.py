@@ -178,28 +178,6 @@ def test_corners_are_the_first_eight_conditions(attached):
     assert np.array_equal(corners(with_arrays(attached, uncertainty=eleven), "uncertainty"), eleven[:, :8])
 
 
-@pytest.mark.parametrize(
-    ("name", "array"),
-    [*((name, "uncertainty") for name in (*SCALED, *LEARNED)), *((name, "residual") for name in LEARNED)],
-)
-def test_a_worth_that_is_missing_or_nan_is_refused(name, array, attached):
-    explainer = fitted(name, attached)
-    nan = with_arrays(attached, **{array: np.full((len(attached), 8), np.nan)})
-    without = replace(attached, attached={key: value for key, value in attached.attached.items() if key != array})
-    for registrations, fault in ((nan, "contains NaN"), (without, "is not attached")):
-        with pytest.raises(InputError, match=f"array '{array}': {fault}"):
-            explainer.explain(registrations)
-        with pytest.raises(InputError, match=f"array '{array}': {fault}"):
-            fitted(name, registrations)
-
-
-@pytest.mark.parametrize("missing", ["icp_calls", "icp_seconds", "seconds"])
-def test_a_cost_that_is_missing_is_refused(missing, attached):
-    without = replace(attached, attached={key: value for key, value in attached.attached.items() if key != missing})
-    with pytest.raises(InputError, match=f"array '{missing}': is not attached"):
-        charged(without, np.zeros((len(attached), 3)), [0], perf_counter())
-
-
 @pytest.mark.parametrize("name", (*SCALED, *LEARNED))
 def test_the_config_may_set_what_they_take_and_no_more(name):
     require_settings(name, {"worth": "residual"} if name in SCALED else {"inverse_regularisation": 0.1})

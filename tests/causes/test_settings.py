@@ -13,7 +13,6 @@ FAULTS = [
     ),
     ({"severities": {"outliers": [0.2, 0.1]}}, r"severity outliers: \[0.2, 0.1\] is in descending order"),
     ({"several": [0.7, 0.3]}, r"causes several: \[0.7, 0.3\] is in descending order"),
-    ({"starts": 12}, "'starts': 12; give at least 13"),
 ]
 
 

@@ -137,11 +137,6 @@ def test_repeated_and_few_points_can_be_fitted():
     assert np.isfinite(fitted(h, np.repeat(LABELS[:2], 4)).attribute(h)[0]).all()
 
 
-def test_an_unknown_kernel_is_named():
-    with pytest.raises(InputError, match=r"kernel 'linear': unknown; choose one of rbf, matern32, polynomial"):
-        GPCSettings("linear")
-
-
 SEEN, NEW = LABELS != "overlap", np.flatnonzero(LABELS == "overlap")
 
 

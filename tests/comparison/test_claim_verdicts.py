@@ -8,7 +8,6 @@ import pytest
 from gpca.attribution.predictions import PREDICTION_COLUMNS
 from gpca.comparison.claim_verdicts import CLAIM_COLUMNS, judge, read_verdicts, verdict_of_interval
 from gpca.comparison.claims import PREDICTIONS, Claim, Compared
-from gpca.errors import InputError
 
 from .conftest import write
 from .made_up import ACCURACY, LABELS, OBJECTS, TIME, runtime, tidy
@@ -157,6 +156,3 @@ def test_verdicts_are_written_and_read(tmp_path):
     read = read_verdicts(path)
     assert read["value"].tolist() == pytest.approx([2.5, float("nan")], nan_ok=True)
     assert read["verdict"].tolist() == rows["verdict"].tolist()
-    path.write_text(path.read_text().replace("not run", "nobody knows"))
-    with pytest.raises(InputError, match="unknown verdict 'nobody knows'"):
-        read_verdicts(path)

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.metrics import TIDY_COLUMNS
-from gpca.comparison.readings import judge_readings, read_judged, summarise, with_readings
+from gpca.comparison.readings import judge_readings, read_judged, summarize, with_readings
 from gpca.errors import InputError
 
 from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy
@@ -35,7 +35,7 @@ def judged(printed, values, here=0.97):
 )
 def test_a_number_is_produced_or_between_readings_or_outside(printed, values, where, nearest):
     found, comparison = judged(printed, values)
-    of = summarise(found)[KEY]["start"]
+    of = summarize(found)[KEY]["start"]
     assert (of.where, of.nearest, of.readings) == (where, nearest, 2)
     assert (of.least, of.most) == (100 * min(values.values()), 100 * max(values.values()))
     [reason] = with_readings(comparison, found)["reason"]
@@ -46,7 +46,7 @@ def test_a_number_is_produced_or_between_readings_or_outside(printed, values, wh
 
 def test_a_number_that_is_reproduced_needs_no_reading():
     found, comparison = judged(97.0, {"random": 0.5}, here=0.97)
-    assert summarise(found) == {}
+    assert summarize(found) == {}
     assert with_readings(comparison, found)["reason"].tolist() == comparison["reason"].tolist()
 
 
@@ -54,7 +54,7 @@ def test_the_joint_reading_fits_most_numbers_of_its_group():
     numbers = [number(50.0), number(60.0, row="Cups", counterpart=OF_CUPS)]
     results = {"metrics.csv": pd.concat([tidy([0.9, 0.9]), tidy([0.9, 0.9], source="cups")])}
     both = pd.concat([readings({"a": 0.5, "b": 0.52}), readings({"a": 0.9, "b": 0.59}, source="cups")])
-    found = summarise(judge_readings(numbers, compared(numbers, results), both, TOLERANCES))
+    found = summarize(judge_readings(numbers, compared(numbers, results), both, TOLERANCES))
     assert [(of["start"].joint, of["start"].fitted, of["start"].touched) for of in found.values()] == [("b", 2, 2)] * 2
     assert found[KEY]["start"].nearest == "a"
 

@@ -44,14 +44,13 @@ def here(tmp_path, monkeypatch):
 
 @pytest.fixture
 def start(here):
-    """Start a process that lives until its stdin is closed or it is killed; as a job it bears the job's mark."""
+    """Start a process that lives until its stdin is closed or it is killed."""
     started = []
 
-    def start(*arguments, code=LIVES, job=False, folder=here):
-        environment = {name: value for name, value in os.environ.items() if name != "GPCA_CONFIG_SHA256"}
-        environment |= {"PYTHONPATH": str(ROOT)} | ({"GPCA_CONFIG_SHA256": "c0ffee"} if job else {})
+    def start(*arguments):
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        process = subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=folder, env=environment, **pipes)
+        process = subprocess.Popen([sys.executable, "-c", LIVES, *arguments], cwd=here, env=environment, **pipes)
         started.append(process)
         assert process.stdout.readline() == b"lives\n"
         return process
@@ -160,43 +159,3 @@ def test_a_link_in_place_of_a_temporary_folder_is_removed_and_what_it_names_is_n
     (here / ".snakemake/running").write_text(f"{here}/snakemakeabcd1234\n")
     clear_leftovers([here / "snakemakeown_own_"])
     assert (here / "home/letter").exists()
-
-
-WAITS = "import sys; print('lives', flush=True); sys.stdin.read()"
-
-
-def test_jobs_that_outlived_their_snakemake_are_waited_for(here, start, monkeypatch, capsys):
-    job = start(code=WAITS, job=True)
-
-    def end(seconds):
-        assert (here / ".snakemake" / LEFT[0]).exists()
-        job.kill()
-        job.wait()
-
-    monkeypatch.setattr(restart.time, "sleep", end)
-    clear_leftovers([])
-    assert capsys.readouterr().err == (
-        f"gpca: waiting for jobs of a killed run to end; 'kill {job.pid}' ends them at once\n"
-    )
-    assert files(here / ".snakemake") == set(KEPT)
-
-
-STARTS = """
-import subprocess, sys
-command = [sys.executable, "-c", sys.argv[1]]
-print(subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True).stdout, end="", flush=True)
-sys.stdin.read()
-"""
-
-
-def test_a_job_that_runs_a_workflow_itself_is_not_waited_for_by_it(here, start):
-    start(LIVES, code=STARTS, job=True)
-    assert files(here / ".snakemake") == set(KEPT)
-
-
-@pytest.mark.parametrize("other", ["no job", "elsewhere"])
-def test_no_other_process_is_waited_for(here, start, monkeypatch, other):
-    (here / "elsewhere").mkdir()
-    start(code=WAITS, job=other == "elsewhere", folder=here / "elsewhere" if other == "elsewhere" else here)
-    monkeypatch.setattr(restart.time, "sleep", lambda seconds: pytest.fail("waits"))
-    clear_leftovers([])

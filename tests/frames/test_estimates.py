@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.frames.estimates import EstimatorErrors, Estimators, error_of, read_pose_errors
+from gpca.frames.estimates import EstimatorErrors, choose_estimate, error_of, read_pose_errors
 
 HEAD = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
 SEEN = {
@@ -20,18 +20,20 @@ def pose(x_m, z_m=1.0):
 
 
 def test_every_estimator_that_spoke_of_an_object_is_drawn():
-    estimators = Estimators({"a": {(1, 2, 3): [pose(0.01)]}, "b": {(1, 2, 3): [pose(0.02)]}, "c": {}})
-    drawn = [estimators.choose((1, 2, 3), True, SEEN, np.random.default_rng(seed)) for seed in range(20)]
+    estimators = {"a": {(1, 2, 3): [pose(0.01)]}, "b": {(1, 2, 3): [pose(0.02)]}, "c": {}}
+    drawn = [choose_estimate(estimators, (1, 2, 3), True, SEEN, np.random.default_rng(seed)) for seed in range(20)]
     assert {name for name, _ in drawn} == {"a", "b"}
     assert all(T[0, 3] == {"a": 0.01, "b": 0.02}[name] for name, T in drawn)
-    assert estimators.choose((1, 2, 4), True, SEEN, np.random.default_rng(0)) is None
+    assert choose_estimate(estimators, (1, 2, 4), True, SEEN, np.random.default_rng(0)) is None
 
 
 def test_among_equal_objects_an_estimate_elsewhere_is_of_another_one():
-    estimators = Estimators({"a": {(1, 2, 3): [pose(0.3)]}})
+    estimators = {"a": {(1, 2, 3): [pose(0.3)]}}
     random = np.random.default_rng(0)
-    assert estimators.choose((1, 2, 3), False, SEEN, random) is None
-    assert estimators.choose((1, 2, 3), True, SEEN, random)  # the only one of its kind: a bad estimate is one too
+    assert choose_estimate(estimators, (1, 2, 3), False, SEEN, random) is None
+    assert choose_estimate(
+        estimators, (1, 2, 3), True, SEEN, random
+    )  # the only one of its kind: a bad estimate is one too
 
 
 def test_errors_are_those_of_the_object_or_of_others_without_symmetry():

@@ -137,8 +137,8 @@ def test_datasets_without_any_model_that_can_stand_are_refused(scenes, tmp_path,
     [
         ({"datasets": {"tiny": {"location": "/nowhere/at/all"}}}, "/nowhere/at/all does not exist"),
         ({"datasets": {"tiny": {"location": "/", "results": "/lost.csv"}}}, "/lost.csv: no such results file; correct"),
-        ({"datasets": {"tiny": {"place": "x"}}}, "setting datasets.tiny.place: unknown"),
-        ({"initial_pose": {"form": "guess"}}, "setting initial_pose.form: 'guess' is not one of"),
+        ({"datasets": {"tiny": {"place": "x"}}}, "datasets.tiny.place: unknown"),
+        ({"initial_pose": {"form": "guess"}}, "initial_pose.form: 'guess' should be"),
     ],
 )
 def test_a_faulty_call_ends_in_one_line(read, capsys, given, expected):

@@ -35,12 +35,12 @@ SYMMETRIES = {
     "mirrored": ("discrete", [TURN, [-1, *TURN[1:]]], "discrete 1: is not a rotation and a shift"),
     "another last row": ("discrete", [[*TURN[:12], 1, 0, 0, 1]], "is not a rotation and a shift"),
     "NaN": ("discrete", [[float("nan"), *TURN[1:]]], "NaN is not a number"),
-    "huge": ("discrete", [[10**400, *TURN[1:]]], "is not 16 finite numbers"),
-    "a matrix alone": ("discrete", TURN, "is not 16 finite numbers"),
+    "huge": ("discrete", [[10**400, *TURN[1:]]], "contains a number that is not finite"),
+    "a matrix alone": ("discrete", TURN, "has 1 numbers, not 16"),
     "a word": ("discrete", "none", "is not a list"),
-    "no axis": ("continuous", [{"offset": [0, 0, 0]}], "axis: is not 3 finite numbers"),
-    "an axis of zeros": ("continuous", [{"axis": [0, 0, 0], "offset": [0, 0, 0]}], "axis: has no direction"),
-    "a list for an axis": ("continuous", [[0, 0, 1]], "axis: is not 3 finite numbers"),
+    "no axis": ("continuous", [{"offset": [0, 0, 0]}], "axis contains None, which is not a number"),
+    "an axis of zeros": ("continuous", [{"axis": [0, 0, 0], "offset": [0, 0, 0]}], "axis has no direction"),
+    "a list for an axis": ("continuous", [[0, 0, 1]], "axis contains None, which is not a number"),
 }
 
 

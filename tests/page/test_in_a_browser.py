@@ -47,9 +47,9 @@ def test_a_browser_draws_both_clouds_and_has_nothing_to_complain_about(folder, t
     chromium(folder / "index.html", tmp_path, f"--screenshot={tmp_path / 'page.png'}", "--window-size=1000,5000")
     with Image.open(tmp_path / "page.png") as image:
         pixels = np.asarray(image.convert("RGB")).astype(int)
-    for colour in ((213, 94, 0), (0, 114, 178)):  # of target and source
-        of_colour = (np.abs(pixels - colour).max(axis=2) < 12).sum(axis=1)
-        assert (of_colour > 0).sum() > 100  # rows of pixels: a cloud, not the key below it
+    for color in ((213, 94, 0), (0, 114, 178)):  # of target and source
+        of_color = (np.abs(pixels - color).max(axis=2) < 12).sum(axis=1)
+        assert (of_color > 0).sum() > 100  # rows of pixels: a cloud, not the key below it
 
 
 @in_a_browser

@@ -74,7 +74,7 @@ def test_the_comparison_comes_with_its_verdicts_counted_and_named(page):
         assert re.search(rf'<span class="verdict[^"]*">{verdict}</span>', page.text)
 
 
-def test_stand_ins_are_labelled_and_real_objects_are_not(page):
+def test_stand_ins_are_labeled_and_real_objects_are_not(page):
     assert 'Bricks &lt;b&gt; <span class="badge">procedural stand-in</span>' in page.text
     assert "<li>Cones</li>" in page.text
 

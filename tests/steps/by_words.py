@@ -54,9 +54,11 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "uncertainty": "seeds registrations outcomes tables timings",
 }
 NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
-TEXTS = set(
-    ["source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of", "registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners", "methods", "encoders_of", "data_dir"]
-)
+TEXTS = {
+    *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
+    *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
+    *("methods", "encoders_of", "data_dir"),
+}
 SWITCHES = {"stand_in"}
 
 

@@ -7,8 +7,6 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
-from gpca.errors import InputError
-from gpca.uncertainty.settings import FEWEST_STARTS
 from gpca.uncertainty.spread import (
     SMALLEST_RESIDUAL,
     Runs,
@@ -131,20 +129,6 @@ def test_the_log_determinant_is_that_of_the_floored_covariance():
 
 
 # Settings
-
-
-@pytest.mark.parametrize("starts", [-1, 0, 1, 6, 12])
-def test_fewer_starts_than_a_covariance_needs_are_refused(starts):
-    with pytest.raises(InputError, match=rf"'starts': {starts}; give at least 13") as caught:
-        UncertaintySettings(starts=starts)
-    assert "\n" not in str(caught.value)
-    assert UncertaintySettings(starts=FEWEST_STARTS).starts == 13
-
-
-@pytest.mark.parametrize("floor", [0.0, -1e-6])
-def test_a_floor_that_is_none_is_refused(floor):
-    with pytest.raises(InputError, match=r"'floor': .* positive"):
-        UncertaintySettings(floor=floor)
 
 
 def test_the_starts_have_the_root_mean_square_angle_and_length_of_the_settings():

@@ -78,6 +78,43 @@ def test_a_collector_takes_what_its_rule_gives(function, names):
     inspect.signature(load(function)).bind(**dict.fromkeys(names))
 
 
+def steps_of_rules():
+    """Each rule that runs a step, with its module and the names that it gives; one derived from another has its too."""
+    rules = {}
+    for path in RULES:
+        for text in re.split(r"^(?=(?:use )?rule \w)", path.read_text(), flags=re.MULTILINE)[1:]:
+            rules[re.match(r"(?:use )?rule (\w+)(?: as (\w+))?", text).group(2) or text.split()[1].rstrip(":")] = text
+    for name, text in rules.items():
+        base = re.match(r"use rule (\w+)", text)
+        step = re.search(r'step="([\w.]+)"', text) or (base and re.search(r'step="([\w.]+)"', rules[base[1]]))
+        if step:
+            inherited = rules[base[1]] if base else ""
+            for part in ("input", "output"):  # what a derived rule gives of these stands in the place of all
+                if f"    {part}:\n" in text:
+                    inherited = re.sub(rf"^    {part}:\n(?:        .*\n)+", "", inherited, flags=re.MULTILINE)
+            whole = text + inherited
+            unpacked = "unpack(" in text or "**" in text
+            yield pytest.param(step[1], whole, unpacked, id=name)
+
+
+@pytest.mark.parametrize(("module", "rule", "unpacked"), [*steps_of_rules()])
+def test_a_step_takes_what_its_rule_gives(module, rule, unpacked):
+    given = {*re.findall(r"^        (\w+)=", rule, re.MULTILINE), *re.findall(r"\{(\w+)\}", rule)}
+    source = (ROOT / f"{module.replace('.', '/')}.py").read_text()
+    taken = set(re.findall(r"\bjob\.(\w+)\b(?!\()", source))
+    taken |= {name for names in re.findall(r"job\.per_seed\(([^)*]*)\)", source) for name in re.findall(r"\w+", names)}
+    always = {"settings", "threads", "data_dir", "downloads", "section", "per_seed", "get"}
+    missing = taken - given - always
+    assert not missing or (unpacked and missing <= UNPACKED[module]), missing
+
+
+UNPACKED = {
+    "gpca.steps.model": {"registrations", "embeddings"},
+    "gpca.experiments.runtime.step": {"registrations", "embeddings"},
+    "gpca.steps.attribute": {"input_timings"},
+}
+
+
 def test_the_slurm_profile_plans_everything_with_what_the_rules_declare(project):
     pytest.importorskip("snakemake_executor_plugin_slurm")
     done = project.plan("all", "--profile", "workflow/profiles/slurm")

@@ -27,7 +27,7 @@ use rule sample_causes as sample_model_causes with:
     output:
         causes="<results>/model_causes/{source}/seed{seed}.npz",
         candidates="<results>/model_causes/{source}/seed{seed}.csv",
-        timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
+        causes_timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
     log:
         "<logs>/model_causes/{source}/seed{seed}.log",
     benchmark:
@@ -39,7 +39,7 @@ use rule sample_causes as sample_model_causes with:
 use rule describe as describe_model_causes with:
     input:
         causes="<results>/model_causes/{source}/seed{seed}.npz",
-        timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
+        causes_timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
         code=code_files("gpca.steps.describe"),
     output:
         descriptors="<results>/model_descriptors/{source}/seed{seed}.npz",

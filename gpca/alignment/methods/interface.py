@@ -1,4 +1,4 @@
-"""What every registration method takes and gives: a pair of clouds in, an outcome out.
+"""The interface of registration methods: a pair of clouds in, an outcome out.
 
 All lengths are in one unit, the diameter of the object, as in :class:`gpca.alignment.canonical_frame.CanonicalFrame`.
 """
@@ -87,7 +87,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a method found.
+    """The result of a registration method.
 
     Attributes:
         T_target_source: the pose (4×4); the initial one where there is no other.

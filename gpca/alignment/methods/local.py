@@ -1,4 +1,4 @@
-"""What local methods share: one step more than they took tells whether they have come to rest."""
+"""Local methods: one step more than they took tells whether they have come to rest."""
 
 from __future__ import annotations
 

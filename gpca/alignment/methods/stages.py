@@ -54,7 +54,7 @@ class Matches:
 
 @dataclass(frozen=True)
 class Stages:
-    """What can be exchanged; the defaults are plain ICP.
+    """The exchangeable stages; the defaults are plain ICP.
 
     Attributes:
         rows: of the source that take part, or None for all.

@@ -14,7 +14,10 @@ from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.pairs.perturbation import Concept
 from gpca.settings import Count, Distinct, OpenShare, PositiveShare
 
-TITLES = {name: strategy.title for name, strategy in STRATEGIES.items()} | STREAMS
+
+def titles() -> dict[str, str]:
+    """Return the titles of all strategies by name."""
+    return {name: strategy.title for name, strategy in STRATEGIES.items()} | STREAMS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +36,7 @@ class Section(ActiveLearningSettings):
 def check(config: dict, _left_out: LeftOut) -> None:
     """Check the names of the strategies, and the encoder that never sees the concept."""
     learning = config["active_learning"]
-    require_names("active_learning.strategies", learning["strategies"], TITLES, "strategy")
+    require_names("active_learning.strategies", learning["strategies"], titles(), "strategy")
     encoder = config["encoders"][config["embedding"]["encoder"]] | learning["without"]
     points = config["registrations"]["cloud_points"]
     require_draws("active_learning.without", encoder, points, "registrations.cloud_points")
@@ -49,7 +52,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     """Return the titles of the strategies, the conditions, and the accuracy to which labels are counted."""
     learning, registrations = config["active_learning"], config["registrations"]
     return {
-        "strategies": {name: TITLES[name] for name in learning["strategies"]},
+        "strategies": {name: titles()[name] for name in learning["strategies"]},
         "active_learning": {**learning, "train": registrations["train"], "test": registrations["test"]},
         "target": learning["target"],
     }
@@ -69,5 +72,5 @@ EXPERIMENT = Experiment(
     names=names,
     shown=shown,
     check=check,
-    switches={"active_learning.strategies": Names("strategy", lambda: TITLES)},
+    switches={"active_learning.strategies": Names("strategy", titles)},
 )

@@ -12,7 +12,7 @@ from gpca.active_learning.curves import read_curves
 from gpca.attribution.metrics import mean_interval, source_method_seed
 from gpca.errors import InputError
 from gpca.reporting.figures.panels import legend_below, panels
-from gpca.reporting.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY_BLUE, VERMILION, write_title
+from gpca.reporting.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION, write_title
 from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ STYLES = {  # The paper's two strategies are thick, with their intervals; an unk
     "coreset": (PURPLE, "-", 0.9),
     "typiclust": (GREEN, "--", 0.9),
 }
-_OTHER = (GREY, "-", 0.9)
+_OTHER = (GRAY, "-", 0.9)
 
 
 def draw_learning_curves(
@@ -81,7 +81,7 @@ def draw_curves(
     Args:
         curves: What :func:`mean_curves` makes of them, by source, row and line.
         sources, rows, lines: The title of each name, in order; those without curves are left out.
-        styles: Colour, dashes and width of a line; an interval is drawn where the width is above 1.
+        styles: Color, dashes and width of a line; an interval is drawn where the width is above 1.
         target: The accuracy that a dashed line marks.
     """
     shown = {key for key in curves if key[0] in sources and key[1] in rows and key[2] in lines}
@@ -100,7 +100,7 @@ def draw_curves(
     for row, name in enumerate(down):
         for column, source in enumerate(columns):
             panel = axes[row, column]
-            panel.axhline(100 * target, color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
+            panel.axhline(100 * target, color=GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
             for line in reversed(across):
                 if (source, name, line) in shown:
                     _draw(panel, styles.get(line, _OTHER), lines[line], curves[source, name, line])
@@ -150,8 +150,8 @@ def mean_curves(
 
 
 def _draw(axes, style: tuple, title: str, curve: pd.DataFrame) -> None:
-    colour, line, width = style
-    axes.plot(curve["labels"], curve["mean"], line, color=colour, linewidth=width, label=title)
+    color, line, width = style
+    axes.plot(curve["labels"], curve["mean"], line, color=color, linewidth=width, label=title)
     if width > 1:
         bounds = curve["low"].clip(0, 100), curve["high"].clip(0, 100)
-        axes.fill_between(curve["labels"], *bounds, color=colour, alpha=0.15, linewidth=0)
+        axes.fill_between(curve["labels"], *bounds, color=color, alpha=0.15, linewidth=0)

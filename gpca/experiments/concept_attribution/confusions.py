@@ -13,7 +13,7 @@ from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, read_metrics
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
 from gpca.reporting.figures.panels import draw_percentages
-from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, use_style
+from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, use_style
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,9 +44,6 @@ def draw_confusions_figure(
 
     Args:
         metrics_csv: The file that :func:`gpca.attribution.metrics.collect` makes.
-
-    Raises:
-        InputError: an unusable file, or one without metrics of these explainers and sources.
     """
     confusions = pooled_confusions(read_metrics(metrics_csv))
     rows = [name for name in explainers if any((source, name) in confusions for source in sources)]
@@ -136,7 +133,7 @@ def _key(confusion: pd.DataFrame, abstained: bool) -> str:
 
 
 def letters(concepts: list[str]) -> list[str]:
-    """Return the shortest capitalised beginnings that tell the concepts apart; what is nominal is OK."""
+    """Return the shortest capitalized beginnings that tell the concepts apart; what is nominal is OK."""
     others = {concept for concept in concepts if concept != NOMINAL}
     length = next(n for n in range(1, 99) if len({concept[:n] for concept in others}) == len(others))
     return ["OK" if concept == NOMINAL else concept[:length].capitalize() for concept in concepts]
@@ -164,9 +161,9 @@ def draw_bars(axes, confusion: pd.DataFrame, head: bool, abstained: bool = True)
     total = confusion.to_numpy().sum()
     shares = confusion.sum().iloc[: len(names)] / total
     truth = confusion.sum(axis=1) / total
-    of_abstained = LIGHT_GREY
-    colours = [*(CONCEPT_COLOURS.get(concept, GREY) for concept in concepts), of_abstained][: len(names)]
-    axes.bar(range(len(shares)), shares, color=colours, width=0.7)
+    of_abstained = LIGHT_GRAY
+    colors = [*(CONCEPT_COLORS.get(concept, GRAY) for concept in concepts), of_abstained][: len(names)]
+    axes.bar(range(len(shares)), shares, color=colors, width=0.7)
     places = np.array([concepts.index(concept) for concept in truth.index])
     axes.hlines(truth, places - 0.45, places + 0.45, color="black", linewidth=0.6)
     axes.set(xlim=(-0.6, len(shares) - 0.4), ylim=(0, 1))

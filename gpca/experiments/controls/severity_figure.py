@@ -12,8 +12,8 @@ from gpca.experiments.controls.severity import REGISTRATION
 from gpca.reporting.figures.panels import color_on_blue, in_lines, legend_below
 from gpca.reporting.figures.style import (
     BLACK,
-    GREY,
-    LIGHT_GREY,
+    GRAY,
+    LIGHT_GRAY,
     METHOD_LOOKS,
     ORANGE,
     OTHER_LOOK,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 CURVES = {"noise": "standard deviation (% of the diameter)", "overlap": "points cut off (%)"}
 # Explainers without a look of their own take the colors in turn, and after all of them the next line and marker.
-COLOURS = (VERMILION, ORANGE, SKY_BLUE, PURPLE, GREY)
+COLORS = (VERMILION, ORANGE, SKY_BLUE, PURPLE, GRAY)
 LINES = (("-", "o"), ((0, (4, 2)), "s"), (":", "^"))
 WIDEST = 4  # panels of pose in a row
 SUCCEEDS = "registration succeeds"
@@ -84,7 +84,7 @@ def draw_severity_curves(severities: pd.DataFrame, explainers: Mapping[str, str]
 
 def _draw_curves(panel, of_concept: pd.DataFrame, shown: list[str], explainers: Mapping[str, str]) -> None:
     """Draw a curve for each explainer, and over them all that of the registrations that succeed."""
-    looks = iter(((colour, line, 1.1), marker) for line, marker in LINES for colour in COLOURS)
+    looks = iter(((color, line, 1.1), marker) for line, marker in LINES for color in COLORS)
     for method in [*shown, REGISTRATION]:
         rows = of_concept[of_concept["method"] == method].sort_values("low")
         middles = 100 * (rows["low"] + rows["high"]) / 2
@@ -92,8 +92,8 @@ def _draw_curves(panel, of_concept: pd.DataFrame, shown: list[str], explainers: 
             style = {"color": BLACK, "linewidth": 1.4, "label": SUCCEEDS, "marker": "D", "markersize": 4}
         else:
             own = (METHOD_LOOKS[method], "o") if method in METHOD_LOOKS else next(looks, (OTHER_LOOK, "o"))
-            (colour, line, width), marker = own
-            style = {"color": colour, "linestyle": line, "linewidth": width, "label": explainers[method]}
+            (color, line, width), marker = own
+            style = {"color": color, "linestyle": line, "linewidth": width, "label": explainers[method]}
             style |= {"marker": marker, "markersize": 3}
         panel.plot(middles, 100 * rows["value"], **style)
 
@@ -110,7 +110,7 @@ def _draw_map(panel, rows: pd.DataFrame, palest: float):
     shares = np.full((len(others) - 1, len(edges) - 1), np.nan)
     for low, other_low, value in zip(rows["low"], rows["other_low"], rows["value"], strict=True):
         shares[np.searchsorted(others, round(other_low, 9)), np.searchsorted(edges, round(low, 9))] = 100 * value
-    panel.set_facecolor(LIGHT_GREY)
+    panel.set_facecolor(LIGHT_GRAY)
     look: dict[str, Any] = {"cmap": blues(), "vmin": palest, "vmax": 100}
     image = panel.pcolormesh(edges, 100 * others, np.ma.masked_invalid(shares), **look)
     for (row, column), share in np.ndenumerate(shares):

@@ -55,10 +55,6 @@ def draw_causes_example(
         objects_npz, causes_npz: Of the shown source and seed, which their paths name.
         predictions_csv: One file per explainer, of the same source and seed.
         settings: The config's section ``causes`` with ``icp``.
-        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
-
-    Raises:
-        InputError: an unusable file, files that do not belong together, or no failed test sample.
     """
     causes = Causes.load(causes_npz)
     row = choose_sample(causes, causes_npz)

@@ -12,7 +12,7 @@ from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import Judged
 from gpca.experiments.diagnosis.measures import BINS as BINS_OF_NOMINAL
 from gpca.reporting.figures.panels import label_outer, legend_below, panels_in_lines
-from gpca.reporting.figures.style import BLUE, GREY, LIGHT_GREY, SMALL_PT, write_title
+from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,20 +98,20 @@ def draw_reliability_panel(
     drawn = counts_B >= FEWEST
     true_B = np.bincount(bin_S, weights=true_S, minlength=bins)[drawn] / counts_B[drawn]
     mean_B = np.bincount(bin_S, weights=probability_S, minlength=bins)[drawn] / counts_B[drawn]
-    centres_B = (np.arange(bins) + 0.5) / bins
+    centers_B = (np.arange(bins) + 0.5) / bins
     counts = panel.twinx()
-    counts.bar(centres_B, counts_B, width=1 / bins, color=LIGHT_GREY)
+    counts.bar(centers_B, counts_B, width=1 / bins, color=LIGHT_GRAY)
     counts.set_yscale("log")
     most = 10 ** np.ceil(np.log10(counts_B.max()))
     counts.set_ylim(0.8, 0.8 * (most / 0.8) ** HEADROOM)
     counts.set_yticks([10**power for power in range(int(np.log10(most)) + 1)])
     counts.yaxis.set_major_formatter("{x:g}")
     counts.minorticks_off()
-    counts.tick_params(colors=GREY, length=2, pad=1)
+    counts.tick_params(colors=GRAY, length=2, pad=1)
     counts.set_zorder(panel.get_zorder() - 1)
     panel.patch.set_visible(False)
-    panel.bar(0.5, 0, color=LIGHT_GREY, label="samples (right axis)")
-    panel.plot([0, 1], [0, 1], color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
+    panel.bar(0.5, 0, color=LIGHT_GRAY, label="samples (right axis)")
+    panel.plot([0, 1], [0, 1], color=GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
     panel.plot(mean_B, true_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, label=label)
     panel.set(xlim=(0, 1.02), ylim=(0, 1.02), box_aspect=1)
     counts.set_box_aspect(1)

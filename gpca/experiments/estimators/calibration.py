@@ -69,18 +69,18 @@ def measure(rows: pd.DataFrame) -> dict[str, float]:
     """
     from scipy.stats import chi2, trim_mean
 
-    told = rows[rows["failure"] == ""]
-    metrics = {"no_estimate": 1 - len(told) / len(rows), "test_samples": float(len(rows))}
-    if told.empty:
+    estimated = rows[rows["failure"] == ""]
+    metrics = {"no_estimate": 1 - len(estimated) / len(rows), "test_samples": float(len(rows))}
+    if estimated.empty:
         return metrics
     for name in ("kl_rotation", "kl_translation"):
-        known = told[name].dropna()
+        known = estimated[name].dropna()
         metrics[name] = float(trim_mean(known, TRIMMED)) if len(known) else np.nan
-    metrics["nne"] = float(np.sqrt(trim_mean(told["error_ratio"], TRIMMED)))
-    metrics["nees"] = float(trim_mean(told["mahalanobis"], TRIMMED) / 6)
-    metrics["coverage"] = float((told["mahalanobis"] <= chi2.ppf(LEVEL, 6)).mean())
-    metrics["auroc_failed"] = _area(told["spread"].to_numpy(), told["failed"].to_numpy())
-    metrics["spearman_error"] = _correlation(told["spread"].to_numpy(), told["add_relative"].to_numpy())
+    metrics["nne"] = float(np.sqrt(trim_mean(estimated["error_ratio"], TRIMMED)))
+    metrics["nees"] = float(trim_mean(estimated["mahalanobis"], TRIMMED) / 6)
+    metrics["coverage"] = float((estimated["mahalanobis"] <= chi2.ppf(LEVEL, 6)).mean())
+    metrics["auroc_failed"] = _area(estimated["spread"].to_numpy(), estimated["failed"].to_numpy())
+    metrics["spearman_error"] = _correlation(estimated["spread"].to_numpy(), estimated["add_relative"].to_numpy())
     return metrics
 
 

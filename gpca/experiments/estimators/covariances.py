@@ -11,8 +11,8 @@ import numpy as np
 
 from gpca.attribution.metrics import source_method_seed
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.axes import Axes
 from gpca.io.csv_file import numbers, read_csv
+from gpca.io.names import Axes
 
 if TYPE_CHECKING:
     import pandas as pd

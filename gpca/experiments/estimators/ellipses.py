@@ -11,9 +11,9 @@ from gpca.experiments.estimators.covariances import REFERENCE, ReferenceSamples,
 from gpca.reporting.figures.style import (
     BLACK,
     BLUE,
+    GRAY,
     GREEN,
-    GREY,
-    LIGHT_GREY,
+    LIGHT_GRAY,
     ORANGE,
     PURPLE,
     SKY_BLUE,
@@ -22,7 +22,7 @@ from gpca.reporting.figures.style import (
 )
 
 STYLES: dict[str, tuple[str, Any]] = {  # An estimator has a color and a line everywhere in the figure.
-    REFERENCE: (GREY, "-"),
+    REFERENCE: (GRAY, "-"),
     "monte_carlo": (BLACK, "-"),
     "censi": (VERMILION, "-"),
     "bonnabel": (VERMILION, (0, (1, 1))),
@@ -67,7 +67,7 @@ def draw_ellipses(
     values_3, axes_3_3 = np.linalg.eigh(np.cov(twists_n_3, rowvar=False))
     plane_3_2 = axes_3_3[:, ::-1][:, :2]
     dots_n_2, true_2 = twists_n_3 @ plane_3_2, factor * samples.true_twist[place, block] @ plane_3_2
-    panel.scatter(*dots_n_2.T, s=1.2, color=LIGHT_GREY, linewidths=0, rasterized=True, zorder=1)
+    panel.scatter(*dots_n_2.T, s=1.2, color=LIGHT_GRAY, linewidths=0, rasterized=True, zorder=1)
     reach = max(np.quantile(np.abs(dots_n_2), 0.985), 2.6 * np.sqrt(max(values_3[-1], 0)), *np.abs(true_2))
     most = WIDEST * reach
     for name, row in estimates.items():

@@ -100,9 +100,9 @@ def try_estimators(
             records[REFERENCE].append(of_reference | {"seconds": case.reference_seconds})
             for name, estimate in made.items():
                 started = perf_counter()
-                said = estimate(case.registered)
+                answer = estimate(case.registered)
                 seconds = perf_counter() - started
-                records[name].append(_judged(case, said, reference, settings.floor) | {"seconds": seconds})
+                records[name].append(_judged(case, answer, reference, settings.floor) | {"seconds": seconds})
     return {name: pd.DataFrame(of_estimator) for name, of_estimator in records.items()}, cases
 
 
@@ -186,12 +186,12 @@ def predicted_spread(points_N_3: np.ndarray, covariance_6_6: np.ndarray) -> floa
     return float(np.sqrt(max(squares.mean(), 0.0)))
 
 
-def _judged(case: EstimatedRow, said: Estimate, reference: Estimate, floor: float) -> dict[str, object]:
+def _judged(case: EstimatedRow, answer: Estimate, reference: Estimate, floor: float) -> dict[str, object]:
     """Return the row of an estimate; numbers that it has not are NaN."""
-    row = {**case.known, "failure": said.failure}
+    row = {**case.known, "failure": answer.failure}
     numbers = dict.fromkeys(JUDGED, np.nan)
-    if said.covariance_6_6 is not None:
-        sigma_6_6, e_6 = said.covariance_6_6, case.true_twist
+    if answer.covariance_6_6 is not None:
+        sigma_6_6, e_6 = answer.covariance_6_6, case.true_twist
         numbers["error_ratio"] = float(e_6 @ e_6 / np.trace(sigma_6_6 + floor * np.eye(6)))
         numbers["mahalanobis"] = mahalanobis(e_6, sigma_6_6, floor)
         points = transform(case.registered.T_target_source, case.registered.pair.source)
@@ -200,7 +200,7 @@ def _judged(case: EstimatedRow, said: Estimate, reference: Estimate, floor: floa
             for name, block in (("kl_rotation", slice(0, 3)), ("kl_translation", slice(3, 6))):
                 expected_3_3, estimated_3_3 = reference.covariance_6_6[block, block], sigma_6_6[block, block]
                 numbers[name] = float(divergence(expected_3_3, estimated_3_3, floor))
-    return row | numbers | covariance_columns(said.covariance_6_6)
+    return row | numbers | covariance_columns(answer.covariance_6_6)
 
 
 def _reference(case: EstimatedRow) -> Estimate:

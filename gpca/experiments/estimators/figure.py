@@ -13,7 +13,7 @@ from gpca.errors import InputError
 from gpca.experiments.estimators.covariances import REFERENCE, ReferenceSamples
 from gpca.experiments.estimators.ellipses import draw_ellipses, style_of
 from gpca.reporting.figures.panels import label_outer
-from gpca.reporting.figures.style import BLACK, GREY, LIGHT_GREY, SMALL_PT, TEXT_WIDTH_IN, use_style, write_title
+from gpca.reporting.figures.style import BLACK, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, use_style, write_title
 from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:
@@ -38,9 +38,6 @@ def draw_estimators(
     Args:
         estimates: rows by source, estimator and seed; the reference is among the estimators.
         samples_npz: the reference's samples of the shown source and seed, which its path names.
-
-    Raises:
-        InputError: an unusable file, or files that do not belong together.
     """
     source, seed = Path(samples_npz).parent.name, seed_of_file(samples_npz)
     samples = ReferenceSamples.load(samples_npz)
@@ -70,7 +67,7 @@ def draw_estimators(
     _draw_coverage(right.subplots(), pooled, names)
     handles = [plt.Line2D([], [], color=style_of(n)[0], linestyle=style_of(n)[1], label=titles[n]) for n in names]
     signs: list[tuple[str, str, dict[str, Any]]] = [
-        ("the reference's results", ".", {"color": LIGHT_GREY}),
+        ("the reference's results", ".", {"color": LIGHT_GRAY}),
         ("true pose", "*", {}),
         ("succeeded", "o", {"markerfacecolor": "none", "markersize": 3}),
         ("failed", "x", {"markersize": 3}),
@@ -148,7 +145,7 @@ def _draw_scatter(panel, rows: pd.DataFrame, title: str, color: str, limits: tup
     """Draw errors over predicted spreads; on the diagonal the prediction is right on average."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    panel.plot(limits, limits, color=GREY, linewidth=0.6, zorder=1)
+    panel.plot(limits, limits, color=GRAY, linewidth=0.6, zorder=1)
     for failed, marker in ((False, "o"), (True, "x")):
         of_kind = rows[rows["failed"] == failed]
         face = {"facecolors": "none", "edgecolors": color} if marker == "o" else {"color": color}
@@ -165,12 +162,12 @@ def _draw_scatter(panel, rows: pd.DataFrame, title: str, color: str, limits: tup
 
 
 def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:
-    panel.plot([0, 100], [0, 100], color=GREY, linewidth=0.6)
+    panel.plot([0, 100], [0, 100], color=GRAY, linewidth=0.6)
     for name in names:
-        colour, line = style_of(name)
+        color, line = style_of(name)
         width = 1.8 if name == REFERENCE else 1.1
         shares = 100 * coverages(pooled[name]["mahalanobis"].to_numpy())
-        panel.plot(100 * LEVELS, shares, color=colour, linestyle=line, linewidth=width)
+        panel.plot(100 * LEVELS, shares, color=color, linestyle=line, linewidth=width)
     panel.set(xlim=(0, 100), ylim=(0, 100))
     panel.set_xlabel("said to hold (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_ylabel("true poses within (%)", fontsize=SMALL_PT, labelpad=1)
@@ -182,7 +179,7 @@ def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:
 def _write(panel, place: tuple[float, float], words: str) -> None:
     """Say in a corner of a panel what it means to lie there."""
     across, up = ("left", "top") if place[0] < 0.5 else ("right", "bottom")
-    panel.text(*place, words, transform=panel.transAxes, ha=across, va=up, fontsize=SMALL_PT, color=GREY)
+    panel.text(*place, words, transform=panel.transAxes, ha=across, va=up, fontsize=SMALL_PT, color=GRAY)
 
 
 def _limits(tables: Sequence[pd.DataFrame]) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Draws saliency maps: the points of a cloud, coloured by how much GP-CA's score reacts to them."""
+"""Draws saliency maps: the points of a cloud, colored by how much GP-CA's score reacts to them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.panels import panels
-from gpca.reporting.figures.style import LIGHT_GREY, SMALL_PT, blues, write_title
+from gpca.reporting.figures.style import LIGHT_GRAY, SMALL_PT, blues, write_title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,9 +29,6 @@ def draw_saliency(registrations_npz: str | Path, maps_npz: str | Path, deletions
 
     Args:
         registrations_npz, maps_npz, deletions_csv: Of one source and seed.
-
-    Raises:
-        InputError: an unusable file, or files that do not belong together.
     """
     registrations = Registrations.load(registrations_npz)
     shapes: dict[str, tuple[int | str, ...]] = {"sample": ("S",), "points": ("S", "N", 3), "saliency": ("S", "N")}
@@ -73,10 +70,10 @@ def _chosen(of_concept) -> int | None:
 
 
 def _draw_map(panel, target_Q_3: np.ndarray, points_N_3: np.ndarray, saliency_N: np.ndarray) -> None:
-    """Scatter the target in grey and the points by the rank of their saliency, the salient ones in front."""
+    """Scatter the target in gray and the points by the rank of their saliency, the salient ones in front."""
     view = widest_views(target_Q_3)[0]
     target, points = target_Q_3 @ view.T, points_N_3 @ view.T
-    panel.scatter(target[:, 0], target[:, 1], s=0.6, c=LIGHT_GREY, linewidths=0)
+    panel.scatter(target[:, 0], target[:, 1], s=0.6, c=LIGHT_GRAY, linewidths=0)
     order = np.argsort(saliency_N, kind="stable")
     ranks = np.linspace(0, 1, len(order))
     panel.scatter(points[order, 0], points[order, 1], s=5, c=ranks, cmap=blues(), vmin=PALEST, vmax=1, linewidths=0)

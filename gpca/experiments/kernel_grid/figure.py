@@ -9,18 +9,18 @@ from gpca.comparison.published import Number
 from gpca.errors import InputError
 from gpca.experiments.kernel_grid.tables import PRINTED, TITLES
 from gpca.reporting.figures.panels import in_lines, legend_below, panels
-from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GREY, ORANGE
+from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-COLOURS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
+COLORS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
 LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # The largest learning rate has the first.
 # Kernels whose curves coincide show beneath each other: the first drawn is the widest.
 WIDTHS = {"matern32": 2.2, "polynomial": 1.0, "rbf": 1.0}
 PRINTED_MARKERS = ("D", "v")  # of what the paper prints for the largest learning rate, and for a smaller one
-BESIDE = dict(zip(COLOURS, (1.15, 1.32, 1.52), strict=True))  # Equal printed numbers would hide one another.
+BESIDE = dict(zip(COLORS, (1.15, 1.32, 1.52), strict=True))  # Equal printed numbers would hide one another.
 MEASURES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
 
 
@@ -49,15 +49,15 @@ def draw_kernel_curves(grid: pd.DataFrame, sources: Mapping[str, str], numbers: 
             for (kernel, rate), curve in sorted(by_kernel, key=lambda item: list(WIDTHS).index(item[0][0])):
                 iterations = curve.index.get_level_values("iterations")
                 line = LINES[rates.index(rate) % len(LINES)]
-                panel.plot(iterations, 100 * curve, color=COLOURS[kernel], linestyle=line, linewidth=WIDTHS[kernel])
+                panel.plot(iterations, 100 * curve, color=COLORS[kernel], linestyle=line, linewidth=WIDTHS[kernel])
             for setting in PRINTED:
                 if setting in means.index:
-                    marker = {"color": COLOURS[setting[0]], "markerfacecolor": "white", "markersize": 5}
+                    marker = {"color": COLORS[setting[0]], "markerfacecolor": "white", "markersize": 5}
                     panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
             for (kernel, rate, iterations), value in printed_accuracies(numbers, source).items():
                 if measure == "accuracy" and (kernel, rate, iterations) in means.index:
                     symbol = PRINTED_MARKERS[int(rate < rates[0])]
-                    filled = {"color": COLOURS[kernel], "markersize": 3.5, "clip_on": False}
+                    filled = {"color": COLORS[kernel], "markersize": 3.5, "clip_on": False}
                     panel.plot(BESIDE[kernel] * iterations, value, symbol, **filled)
             panel.set_xscale("log")
             panel.set_xticks(ticks, [f"{tick}" for tick in ticks])
@@ -68,18 +68,18 @@ def draw_kernel_curves(grid: pd.DataFrame, sources: Mapping[str, str], numbers: 
     for row, label in enumerate(MEASURES.values()):
         axes[row, 0].set_ylabel(label)
     handles = [
-        Line2D([], [], color=COLOURS[kernel], linewidth=WIDTHS[kernel], label=TITLES[kernel])
-        for kernel in COLOURS
+        Line2D([], [], color=COLORS[kernel], linewidth=WIDTHS[kernel], label=TITLES[kernel])
+        for kernel in COLORS
         if (grid["kernel"] == kernel).any()
     ]
     handles += [
-        Line2D([], [], color=GREY, linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
+        Line2D([], [], color=GRAY, linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
         for i, rate in enumerate(rates)
     ]
-    ours: dict[str, Any] = {"color": GREY, "marker": "o", "markerfacecolor": "white", "linestyle": ""}
+    ours: dict[str, Any] = {"color": GRAY, "marker": "o", "markerfacecolor": "white", "linestyle": ""}
     handles.append(Line2D([], [], label="row of Table IV", **ours))
     for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False):
-        printed: dict[str, Any] = {"color": GREY, "marker": symbol, "linestyle": "", "markersize": 3.5}
+        printed: dict[str, Any] = {"color": GRAY, "marker": symbol, "linestyle": "", "markersize": 3.5}
         handles.append(Line2D([], [], label=f"paper, rate {rate:g}", **printed))
     legend_below(figure, handles, columns=3)
     return figure

@@ -35,9 +35,6 @@ def draw_concepts_figure(
     The figure shows test samples of one object: `object_name`, or the object whose samples come nearest to the medium
     severity. One view serves all panels, and shows the pose error and the cut from the side. The object's name in words
     follows from its `dataset` of the BOP benchmark.
-
-    Raises:
-        InputError: an unusable file, or no (such) object with a test sample of each concept.
     """
     objects = ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)

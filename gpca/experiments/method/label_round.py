@@ -22,8 +22,8 @@ class Round:
 
     Attributes:
         rows_N: The rows of the pool.
-        labelled: The rows of the samples that were labelled at the start, none of the new concept.
-        map_S_2: The principal components of all embeddings, fitted to the standardised ones of the training samples.
+        labeled: The rows of the samples that were labeled at the start, none of the new concept.
+        map_S_2: The principal components of all embeddings, fitted to the standardized ones of the training samples.
         bald_N: BALD of the pool in nats, by the classifier that knows all concepts but the new one.
         candidates, chosen: The places in `rows_N` of the B·K largest BALD, and of the B of them that k-means keeps.
     """

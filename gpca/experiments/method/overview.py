@@ -17,11 +17,11 @@ from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import (
     BLUE,
     COLUMN_WIDTH_IN,
-    CONCEPT_COLOURS,
-    GREY,
-    LIGHT_GREY,
-    SOURCE_COLOUR,
-    TARGET_COLOUR,
+    CONCEPT_COLORS,
+    GRAY,
+    LIGHT_GRAY,
+    SOURCE_COLOR,
+    TARGET_COLOR,
     write_title,
 )
 from gpca.reporting.words import object_in_words
@@ -51,16 +51,7 @@ def draw_overview(
     person and a new training.
 
     Args:
-        registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
-            sample of the concept `CONCEPT` that :meth:`gpca.experiments.method.shown_sample.Stages.choose` returns.
-        uncertainty_csv: The uncertainties of the design ``causal``.
-        limits: Those of the errors that states are told apart by, from the config.
-        encoder: The name that the figure gives the encoder.
         treatments: The action of recovery for each concept.
-        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
-
-    Raises:
-        InputError: an unusable file, files of different samples, or a concept without a treatment.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(CONCEPT, registrations_npz)
@@ -95,21 +86,21 @@ def draw_overview(
     follows = (
         f"Act on {named}:\n{short_action(treatments[named])}" if failed else f"No action on\n{named}: it did\nnot fail"
     )
-    canvas.box(0.02, 0.32, 0.92, 0.56, follows, CONCEPT_COLOURS[named] if failed else GREY)
+    canvas.box(0.02, 0.32, 0.92, 0.56, follows, CONCEPT_COLORS[named] if failed else GRAY)
     canvas.arrow((1.62, 0.88), (1.62, 1.08))
     canvas.text(1.66, 0.97, "high", ha="left", va="center")
-    canvas.box(0.02, 1.08, 1.9, 0.37, "Ask a person for the concept\nof a few such cases", GREY, dashed=True)
+    canvas.box(0.02, 1.08, 1.9, 0.37, "Ask a person for the concept\nof a few such cases", GRAY, dashed=True)
     canvas.arrow((1.92, 1.265), (2.22, 1.265), words="retrain")
 
     write_title(canvas.figure, f"{title}: {object_in_words(sample['object'], dataset)}")
-    for x_in, colour, words in ((0.06, TARGET_COLOUR, "target"), (0.5, SOURCE_COLOUR, "source")):
-        canvas.dot(x_in, 2.74, colour, words)
+    for x_in, color, words in ((0.06, TARGET_COLOR, "target"), (0.5, SOURCE_COLOR, "source")):
+        canvas.dot(x_in, 2.74, color, words)
     return canvas.figure
 
 
 def _draw_bald(axes, bald_N: np.ndarray, of_sample: float) -> None:
     """Draw how BALD is spread over the test samples, with a line where the sample stands."""
-    axes.hist(bald_N, bins=12, color=LIGHT_GREY)
+    axes.hist(bald_N, bins=12, color=LIGHT_GRAY)
     axes.axvline(of_sample, color=BLUE, linewidth=1.2)
     axes.set(yticks=[])
     axes.set_xlim(left=0)

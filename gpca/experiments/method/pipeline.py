@@ -20,13 +20,13 @@ from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import (
     BLACK,
     BLUE,
-    CONCEPT_COLOURS,
+    CONCEPT_COLORS,
     CONCEPT_MARKERS,
-    GREY,
-    LIGHT_GREY,
+    GRAY,
+    LIGHT_GRAY,
     SMALL_PT,
-    SOURCE_COLOUR,
-    TARGET_COLOUR,
+    SOURCE_COLOR,
+    TARGET_COLOR,
     TEXT_WIDTH_IN,
     blues,
     write_title,
@@ -58,15 +58,9 @@ def draw_pipeline(
     """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
 
     Args:
-        registrations_npz, embeddings_npz, predictions_csv: The files of one source and seed. The figure shows the
-            sample that :meth:`gpca.experiments.method.shown_sample.Stages.choose` returns for `ORDER`.
-        uncertainty_csv: The uncertainties of the design ``causal``.
-        limits: Those of the errors that states are told apart by, from the config.
         curve_files: The files of that source, named as for
             :func:`gpca.experiments.active_learning.figure.draw_learning_curves`.
-        encoder: The name that the figure gives the encoder.
         active_learning: The config's section; the figure repeats the first round of the run.
-        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
     row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])
@@ -75,8 +69,8 @@ def draw_pipeline(
     source, _, seed = source_method_seed(files[0])
     asked = first_round(stages, new, ActiveLearningSettings.from_dict(dict(active_learning)), source, seed)
     canvas = Canvas(TEXT_WIDTH_IN, 3.5)
-    canvas.box(0.03, 1.9, 7.1, 1.4, colour=LIGHT_GREY)
-    canvas.box(0.03, 0.03, 7.1, 1.6, colour=LIGHT_GREY)
+    canvas.box(0.03, 1.9, 7.1, 1.4, color=LIGHT_GRAY)
+    canvas.box(0.03, 0.03, 7.1, 1.6, color=LIGHT_GRAY)
     _draw_inference(canvas, stages, row, encoder, asked)
     _draw_active_learning(canvas, stages, asked, new, curves)
     canvas.arrow((6.4, 1.97), (6.4, 1.63))
@@ -84,8 +78,8 @@ def draw_pipeline(
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
     canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
     write_title(canvas.figure, f"{title}: {object_in_words(stages.predictions['object'][row], dataset)}")
-    canvas.dot(6.15, 3.4, TARGET_COLOUR, r"target $\mathcal{Q}$", gap_in=0.05)
-    canvas.dot(6.63, 3.4, SOURCE_COLOUR, r"source $\mathcal{P}$", gap_in=0.05)
+    canvas.dot(6.15, 3.4, TARGET_COLOR, r"target $\mathcal{Q}$", gap_in=0.05)
+    canvas.dot(6.63, 3.4, SOURCE_COLOR, r"source $\mathcal{P}$", gap_in=0.05)
     return canvas.figure
 
 
@@ -112,16 +106,16 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, aske
     canvas.arrow((1.2, middle_in), (1.54, middle_in), words="ICP")
     canvas.arrow((2.66, middle_in), (2.8, middle_in))
     corners_in = [(2.8, 3.02), (3.3, 2.86), (3.3, 2.46), (2.8, 2.3)]
-    canvas.axes.fill(*zip(*corners_in, strict=True), facecolor=GREY + "22", edgecolor=GREY, linewidth=0.9)
+    canvas.axes.fill(*zip(*corners_in, strict=True), facecolor=GRAY + "22", edgecolor=GRAY, linewidth=0.9)
     canvas.text(3.05, middle_in, f"{encoder}\n$f_\\theta$", va="center")
     canvas.text(3.05, captions_in, "frozen", va="top")
     canvas.arrow((3.3, middle_in), (3.46, middle_in))
     draw_embedding(canvas.panel(3.48, 2.3, 0.36, 0.72), stages.h_S_d[row])
     canvas.text(3.66, captions_in, rf"$\mathbf{{h}} \in \mathbb{{R}}^{{{stages.h_S_d.shape[1]}}}$", va="top")
     canvas.arrow((3.86, middle_in), (4.02, middle_in))
-    canvas.box(4.02, 2.0, 1.2, 1.22, colour=BLUE)
+    canvas.box(4.02, 2.0, 1.2, 1.22, color=BLUE)
     canvas.text(4.62, 3.19, "multi-class GP classifier", va="top")
-    _draw_labelled(canvas.panel(4.07, 2.17, 1.1, 0.88), stages, row, asked)
+    _draw_labeled(canvas.panel(4.07, 2.17, 1.1, 0.88), stages, row, asked)
     canvas.text(4.62, 2.03, "★ this sample", va="bottom")
     canvas.arrow((5.22, middle_in), (5.58, middle_in))
     draw_scores_with_numbers(canvas.panel(5.96, 2.42, 0.62, 0.62), sample)
@@ -130,12 +124,12 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, aske
     )
 
 
-def _draw_labelled(axes, stages: Stages, row: int, asked: Round) -> None:
+def _draw_labeled(axes, stages: Stages, row: int, asked: Round) -> None:
     """Scatter the training samples by concept, and the sample that is shown."""
     of = stages.registrations
     for concept in CONCEPTS:
         rows = of.rows("train")[of.concept[of.rows("train")] == concept]
-        look = {"marker": CONCEPT_MARKERS[concept], "color": CONCEPT_COLOURS[concept], "alpha": 0.6, "linewidths": 0}
+        look = {"marker": CONCEPT_MARKERS[concept], "color": CONCEPT_COLORS[concept], "alpha": 0.6, "linewidths": 0}
         axes.scatter(*asked.map_S_2[rows].T, s=5, **look)
     axes.scatter(*asked.map_S_2[row], s=45, marker="*", color=BLACK, zorder=5)
     axes.set_axis_off()
@@ -160,8 +154,8 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     bald_N = asked.bald_N
     points_N_2 = asked.map_S_2[asked.rows_N]
     order = np.argsort(bald_N, kind="stable")
-    panel.scatter(*asked.map_S_2[asked.labeled].T, s=5, marker="x", color=GREY, linewidths=0.5)
-    panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GREY, linewidths=0.3)
+    panel.scatter(*asked.map_S_2[asked.labeled].T, s=5, marker="x", color=GRAY, linewidths=0.5)
+    panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GRAY, linewidths=0.3)
     panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
     panel.set_axis_off()
     canvas.text(
@@ -193,9 +187,9 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     panel = canvas.panel(0.5, 0.38, 1.18, 1.0)
     for name in reversed(TITLES):
         if name in curves:
-            colour, line, width = STYLES[name]
+            color, line, width = STYLES[name]
             panel.plot(
-                curves[name]["labels"], curves[name]["mean"], line, color=colour, linewidth=width, label=TITLES[name]
+                curves[name]["labels"], curves[name]["mean"], line, color=color, linewidth=width, label=TITLES[name]
             )
     low, high = panel.get_ylim()
     panel.set_ylim(bottom=low - 0.5 * (high - low))  # The legend needs room.

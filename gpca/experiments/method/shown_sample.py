@@ -22,7 +22,7 @@ from gpca.io.csv_file import numbers
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
-from gpca.reporting.figures.style import GREY, SMALL_PT, blues
+from gpca.reporting.figures.style import GRAY, SMALL_PT, blues
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -177,7 +177,7 @@ def draw_embedding(axes, h_d: np.ndarray) -> None:
     columns = next(width for width in range(round(np.sqrt(len(h_d) / 2)) or 1, 0, -1) if len(h_d) % width == 0)
     axes.imshow(h_d.reshape(-1, columns), cmap=blues(), aspect="auto", interpolation="nearest")
     axes.set(xticks=[], yticks=[])
-    axes.spines[:].set(visible=True, linewidth=0.6, color=GREY)
+    axes.spines[:].set(visible=True, linewidth=0.6, color=GRAY)
 
 
 def draw_scores_with_numbers(axes, sample: pd.Series) -> None:

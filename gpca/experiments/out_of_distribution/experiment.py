@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from gpca.encoders.settings import EncoderChanges, require_draws
-from gpca.errors import InputError, with_key
+from gpca.errors import InputError
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import require_explained
 from gpca.experiments.out_of_distribution.settings import ShiftSettings
 from gpca.explainers.registry import explainer_entry, explainers
 from gpca.pairs.perturbation import Severities
-from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import Keys, changes_of
 
 _SHIFT = changes_of(ShiftSettings, without=("beyond",)).kinds
@@ -23,7 +22,6 @@ Shift = Annotated[dict, Keys(_SHIFT | {"encoder": EncoderChanges, "severities": 
 def check(config: dict, _left_out: LeftOut) -> None:
     """Check that the samples can be drawn, and that every learner reads embeddings."""
     shift, registrations = config["shift"], config["registrations"]
-    with_key("shift.severities", RegistrationSettings.from_dict, {"severities": shift["severities"]})
     encoder = config["encoders"][config["embedding"]["encoder"]] | shift["encoder"]
     require_draws("shift.encoder", encoder, registrations["cloud_points"], "registrations.cloud_points")
     for key, name in require_explained(config, "learners"):

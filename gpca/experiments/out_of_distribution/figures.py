@@ -136,8 +136,8 @@ def _write_correlations(panel, correlations: Mapping[str, float]) -> None:
 
 
 def _look(learner: str) -> dict:
-    colour, line, width = METHOD_LOOKS.get(learner, OTHER_LOOK)
-    return {"color": colour, "linestyle": line, "linewidth": width}
+    color, line, width = METHOD_LOOKS.get(learner, OTHER_LOOK)
+    return {"color": color, "linestyle": line, "linewidth": width}
 
 
 def _paper_first(learners: Iterable[str]) -> list[str]:
@@ -146,7 +146,7 @@ def _paper_first(learners: Iterable[str]) -> list[str]:
 
 
 def _in_front(shown: list[str]) -> list[str]:
-    """Return the learners in the order of drawing: the grey ones first, the paper's over them."""
+    """Return the learners in the order of drawing: the gray ones first, the paper's over them."""
     return [name for name in shown if name not in METHOD_LOOKS] + _paper_first(shown)[::-1]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.axes import Axes
+from gpca.io.names import Axes
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 
 # set -> the set that holds the training samples of its encoder and learners

@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 
 
 def draw_real_world_confusions(metrics_csv: str | Path, title: str, methods: Sequence[str]) -> Figure:
-    """Draw a matrix for each method ``{backbone}-{reduction}``: shares of each true concept in %, and counts.
-
-    Raises:
-        InputError: an unusable file, or one without metrics of these methods.
-    """
+    """Draw a matrix for each method ``{backbone}-{reduction}``: shares of each true concept in %, and counts."""
     pooled = {method: counts for (_, method), counts in pooled_confusions(read_together(metrics_csv)).items()}
     shown = {method: pooled[method] for method in methods if method in pooled}
     if not shown:

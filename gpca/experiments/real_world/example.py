@@ -18,7 +18,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.cloud_views import legend_of_clouds
 from gpca.reporting.figures.panels import panels, write_below
-from gpca.reporting.figures.style import BLACK, SOURCE_COLOUR, TARGET_COLOUR, YELLOW, write_title
+from gpca.reporting.figures.style import BLACK, SOURCE_COLOR, TARGET_COLOR, YELLOW, write_title
 from gpca.reporting.words import BOP_TITLES, object_of_frames
 
 if TYPE_CHECKING:
@@ -44,9 +44,6 @@ def draw_real_world_example(
 
     The figure shows a test sample that an occluder covers (else any overlap sample) and that is attributed rightly: of
     the half of such samples that are the largest in their images, the one with the median score.
-
-    Raises:
-        InputError: an unusable file, or no test sample of the concept overlap.
     """
     instances = Instances.load(instances_npz)
     objects = ObjectClouds.load(objects_npz)
@@ -82,8 +79,8 @@ def draw_real_world_example(
         _shade(panel, covered(own_px, seen["init", "source"], image.shape[:2]))
     large = float(np.clip(2000 / len(observed_m), 1.1, 5))  # Few points are drawn larger.
     looks: dict[str, dict[str, Any]] = {
-        "model": {"color": TARGET_COLOUR, "s": 0.7},
-        "source": {"color": SOURCE_COLOUR, "s": large},
+        "model": {"color": TARGET_COLOR, "s": 0.7},
+        "source": {"color": SOURCE_COLOR, "s": large},
     }
     for panel, pose in ((drawn[1], "init"), (drawn[2], "icp")):
         for name, look in looks.items():

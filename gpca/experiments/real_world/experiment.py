@@ -13,7 +13,6 @@ from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
 from gpca.explainers.registry import require_settings
-from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.title import title_of
@@ -29,7 +28,6 @@ def check(config: dict, left_out: LeftOut) -> None:
     if REAL_WORLD in config["sources"]:
         fault = "is reserved for the frames of real_world"
         raise InputError(f"config key sources.{REAL_WORLD}", fault, "choose another name")
-    with_key("real_world.scenes", SceneSettings.from_dict, section["scenes"])
     for family in section["scenes"].get("families", ()):
         with_key("real_world.scenes.families", procedural.require_family, family)
     datasets = with_key("real_world.datasets", resolve_datasets, section["datasets"], config["data_dir"])
@@ -37,8 +35,8 @@ def check(config: dict, left_out: LeftOut) -> None:
         fault = "form 'results' needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
     _check_training(config)
-    names = section["condition_backbones"]
-    require_names("real_world.condition_backbones", names, section["backbones"], "backbone", encoders_left_out)
+    key, backbones = "real_world.condition_backbones", section["backbones"]
+    require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
     _check_reductions(config)

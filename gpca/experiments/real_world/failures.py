@@ -33,9 +33,6 @@ def draw_real_world_failures(
     """Draw the test samples of all seeds that were attributed wrongly with the highest score, one of each instance.
 
     The three lists of files run through the seeds in the same order.
-
-    Raises:
-        InputError: an unusable file, or files of different samples.
     """
     objects = ObjectClouds.load(objects_npz)
     mistakes = _mistakes(poses_csv, predictions_csv)

@@ -14,7 +14,7 @@ from gpca.frames.sample_file import FRAME_COLUMNS
 from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds
-from gpca.reporting.figures.style import CONCEPT_COLOURS, SMALL_PT
+from gpca.reporting.figures.style import CONCEPT_COLORS, SMALL_PT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,7 +74,7 @@ def draw_score_bars(
     """Draw a bar for each concept from top to bottom, without axis at the left, the true concept's name in bold."""
     for place, concept in enumerate(CONCEPTS):
         deviation = None if deviations_C is None else deviations_C[place]
-        look = {"color": CONCEPT_COLOURS[concept], "height": 0.7, "error_kw": {"lw": 0.8}}
+        look = {"color": CONCEPT_COLORS[concept], "height": 0.7, "error_kw": {"lw": 0.8}}
         axes.barh(place, scores_C[place], xerr=deviation, **look)
         weight = "bold" if concept == true_concept else "normal"
         axes.text(-0.03, place, concept, ha="right", va="center", fontsize=SMALL_PT, fontweight=weight)

@@ -59,8 +59,8 @@ class Answers:
             if not new:
                 continue
             records = [record_of(self._episodes[key.episode], key.actions, self._actions, self._budget) for key in new]
-            said = explain(as_registrations(records)[0].without_labels())
-            self._answers |= dict(zip(new, answers_of(said), strict=True))
+            attribution = explain(as_registrations(records)[0].without_labels())
+            self._answers |= dict(zip(new, answers_of(attribution), strict=True))
 
     def history(self, explainer: str, episode: int, actions: tuple[str, ...]) -> list[Answer]:
         """Return what an explainer said at the start and after each of these actions."""
@@ -84,10 +84,10 @@ def starts_of(episodes: Sequence[Episode], actions: Sequence[str], budget: int) 
     return as_registrations([record_of(episode, (), actions, budget) for episode in episodes])[0]
 
 
-def answers_of(said: Attribution) -> list[Answer]:
+def answers_of(attribution: Attribution) -> list[Answer]:
     """Return an attribution's rows as answers."""
-    scores_N_C = as_shares(said.scores_N_C)
-    rows = zip(scores_N_C, said.variances_N_C, said.bald_N, said.seconds_N, strict=True)
+    scores_N_C = as_shares(attribution.scores_N_C)
+    rows = zip(scores_N_C, attribution.variances_N_C, attribution.bald_N, attribution.seconds_N, strict=True)
     return [Answer(scores_C, variances_C, float(bald), float(time)) for scores_C, variances_C, bald, time in rows]
 
 

@@ -17,7 +17,7 @@ from gpca.frames.shots import Shot
 from gpca.frames.situations import Situation
 from gpca.frames.viewpoint import best_viewpoint
 from gpca.io.arrays import save_arrays
-from gpca.io.axes import Axes
+from gpca.io.names import Axes
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action, look_around
 from gpca.recovery.settings import LoopSettings

@@ -16,7 +16,7 @@ from gpca.reporting.figures.panels import write_below
 from gpca.reporting.figures.style import (
     BLACK,
     SMALL_PT,
-    TARGET_COLOUR,
+    TARGET_COLOR,
     TEXT_WIDTH_IN,
     YELLOW,
     blues,
@@ -50,9 +50,6 @@ def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = ""
 
     Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
     object's name in words follows from its `dataset` of the BOP benchmark.
-
-    Raises:
-        InputError: an unusable file.
     """
     found = load_arrays(example_npz, SHAPES, "python -m gpca recover")
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 2.0), layout="constrained")
@@ -85,16 +82,16 @@ def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = ""
 def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, placed: np.ndarray) -> None:
     """Show the part of an image around both outlines; what is seen of the object is outlined in full."""
     panel.imshow(image)
-    for silhouette, colour, line in ((true, YELLOW, "--"), (mask, YELLOW, "-"), (placed, TARGET_COLOUR, "-")):
+    for silhouette, color, line in ((true, YELLOW, "--"), (mask, YELLOW, "-"), (placed, TARGET_COLOR, "-")):
         if silhouette.any():
-            panel.contour(silhouette, [0.5], colors=colour, linewidths=1.0, linestyles=line)
+            panel.contour(silhouette, [0.5], colors=color, linewidths=1.0, linestyles=line)
     height, width = mask.shape
     v, u = np.nonzero(true | placed | mask)
     half_v = np.clip(0.75 * max(np.ptp(v), np.ptp(u) * height / width), height / 5, height / 2)
     half_u = half_v * width / height
-    centre_u = np.clip((u.min() + u.max()) / 2, half_u, width - half_u)
-    centre_v = np.clip((v.min() + v.max()) / 2, half_v, height - half_v)
-    panel.set(xlim=(centre_u - half_u, centre_u + half_u - 1), ylim=(centre_v + half_v - 1, centre_v - half_v))
+    center_u = np.clip((u.min() + u.max()) / 2, half_u, width - half_u)
+    center_v = np.clip((v.min() + v.max()) / 2, half_v, height - half_v)
+    panel.set(xlim=(center_u - half_u, center_u + half_u - 1), ylim=(center_v + half_v - 1, center_v - half_v))
     panel.set_axis_off()
 
 
@@ -106,7 +103,7 @@ def _draw_viewpoints(figure, panel, found: Mapping[str, np.ndarray]) -> None:
     widths = np.where(np.arange(len(towards)) == int(found["chosen"]), 1.6, 0.3)
     dots = panel.scatter(azimuth, zenith_deg, c=found["surface_n"], s=24, linewidths=widths, **look)
     first = found["viewpoint_first"]
-    panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=TARGET_COLOUR)
+    panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=TARGET_COLOR)
     panel.set(rlim=(0, 90), xticks=[], yticks=[30, 60, 90])
     panel.set_yticklabels([])
     bar = figure.colorbar(dots, ax=panel, shrink=0.7, pad=0.02, aspect=25, ticks=[0, 0.5, 1])

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.errors import InputError
 from gpca.reporting.figures.diagram import Canvas
-from gpca.reporting.figures.style import CONCEPT_COLOURS, GREY, TEXT_WIDTH_IN, write_title
+from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, TEXT_WIDTH_IN, write_title
 from gpca.reporting.words import in_words, plural
 
 if TYPE_CHECKING:
@@ -27,46 +26,28 @@ ASKED = {
 }
 
 
-def read_policy(path: str | Path) -> dict:
-    """Read the JSON of the step ``recover``; InputError where it is missing or lacks a threshold."""
-    try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-        content["thresholds"] = {
-            name: float(content["thresholds"][name]) for name in ("uncertain", "dominant", "improvement", "attempts")
-        }
-        content["treatments"] = dict(content["treatments"])
-    except FileNotFoundError as fault:
-        raise InputError(path, "no such file", "make it with 'python -m gpca recover'") from fault
-    except (ValueError, KeyError, TypeError) as fault:
-        raise InputError(
-            path, "is not a policy with its thresholds", "make it with 'python -m gpca recover'"
-        ) from fault
-    return content
-
-
 def draw_mitigation(title: str, policy_json: str | Path) -> Figure:
     """Draw the mapping of one policy: what it reads, its branches in the order of asking, and the ways back.
 
     An action leads to new scores; what is queued leads to a label and to a classifier that has learned it.
     """
-    policy = read_policy(policy_json)
-    limits = policy["thresholds"]
-    treatments = policy["treatments"]
+    policy = json.loads(Path(policy_json).read_text(encoding="utf-8"))
+    limits, treatments = policy["thresholds"], policy["treatments"]
     canvas = Canvas(TEXT_WIDTH_IN, 2.62)
     write_title(canvas.figure, f"{title}: thresholds of this run")
     words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"
     canvas.box(0.04, 0.86, 1.3, 0.66, words)
-    branches = [(_queue_condition(limits), "Abstain\nqueue for a person", GREY)]
+    branches = [(_queue_condition(limits), "Abstain\nqueue for a person", GRAY)]
     branches += [
-        (ASKED.get(concept, concept), WORDS.get(action, in_words(action)), CONCEPT_COLOURS[concept])
+        (ASKED.get(concept, concept), WORDS.get(action, in_words(action)), CONCEPT_COLORS[concept])
         for concept, action in sorted(treatments.items(), key=lambda item: ("pose", "overlap", "noise").index(item[0]))
     ]
     middles_in = [1.99 - 0.53 * place for place in range(len(branches))]
-    for middle_in, (condition, branch, colour) in zip(middles_in, branches, strict=True):
-        canvas.box(1.95, middle_in - 0.2, 1.6, 0.4, condition, colour, dashed=True)
-        canvas.box(3.95, middle_in - 0.2, 1.85, 0.4, branch, colour)
+    for middle_in, (condition, branch, color) in zip(middles_in, branches, strict=True):
+        canvas.box(1.95, middle_in - 0.2, 1.6, 0.4, condition, color, dashed=True)
+        canvas.box(3.95, middle_in - 0.2, 1.85, 0.4, branch, color)
         canvas.arrow((1.34, 1.19), (1.62, 1.19), (1.62, middle_in), (1.95, middle_in))
-        canvas.arrow((3.55, middle_in), (3.95, middle_in), colour=colour)
+        canvas.arrow((3.55, middle_in), (3.95, middle_in), color=color)
         canvas.arrow((5.8, middle_in), (6.05, middle_in))
     canvas.box(6.05, middles_in[0] - 0.2, 1.06, 0.4, "A person labels it\nthe GPC learns it")
     over_in = middles_in[0] + 0.32

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from gpca.experiments.recovery.queue_file import DOUBTED, DRAWN
 from gpca.reporting.figures.panels import legend_below, panels
-from gpca.reporting.figures.style import BLUE, GREY, write_title
+from gpca.reporting.figures.style import BLUE, GRAY, write_title
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-ORDERS = {DOUBTED: ("in doubt first, as a queue gives them", BLUE, "-"), DRAWN: ("drawn at random", GREY, "--")}
+ORDERS = {DOUBTED: ("in doubt first, as a queue gives them", BLUE, "-"), DRAWN: ("drawn at random", GRAY, "--")}
 
 
 def draw_queued_labels(queues: pd.DataFrame, title: str, policies: Mapping[str, str]) -> Figure:
@@ -26,11 +26,11 @@ def draw_queued_labels(queues: pd.DataFrame, title: str, policies: Mapping[str, 
     highest = 100 * queues[queues["policy"].isin(shown)]["high"].max()
     figure, [drawn] = panels(1, len(shown), 2.4, sharex=True, sharey=True)
     for panel, policy in zip(drawn, shown, strict=True):
-        for order, (words, colour, line) in ORDERS.items():
+        for order, (words, color, line) in ORDERS.items():
             curve = queues[(queues["policy"] == policy) & (queues["order"] == order)].sort_values("labels")
-            panel.plot(curve["labels"], 100 * curve["error"], line, color=colour, label=words, linewidth=1.4)
+            panel.plot(curve["labels"], 100 * curve["error"], line, color=color, label=words, linewidth=1.4)
             bounds = (100 * curve[name] for name in ("low", "high"))
-            panel.fill_between(curve["labels"], *bounds, color=colour, alpha=0.15, linewidth=0)
+            panel.fill_between(curve["labels"], *bounds, color=color, alpha=0.15, linewidth=0)
         panel.set_title(policies[policy])
         panel.set_xlabel("queued cases labeled, per seed")
         panel.set_ylim(0, min(100, 1.05 * highest))

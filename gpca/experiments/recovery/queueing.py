@@ -68,8 +68,8 @@ class ClassifierLearner:
 
     def choose(self) -> list[str]:
         """Return the treatments of the largest scores."""
-        said = self._explainer.explain(self._judged.without_labels())
-        return [self._treatments[CONCEPTS[column]] for column in said.scores_N_C.argmax(axis=1)]
+        attribution = self._explainer.explain(self._judged.without_labels())
+        return [self._treatments[CONCEPTS[column]] for column in attribution.scores_N_C.argmax(axis=1)]
 
 
 class ChancesLearner:

@@ -11,7 +11,7 @@ from gpca.errors import InputError
 from gpca.experiments.recovery.metrics import pool_share
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.panels import panels
-from gpca.reporting.figures.style import BLACK, BLUE, CONCEPT_COLOURS, CONCEPT_MARKERS, SKY_BLUE, write_title
+from gpca.reporting.figures.style import BLACK, BLUE, CONCEPT_COLORS, CONCEPT_MARKERS, SKY_BLUE, write_title
 from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def draw_recovery_rates(metrics: pd.DataFrame, title: str, policies: Mapping[str
     for n, cause in enumerate(CONCEPTS):
         _, failures = pool_share(metrics, shown[0], f"recovered_within_{budget}", cause) or (nan, 0)
         label = f"{cause} ($n$ = {failures})"
-        look = {"color": CONCEPT_COLOURS[cause], "marker": CONCEPT_MARKERS[cause], "label": label}
+        look = {"color": CONCEPT_COLORS[cause], "marker": CONCEPT_MARKERS[cause], "label": label}
         _draw(axes[1], metrics, shown, f"recovered_within_{budget}", cause, APART * (n - 1), look)
     axes[0].set_yticks(range(len(shown)), [policies[name] for name in shown])
     axes[0].set_ylim(len(shown) - 0.4, -0.6)

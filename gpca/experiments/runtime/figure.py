@@ -9,13 +9,13 @@ from gpca.comparison.published import HARDWARE, Number, printed_seconds
 from gpca.errors import InputError
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION
 from gpca.reporting.figures.panels import legend_below, panels
-from gpca.reporting.figures.style import BLUE, GREEN, GREY, ORANGE, SMALL_PT, write_title
+from gpca.reporting.figures.style import BLUE, GRAY, GREEN, ORANGE, SMALL_PT, write_title
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-LOOKS = ((GREY, "D"), (BLUE, "o"), (GREEN, "s"), (ORANGE, "^"))  # the paper's first, then those of our devices
+LOOKS = ((GRAY, "D"), (BLUE, "o"), (GREEN, "s"), (ORANGE, "^"))  # the paper's first, then those of our devices
 ROW_IN = 0.34
 ALL_STAGES = "All four"
 
@@ -38,19 +38,19 @@ def draw_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number]) -
     figure, [[panel]] = panels(1, 1, 0.9 + ROW_IN * len(rows))
     step = 0.7 / len(series)
     for place, (name, stages) in enumerate(series.items()):
-        colour, marker = LOOKS[min(place, len(LOOKS) - 1)]
+        color, marker = LOOKS[min(place, len(LOOKS) - 1)]
         drawn = [*stages.values(), Stage(sum(stage.mean for stage in stages.values()))]
         for row, (mean, deviation) in enumerate(drawn):
             y = row + step * (place - (len(series) - 1) / 2)
             # A logarithmic axis has no place for what lies below zero.
             low, high = max(mean - deviation, 0.1 * mean), mean + deviation
-            panel.plot([low, high], [y, y], color=colour, linewidth=1.0)
-            panel.plot(mean, y, marker, color=colour, linestyle="", label=name if row == 0 else None)
+            panel.plot([low, high], [y, y], color=color, linewidth=1.0)
+            panel.plot(mean, y, marker, color=color, linestyle="", label=name if row == 0 else None)
             words = f"{mean:,.3g}" if mean < 1000 else f"{mean:,.0f}"
             look = {"textcoords": "offset points", "va": "center_baseline", "fontsize": SMALL_PT}
             panel.annotate(words, (high, y), (5, 0), **look)
     panel.margins(x=0.08)  # The last number needs room.
-    panel.axhline(len(rows) - 1.5, color=GREY, linewidth=0.6)
+    panel.axhline(len(rows) - 1.5, color=GRAY, linewidth=0.6)
     panel.set_yticks(range(len(rows)), rows)
     panel.set(ylim=(len(rows) - 0.5, -0.5), xscale="log", xlabel="milliseconds")
     panel.xaxis.set_major_formatter("{x:g}")

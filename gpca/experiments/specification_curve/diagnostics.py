@@ -10,16 +10,16 @@ import numpy as np
 from gpca.attribution.diagnostics import aurc, calibration_error, rank_correlation
 from gpca.attribution.metrics import ALL
 from gpca.experiments.out_of_distribution.metrics import probabilities, read_learner_predictions, sets_of, wrong
-from gpca.experiments.specification_curve.given import Given, Row
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield ρ, AUC and ECE of each learner under each reading."""
-    learned = read_learner_predictions(given.predictions.values(), given.sets.values())
+    learned = read_learner_predictions(run_files.predictions.values(), run_files.sets.values())
     for (source, learner, seed), rows in learned.items():
         of_sets = sets_of(rows)
         for reading in readings:

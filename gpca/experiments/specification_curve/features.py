@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.experiments.specification_curve.given import Given, Row
 from gpca.experiments.specification_curve.judged import accuracies
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.explainers.analytical_features import analytical_features
 from gpca.pairs.dataset import Registrations
@@ -23,15 +23,15 @@ COLUMNS = {
 }
 
 
-def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies of the paper's GPC on each choice of features."""
-    for (source, seed), path in given.registrations.items():
+    for (source, seed), path in run_files.registrations.items():
         registrations = Registrations.load(path, (source, seed))
         features_S_F = analytical_features(registrations, source, seed, "analytical")
         train, test = (registrations.rows(split) for split in ("train", "test"))
         for reading in readings:
             chosen_S_F = features_S_F[:, COLUMNS[reading["features"]]]
-            gpc = GPC(CONCEPTS, GPCSettings(**given.section("gpca_paper")), source, seed)
+            gpc = GPC(CONCEPTS, GPCSettings(**run_files.section("gpca_paper")), source, seed)
             gpc.fit(chosen_S_F[train], registrations.concept[train])
             scores_S_C, _, _ = gpc.attribute(chosen_S_F[test])
             for (metric, concept), value in accuracies(registrations.concept[test], scores_S_C).items():

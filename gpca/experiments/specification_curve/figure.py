@@ -12,7 +12,7 @@ from gpca.comparison.readings import asked_about
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.figures.panels import panels
-from gpca.reporting.figures.style import LIGHT_GREY, PALETTE, SMALL_PT, YELLOW, write_title
+from gpca.reporting.figures.style import LIGHT_GRAY, PALETTE, SMALL_PT, YELLOW, write_title
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 COLUMNS = 3
 PANEL_IN, LINE_IN = 1.9, 0.13  # the height of a row of panels, and what each line of the legends below it adds
 FARTHEST = 30.0  # times what is close
-COLOURS = tuple(colour for colour in PALETTE if colour != YELLOW)  # Yellow lines are hard to see on white.
+COLORS = tuple(color for color in PALETTE if color != YELLOW)  # Yellow lines are hard to see on white.
 NUMBER = ["table", "row", "column"]  # what names a printed number
 LETTERS = 48  # of a number's name, which a panel has room for
 LINES = ("-", "--", ":")  # of the first numbers in a panel that have a color each, the next such, …
@@ -56,13 +56,13 @@ def draw_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: Mapp
 
 def _draw_group(panel, of_numbers: Mapping[tuple[str, str, str], pd.DataFrame]) -> None:
     """Draw the curve of each number, and name them all below the panel, where no curve is."""
-    panel.axhspan(-1, 1, color=LIGHT_GREY, linewidth=0)
+    panel.axhspan(-1, 1, color=LIGHT_GRAY, linewidth=0)
     for place, (key, of_number) in enumerate(of_numbers.items()):
         distance_R = np.sort(of_number["distance"].to_numpy().clip(-FARTHEST, FARTHEST))
         share_R = np.linspace(0, 100, len(distance_R)) if len(distance_R) > 1 else np.array([50.0])
         look = {
-            "color": COLOURS[place % len(COLOURS)],
-            "linestyle": LINES[place // len(COLOURS) % len(LINES)],
+            "color": COLORS[place % len(COLORS)],
+            "linestyle": LINES[place // len(COLORS) % len(LINES)],
             "label": _words(key),
         }
         panel.plot(share_R, distance_R, marker="o", markersize=1.6, linewidth=0.8, **look)

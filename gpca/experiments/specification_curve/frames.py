@@ -10,8 +10,8 @@ from gpca.attribution.metrics import ALL
 from gpca.attribution.predictions import read_predictions
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.experiments.specification_curve.given import Given, Row
 from gpca.experiments.specification_curve.judged import Values, accuracies_of_named
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -19,12 +19,12 @@ from gpca.process.progress import progress
 from gpca.seeds import generator
 
 
-def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies of every backbone and reduction, repeat by repeat, and how concepts are confused."""
     of_seeds: dict[int, Registrations] = {}
-    for source, seed in given.registrations:
-        of_seeds[seed] = Registrations.load(given.registrations[source, seed], (source, seed))
-    methods = list(dict.fromkeys(method for _, method, _ in given.predictions))
+    for source, seed in run_files.registrations:
+        of_seeds[seed] = Registrations.load(run_files.registrations[source, seed], (source, seed))
+    methods = list(dict.fromkeys(method for _, method, _ in run_files.predictions))
     first = next(iter(of_seeds))
     for repeats in dict.fromkeys(reading["repeats"] for reading in readings):
         wanted = [reading for reading in readings if reading["repeats"] == repeats]
@@ -32,10 +32,10 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
             for seed in of_seeds:
                 if repeats == "everything":
                     shown = of_seeds[seed]
-                    named_S = _predicted(given, source, method, seed)
+                    named_S = _predicted(run_files, source, method, seed)
                 else:
-                    shown = given.embedded(source, method, first)
-                    named_S = refitted(shown, given.section("gpca"), repeats == "samples", source, seed)
+                    shown = run_files.embedded(source, method, first)
+                    named_S = refitted(shown, run_files.section("gpca"), repeats == "samples", source, seed)
                 for reading in wanted:
                     chosen_S = of_objects(shown, reading["objects"])
                     if not chosen_S.any():
@@ -76,6 +76,6 @@ def values(true_S: np.ndarray, named_S: np.ndarray) -> Values:
     return found | {("test_samples", ALL): float(len(true_S))}
 
 
-def _predicted(given: Given, source: str, method: str, seed: int) -> np.ndarray:
-    rows = read_predictions(given.predictions[source, method, seed])
+def _predicted(run_files: RunFiles, source: str, method: str, seed: int) -> np.ndarray:
+    rows = read_predictions(run_files.predictions[source, method, seed])
     return rows.loc[rows["split"] == "test", "concept_predicted"].to_numpy()

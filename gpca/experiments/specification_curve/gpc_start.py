@@ -19,8 +19,8 @@ from gpca.classifier.covariances import make_covariance
 from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import SparseGPs
-from gpca.experiments.specification_curve.given import Given, Row
 from gpca.experiments.specification_curve.judged import accuracies, table5
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
@@ -32,9 +32,9 @@ DEFAULT_LENGTHSCALE = math.log(2)  # gpytorch's
 FITTED = (("rbf", 0.001, 200), ("polynomial", 0.001, 200), ("rbf", 0.01, 100))
 
 
-def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield accuracies under each reading, and of the last of `FITTED` what Table V prints."""
-    for source, seed, sets, registrations in given.in_distribution():
+    for source, seed, sets, registrations in run_files.in_distribution():
         train, test = (registrations.rows(split) for split in ("train", "test"))
         distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         h_S_d, true_S = registrations.embedding, registrations.concept
@@ -42,7 +42,7 @@ def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iter
         for reading in progress(readings, f"starts of the GPC on {source}, seed {seed}"):
             for kernel, rate, iterations in FITTED:
                 schedule = {"kernel": kernel, "learning_rate": rate, "iterations": iterations}
-                settings = GPCSettings(**given.section("gpca_paper") | schedule)
+                settings = GPCSettings(**run_files.section("gpca_paper") | schedule)
                 # A polynomial kernel has no lengthscale.
                 relevant = {k: v for k, v in reading.items() if kernel != "polynomial" or k != "lengthscale"}
                 key = (kernel, rate, iterations, *relevant.values())

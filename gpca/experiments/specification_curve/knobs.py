@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.metrics import ALL
 from gpca.causes.shapley import shapley_values
-from gpca.experiments.specification_curve.given import Given, Row
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -27,10 +27,10 @@ from gpca.uncertainty.spread import divergence, log_determinant, log_residual
 STEPS = {"small": STEP * KNOB_RANGE, "middle": np.subtract(MIDDLE, UNTOUCHED)}
 
 
-def sensitivity(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
+def sensitivity(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies of local sensitivity analysis under each reading."""
-    settings = given.uncertainty()
-    for source, seed, pairs in _pairs(given, sizes, settings, settings.starts, "sensitivity"):
+    settings = run_files.uncertainty()
+    for source, seed, pairs in _pairs(run_files, sizes, settings, settings.starts, "sensitivity"):
         found = [(concept, _steps(runs["observed"], settings)) for concept, runs in pairs]
         concept_S, measured = zip(*found, strict=True)
         for reading in readings:
@@ -43,11 +43,11 @@ def sensitivity(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) 
             yield reading, source, "sa_local_additive", "accuracy", ALL, seed, value
 
 
-def shap(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
+def shap(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies of SHAP under each reading."""
-    settings = given.uncertainty()
+    settings = run_files.uncertainty()
     starts = sorted({reading["starts"] for reading in readings})
-    for source, seed, pairs in _pairs(given, sizes, settings, starts[-1], "shap"):
+    for source, seed, pairs in _pairs(run_files, sizes, settings, starts[-1], "shap"):
         concept_S, spreads = [], []
         for concept, runs in pairs:
             concept_S.append(concept)
@@ -60,13 +60,13 @@ def shap(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iter
 
 
 def _pairs(
-    given: Given, sizes: ReadingSizes, settings: UncertaintySettings, starts: int, title: str
+    run_files: RunFiles, sizes: ReadingSizes, settings: UncertaintySettings, starts: int, title: str
 ) -> Iterator[tuple[str, int, Iterator[tuple[str, dict[str, tuple[RegisteredRow, KnobRuns]]]]]]:
     """Yield source, seed, and of each sample its concept and its runs: of the observed pair, and of a clean one.
 
     What is random in a sample is named as in :func:`gpca.uncertainty.evaluation.evaluate_design`.
     """
-    for (source, seed), path in given.registrations.items():
+    for (source, seed), path in run_files.registrations.items():
         registrations = Registrations.load(path, (source, seed))
         chosen = registrations.subset(design_rows(registrations, "additive", sizes.samples))
         yield source, seed, _runs(chosen, source, seed, settings, starts, f"{title} of {source}, seed {seed}")

@@ -12,7 +12,7 @@ from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.experiments.specification_curve.given import Given, Row
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
@@ -22,10 +22,10 @@ RANDOM_BATCH = 10  # random choice is the same in rounds of any size, and needs 
 EVERY, MOST = 5, 200  # epochs after which the accuracy is looked at, and of which there are at most so many
 
 
-def pool(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield labels and epochs to the target under each reading, by BALD with k-means and by random choice."""
-    base, target = _base(given)
-    for source, seed, _, registrations in given.in_distribution():
+    base, target = _base(run_files)
+    for source, seed, _, registrations in run_files.in_distribution():
         started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
         found: dict[tuple, dict[str, float]] = {}
         for reading in progress(readings, f"pools of {source}, seed {seed}"):
@@ -74,10 +74,10 @@ def until(
     return [step for step, _ in done], done[-1][1]
 
 
-def epochs(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def epochs(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the passes of Adam that a classifier started anew takes to the target."""
-    base, target = _base(given)
-    for source, seed, _, registrations in given.in_distribution():
+    base, target = _base(run_files)
+    for source, seed, _, registrations in run_files.in_distribution():
         task = make_task(registrations, NEW, base, source, seed)
         begun = (task, initial_gpc(task, base, source, seed, "reading"))
         ends = {"at_target": target, "all": np.inf}
@@ -103,6 +103,6 @@ def passes(
     return {"epochs_to_target": float(MOST), "reached": 0.0}
 
 
-def _base(given: Given) -> tuple[ActiveLearningSettings, float]:
-    section = given.section("active_learning")
+def _base(run_files: RunFiles) -> tuple[ActiveLearningSettings, float]:
+    section = run_files.section("active_learning")
     return ActiveLearningSettings.from_dict(section), section["target"]

@@ -13,8 +13,8 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.experiments.specification_curve.given import Given, Row
 from gpca.experiments.specification_curve.judged import accuracies, table5
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.explainers.concept_classifier import PAPERS_RANDOM_STATE
 from gpca.explainers.registry import explainer_entry
@@ -24,14 +24,14 @@ from gpca.pairs.perturbation import CONCEPTS
 FOREST, SVM = "learner_forest", "learner_linear_svm"
 
 
-def kernel(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def kernel(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield what Table V prints of the GPC, by its kernel and schedule."""
-    for source, seed, sets, registrations in given.in_distribution():
+    for source, seed, sets, registrations in run_files.in_distribution():
         train, test = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
         distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         for name in dict.fromkeys(reading["kernel"] for reading in readings):
             of_kernel = {reading["iterations"]: reading for reading in readings if reading["kernel"] == name}
-            settings = GPCSettings(**{**given.section("gpca_paper"), "kernel": name})
+            settings = GPCSettings(**{**run_files.section("gpca_paper"), "kernel": name})
             gpc = GPC(CONCEPTS, settings, source, seed)
             for iterations in gpc.fit_up_to(of_kernel, train.embedding, train.concept):
                 scores_S_C, _, _ = gpc.attribute(test.embedding)
@@ -39,9 +39,9 @@ def kernel(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> I
                     yield of_kernel[iterations], source, "gpca_paper", metric, concept, seed, value
 
 
-def linear_svm(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def linear_svm(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield what Table V prints of the linear SVM, by its kind."""
-    for source, seed, sets, registrations in given.in_distribution():
+    for source, seed, sets, registrations in run_files.in_distribution():
         distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         train, test = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
         for reading in readings:
@@ -75,19 +75,19 @@ def svm_scores(train: Registrations, asked_S_d: np.ndarray, machine: str, inputs
     return softmax(fitted.decision_function(np.asarray(asked_S_d, float))[:, columns], axis=1)
 
 
-def encoder_head(given: Given, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
+def encoder_head(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies of Table V's learners on embeddings by encoders that were trained with other heads."""
-    for number, (source, seed, _, registrations) in enumerate(given.in_distribution()):
+    for number, (source, seed, _, registrations) in enumerate(run_files.in_distribution()):
         of_heads = {"linear": registrations}
         if number < sizes.encoders:
-            clouds = Registrations.load(given.registrations[source, seed], (source, seed))
-            settings = EncoderSettings(**{**given.section("encoder"), "head": "two_layer"})
+            clouds = Registrations.load(run_files.registrations[source, seed], (source, seed))
+            settings = EncoderSettings(**{**run_files.section("encoder"), "head": "two_layer"})
             model, _ = train_encoder(clouds, source, seed, settings)
             h_S_d, _ = embed(model, clouds, source, seed, settings)
             of_heads["two_layer"] = replace(clouds, attached={"embedding": h_S_d})
         for head, embedded in of_heads.items():
             train, test = (embedded.subset(embedded.rows(split)) for split in ("train", "test"))
-            gpc = GPC(CONCEPTS, GPCSettings(**given.section("gpca_paper")), source, seed)
+            gpc = GPC(CONCEPTS, GPCSettings(**run_files.section("gpca_paper")), source, seed)
             gpc.fit(train.embedding, train.concept)
             trees = explainer_entry(FOREST).make(source, seed)
             trees.fit(train)

@@ -21,7 +21,7 @@ class Group:
         choices: the class of its choices.
         run: ``module:function`` beside this module, of the files given, the readings and their sizes, that
             yields reading, source, method, metric, concept, seed and value, named as in published.csv.
-        reads: kinds of files, fields of :class:`gpca.experiments.specification_curve.given.Given`.
+        reads: kinds of files, fields of :class:`gpca.experiments.specification_curve.run_files.RunFiles`.
         sources: of which printed numbers are asked; empty for depth frames.
         methods: whose predictions it reads.
         explainers: those that it fits itself, found by name.

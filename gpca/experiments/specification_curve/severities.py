@@ -8,8 +8,8 @@ import numpy as np
 from scipy.stats import rankdata
 
 from gpca.attribution.predictions import read_predictions
-from gpca.experiments.specification_curve.given import Given, Row
 from gpca.experiments.specification_curve.judged import accuracies_of_named
+from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations
 
@@ -17,14 +17,14 @@ PARTS = ("weakest", "middle", "strongest")
 CLASSIFIERS = {"paper": "gpca_paper", "converged": "gpca"}
 
 
-def run(given: Given, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the accuracies under each reading, of all samples and of each concept."""
-    for (source, seed), path in given.registrations.items():
+    for (source, seed), path in run_files.registrations.items():
         registrations = Registrations.load(path, (source, seed))
         test = registrations.subset(registrations.rows("test"))
         part_S = dict(zip(test.sample.astype(str), parts(test), strict=True))
         for reading in readings:
-            of_classifier = given.predictions.get((source, CLASSIFIERS[reading["classifier"]], seed))
+            of_classifier = run_files.predictions.get((source, CLASSIFIERS[reading["classifier"]], seed))
             if of_classifier is None:
                 continue
             rows = read_predictions(of_classifier)

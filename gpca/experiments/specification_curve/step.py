@@ -10,8 +10,8 @@ import pandas as pd
 
 from gpca.attribution.metrics import TIDY_COLUMNS, write_metrics
 from gpca.errors import InputError
-from gpca.experiments.specification_curve.given import Given, by_backbone, by_method, by_source_and_seed
 from gpca.experiments.specification_curve.registry import GROUPS
+from gpca.experiments.specification_curve.run_files import RunFiles, by_backbone, by_method, by_source_and_seed
 from gpca.experiments.specification_curve.settings import ReadingSizes, name_of, readings_of
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
@@ -32,9 +32,9 @@ def run(job: Job) -> None:
     files: dict[str, Any] = {kind: KINDS[kind](getattr(job, kind)) for kind in group.reads}
     inputs = [path for of_kind in files.values() for path in of_kind.values()]
     with record_provenance([job.out], inputs, job.settings):
-        given = Given(**files, settings=job.settings)
+        run_files = RunFiles(**files, settings=job.settings)
         readings = readings_of({name: choices[name] for name in get_type_hints(group.choices)})
-        rows = group.function()(given, readings, ReadingSizes(**job.section("sizes")))
+        rows = group.function()(run_files, readings, ReadingSizes(**job.section("sizes")))
         records = [(name_of(job.group, reading), *value) for reading, *value in rows]
         if not records:
             remedy = f"raise registrations.train, or real_world.train, or set readings.groups.{job.group} to false"

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gpca.comparison.readings import summarise
+from gpca.comparison.readings import summarize
 from gpca.experiments.specification_curve.words import reading_in_words
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder
@@ -39,7 +39,7 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
     heads = {"number": "Number", "unit": "Unit", "group": "What is open", "where": "Printed number"}
     heads |= {"nearest": "Nearest reading", "close": "Readings that are close", "joint": _BEST}
     table = TableBuilder("table13_readings", heads)
-    for key, of_groups in summarise(judged).items():
+    for key, of_groups in summarize(judged).items():
         rows = rows_where(judged, **dict(zip(("table", "row", "column"), key, strict=True)))
         first = rows.iloc[0]
         for group, of in of_groups.items():

@@ -87,13 +87,13 @@ class KnobbedRegistrar:
 
     def examples(self, rows: np.ndarray, judges: Judges) -> list[Example]:
         """Return the rows as estimators learn from them."""
-        found = []
+        examples = []
         for row in rows:
             [registered] = self.under(row, OBSERVED)
             T_true = self._registrations.T_target_source("true", row)
             judge = judges.of(self._registrations, row)
-            found.append(example(registered, T_true, judge, MOVED, self._settings.starts, *self._axes))
-        return found
+            examples.append(example(registered, T_true, judge, MOVED, self._settings.starts, *self._axes))
+        return examples
 
     def estimates(
         self,
@@ -103,13 +103,15 @@ class KnobbedRegistrar:
     ) -> dict[str, Estimates]:
         """Return what each estimator says of the rows under each setting."""
         shape = len(rows), len(settings_of_knobs)
-        found = {name: Estimates(np.full((*shape, 6, 6), np.nan), np.full(shape, "", object)) for name in estimators}
+        estimates = {
+            name: Estimates(np.full((*shape, 6, 6), np.nan), np.full(shape, "", object)) for name in estimators
+        }
         for s, row in enumerate(progress(rows, f"estimates of {self._axes[0]}, seed {self._axes[1]}")):
             for k, registered in enumerate(self.under(row, settings_of_knobs)):
                 for name, estimate in estimators.items():
-                    said = estimate(registered)
-                    if said.covariance_6_6 is None:
-                        found[name].failure[s, k] = said.failure
+                    answer = estimate(registered)
+                    if answer.covariance_6_6 is None:
+                        estimates[name].failure[s, k] = answer.failure
                     else:
-                        found[name].covariance[s, k] = said.covariance_6_6
-        return found
+                        estimates[name].covariance[s, k] = answer.covariance_6_6
+        return estimates

@@ -87,9 +87,9 @@ class Exchange:
                 explainer.fit(learned.subset(learned.rows("train")))
                 for asked_of, (asked, failure_S) in found.items():
                     test = asked.subset(asked.rows("test"))
-                    said = explainer.explain(test.without_labels())
+                    attribution = explainer.explain(test.without_labels())
                     labels = METHOD, learnt_from, asked_of, explainer_name
-                    yield labeled(prediction_frame(test, said), labels, failure_S[asked.rows("test")])
+                    yield labeled(prediction_frame(test, attribution), labels, failure_S[asked.rows("test")])
 
     def _by_estimators(
         self, registrations: Registrations, rivals: Mapping[str, Rival], judges: Judges
@@ -111,11 +111,13 @@ class Exchange:
         train, test_samples = (described.subset(rows) for rows in rows_of.values())
         for estimator in estimators:
             for name, rival in rivals.items():
-                said, failure_S = self._said(rival, train, taught[estimator], test_samples, asked[estimator])
-                frame = prediction_frame(test_samples, said)
+                attribution, failure_S = self._attributed(
+                    rival, train, taught[estimator], test_samples, asked[estimator]
+                )
+                frame = prediction_frame(test_samples, attribution)
                 yield labeled(frame, (ESTIMATOR, estimator, estimator, name), failure_S)
 
-    def _said(
+    def _attributed(
         self, rival: Rival, train: Registrations, taught: Estimates, test: Registrations, asked: Estimates
     ) -> tuple[Attribution, np.ndarray]:
         """Return the attribution of all test samples, abstained where there is no estimate, and why there is none."""
@@ -132,8 +134,8 @@ class Exchange:
         scores_S_C = np.zeros((len(test), len(CONCEPTS)))
         abstained_S = np.ones(len(test), bool)
         if len(told):
-            said = explainer.explain(asked.attach_to(test.without_labels(), told, conditions, floor))
-            scores_S_C[told], abstained_S[told] = said.scores_N_C, said.abstained_N
+            attribution = explainer.explain(asked.attach_to(test.without_labels(), told, conditions, floor))
+            scores_S_C[told], abstained_S[told] = attribution.scores_N_C, attribution.abstained_N
         return Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S), failure_S
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from gpca.reporting.figures.panels import legend_below, panels
-from gpca.reporting.figures.style import SOURCE_COLOUR, TARGET_COLOUR, TEXT_WIDTH_IN, save_png, write_title
+from gpca.reporting.figures.style import SOURCE_COLOR, TARGET_COLOR, TEXT_WIDTH_IN, save_png, write_title
 
 _ELEVATION_RAD = np.radians(22.0)
 _POINTS_OF_QUERY = 1500  # At most this many points of each cloud are drawn, as more hide one another.
-_PALEST = 0.65  # The colour of the farthest point holds this share of white.
+_PALEST = 0.65  # The color of the farthest point holds this share of white.
 
 
 def draw_clouds(axes, target_Q_3: np.ndarray, source_P_3: np.ndarray, size: float = 1.6, corners=None) -> None:
@@ -28,11 +28,11 @@ def draw_clouds(axes, target_Q_3: np.ndarray, source_P_3: np.ndarray, size: floa
 
     points = np.concatenate([target_Q_3, source_P_3])
     low, high = (points.min(axis=0), points.max(axis=0)) if corners is None else corners
-    colours = np.repeat([to_rgb(TARGET_COLOUR), to_rgb(SOURCE_COLOUR)], [len(target_Q_3), len(source_P_3)], axis=0)
+    colors = np.repeat([to_rgb(TARGET_COLOR), to_rgb(SOURCE_COLOR)], [len(target_Q_3), len(source_P_3)], axis=0)
     farness = ((high[2] - points[:, 2]) / max(high[2] - low[2], 1e-9))[:, None]
-    colours += (1 - colours) * _PALEST * np.clip(farness, 0, 1)
+    colors += (1 - colors) * _PALEST * np.clip(farness, 0, 1)
     order = np.argsort(points[:, 2], kind="stable")
-    axes.scatter(points[order, 0], points[order, 1], s=size, c=colours[order], linewidths=0)
+    axes.scatter(points[order, 0], points[order, 1], s=size, c=colors[order], linewidths=0)
     margin = 0.02 * float(np.max(high - low))
     axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), aspect="equal")
     axes.set_axis_off()
@@ -48,8 +48,8 @@ def legend_of_clouds(figure, target: str, source: str, gap: float) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], linestyle="", marker="o", markersize=3, color=colour, label=label)
-        for colour, label in ((TARGET_COLOUR, target), (SOURCE_COLOUR, source))
+        Line2D([], [], linestyle="", marker="o", markersize=3, color=color, label=label)
+        for color, label in ((TARGET_COLOR, target), (SOURCE_COLOR, source))
     ]
     figure.legend(handles=handles, loc="upper right", ncols=2, borderaxespad=gap, handletextpad=0.1, columnspacing=1)
 
@@ -75,16 +75,16 @@ def widest_views(cloud_P_3: np.ndarray, count: int = 8) -> list[np.ndarray]:
 def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:
     """Draw what a person is asked about, the aligned source over its target, along each axis at one scale, as a PNG."""
     clouds = [
-        (thinned(target_Q_3, _POINTS_OF_QUERY), TARGET_COLOUR, "reference"),
-        (thinned(cloud_P_3, _POINTS_OF_QUERY), SOURCE_COLOUR, "aligned source"),
+        (thinned(target_Q_3, _POINTS_OF_QUERY), TARGET_COLOR, "reference"),
+        (thinned(cloud_P_3, _POINTS_OF_QUERY), SOURCE_COLOR, "aligned source"),
     ]
     everything = np.concatenate([cloud for cloud, *_ in clouds])
     center = (everything.min(axis=0) + everything.max(axis=0)) / 2
     reach = 0.52 * float(np.ptp(everything, axis=0).max())
     figure, [drawn] = panels(1, 3, TEXT_WIDTH_IN / 3 + 0.35)
     for panel, (across, up, name) in zip(drawn, ((0, 1, "along z"), (0, 2, "along y"), (1, 2, "along x")), strict=True):
-        for cloud, colour, label in clouds:
-            panel.scatter(cloud[:, across], cloud[:, up], s=1.2, color=colour, alpha=0.5, linewidths=0, label=label)
+        for cloud, color, label in clouds:
+            panel.scatter(cloud[:, across], cloud[:, up], s=1.2, color=color, alpha=0.5, linewidths=0, label=label)
         sides = np.array([-reach, reach])
         panel.set(xlim=center[across] + sides, ylim=center[up] + sides, aspect="equal")
         panel.set_axis_off()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VIEW = (math.radians(-55), math.radians(32))  # Azimuth and elevation of the eye, z up: it sees front, right and top.
-BASE_COLOUR = np.array([0.62, 0.70, 0.80])
+BASE_COLOR = np.array([0.62, 0.70, 0.80])
 LIGHT = np.array([-0.42, 0.55, 0.72])  # The light shines over the left shoulder (right, up, towards the eye).
 SUPERSAMPLING = 2  # The picture is drawn this much finer and averaged, which smooths outlines.
 FILL = 0.9  # The larger side of an object's outline takes this share of its tile.
@@ -61,18 +61,18 @@ def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, flo
 
 
 def _disc_radius(positions: np.ndarray) -> float:
-    """Return the radius of a disc that covers DISC_COVER points, from the distance to the 8th neighbour."""
+    """Return the radius of a disc that covers DISC_COVER points, from the distance to the 8th neighbor."""
     from scipy.spatial import cKDTree
 
-    neighbours = min(8, len(positions) - 1)
-    if neighbours < 1:
+    neighbors = min(8, len(positions) - 1)
+    if neighbors < 1:
         return 1.0
-    distance, _ = cKDTree(positions).query(positions, k=[neighbours + 1])
-    return max(1.0, float(np.median(distance)) * math.sqrt(DISC_COVER / neighbours))
+    distance, _ = cKDTree(positions).query(positions, k=[neighbors + 1])
+    return max(1.0, float(np.median(distance)) * math.sqrt(DISC_COVER / neighbors))
 
 
 def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) -> np.ndarray:
-    """Return the colours (size, size, 3) of a depth buffer with normals; `relief` is the scale of the depth cue."""
+    """Return the colors (size, size, 3) of a depth buffer with normals; `relief` is the scale of the depth cue."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     covered = np.isfinite(depth)
@@ -87,7 +87,7 @@ def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) 
     share = np.maximum(gaussian_filter(solid.astype(float), relief), 1e-6)
     dip = (heights - gaussian_filter(heights, relief) / share) / relief
     brightness = (0.22 + 0.92 * soft) * (1 + 0.28 * np.clip(dip, -1.0, 0.25))
-    return np.where(solid[..., None], np.clip(BASE_COLOUR * 1.15 * brightness[..., None], 0, 1), 1.0)
+    return np.where(solid[..., None], np.clip(BASE_COLOR * 1.15 * brightness[..., None], 0, 1), 1.0)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -100,7 +100,6 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, dataset: str = "") -
     Args:
         objects_npz: The clouds as `gpca objects` writes them.
         title: The line on top, which says so when the objects are stand-ins.
-        dataset: That of the objects, as the BOP benchmark calls it; their names follow from it.
 
     Raises:
         InputError: the npz is missing, unreadable or not of that format.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gpca.reporting.figures.style import GREY, SMALL_PT, use_style
+from gpca.reporting.figures.style import GRAY, SMALL_PT, use_style
 
 
 class Canvas:
@@ -33,13 +33,13 @@ class Canvas:
         return axes
 
     def text(self, x_in: float, y_in: float, words: str, **style) -> None:
-        """Write at this place, centred unless the style says otherwise."""
+        """Write at this place, centered unless the style says otherwise."""
         look: dict[str, Any] = {"ha": "center", "fontsize": SMALL_PT, "linespacing": 1.15} | style
         self.axes.text(x_in, y_in, words, **look)
 
-    def dot(self, x_in: float, y_in: float, colour: str, words: str, gap_in: float = 0.06) -> None:
-        """Draw a dot of a cloud's colour at this place, with the cloud's name to its right."""
-        self.axes.plot(x_in, y_in + 0.005, "o", color=colour, markersize=3)
+    def dot(self, x_in: float, y_in: float, color: str, words: str, gap_in: float = 0.06) -> None:
+        """Draw a dot of a cloud's color at this place, with the cloud's name to its right."""
+        self.axes.plot(x_in, y_in + 0.005, "o", color=color, markersize=3)
         self.text(x_in + gap_in, y_in, words, ha="left", va="center")
 
     def box(
@@ -49,38 +49,38 @@ class Canvas:
         width_in: float,
         height_in: float,
         words: str = "",
-        colour: str = GREY,
+        color: str = GRAY,
         dashed: bool = False,
     ) -> None:
-        """Draw a rounded box, tinted by its colour, with words in the middle; a dashed one is white."""
+        """Draw a rounded box, tinted by its color, with words in the middle; a dashed one is white."""
         from matplotlib.patches import FancyBboxPatch
 
-        look: dict[str, Any] = {"facecolor": "white", "linestyle": "--"} if dashed else {"facecolor": colour + "22"}
+        look: dict[str, Any] = {"facecolor": "white", "linestyle": "--"} if dashed else {"facecolor": color + "22"}
         style = f"round,pad=0,rounding_size={min(0.06, height_in / 3)}"
         corner = (left_in, bottom_in)
         self.axes.add_patch(
-            FancyBboxPatch(corner, width_in, height_in, boxstyle=style, edgecolor=colour, linewidth=0.9, **look)
+            FancyBboxPatch(corner, width_in, height_in, boxstyle=style, edgecolor=color, linewidth=0.9, **look)
         )
         self.text(left_in + width_in / 2, bottom_in + height_in / 2, words, va="center")
 
-    def arrow(self, *points_in: tuple[float, float], colour: str = GREY, words: str = "", over: bool = True) -> None:
+    def arrow(self, *points_in: tuple[float, float], color: str = GRAY, words: str = "", over: bool = True) -> None:
         """Draw a line through the points with a head at the last; words stand over (or under) the middle of its start.
 
         Args:
             points_in: Two or more points (x, y).
-            colour: The colour of line and head.
+            color: The color of line and head.
             words: The words at the first stretch.
             over: Whether the words stand above that stretch, else below.
         """
         if len(points_in) > 2:
             self.axes.plot(
                 *zip(*points_in[:-1], strict=True),
-                color=colour,
+                color=color,
                 linewidth=0.9,
                 solid_capstyle="butt",
                 solid_joinstyle="miter",
             )
-        look = {"arrowstyle": "-|>", "color": colour, "lw": 0.9, "mutation_scale": 7, "shrinkA": 0, "shrinkB": 0}
+        look = {"arrowstyle": "-|>", "color": color, "lw": 0.9, "mutation_scale": 7, "shrinkA": 0, "shrinkB": 0}
         self.axes.annotate("", points_in[-1], points_in[-2], arrowprops=look)
         if words:
             (x, y), (x_end, _) = points_in[:2]

@@ -11,7 +11,7 @@ MATPLOTLIBRC = str(Path(__file__).with_name("matplotlibrc"))
 COLUMN_WIDTH_IN = 3.5  # One column of an IEEE paper is this wide.
 TEXT_WIDTH_IN = 7.16  # Both columns are this wide.
 
-# Okabe and Ito chose these colours ("Color Universal Design", 2008), which no common colour blindness confuses.
+# Okabe and Ito chose these colors ("Color Universal Design", 2008), which no common color blindness confuses.
 BLACK = "#000000"
 ORANGE = "#E69F00"
 SKY_BLUE = "#56B4E9"
@@ -21,17 +21,17 @@ BLUE = "#0072B2"
 VERMILION = "#D55E00"
 PURPLE = "#CC79A7"
 PALETTE = (BLUE, VERMILION, GREEN, ORANGE, SKY_BLUE, PURPLE, YELLOW, BLACK)
-GREY = "#666666"  # Lines, boxes and what has no name of its own are grey.
-LIGHT_GREY = "#CCCCCC"  # What lies behind is light grey.
+GRAY = "#666666"  # Lines, boxes and what has no name of its own are gray.
+LIGHT_GRAY = "#CCCCCC"  # What lies behind is light gray.
 
-# One thing has one colour in every figure. Concepts have a marker too, which survives a print in grey.
-TARGET_COLOUR = VERMILION
-SOURCE_COLOUR = BLUE
-CONCEPT_COLOURS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
+# One thing has one color in every figure. Concepts have a marker too, which survives a print in gray.
+TARGET_COLOR = VERMILION
+SOURCE_COLOR = BLUE
+CONCEPT_COLORS = {"noise": ORANGE, "pose": PURPLE, "overlap": GREEN}
 CONCEPT_MARKERS = {"noise": "o", "pose": "s", "overlap": "^"}
 SMALL_PT = 7  # No letters are smaller.
 
-# Where many methods share a panel, the paper's have a colour, a line and a width, and all others are grey.
+# Where many methods share a panel, the paper's have a color, a line and a width, and all others are gray.
 METHOD_LOOKS: dict[str, tuple[str, Any, float]] = {
     "gpca_paper": (BLUE, (0, (4, 2)), 1.8),
     "gpca": (BLUE, "-", 1.8),
@@ -39,7 +39,7 @@ METHOD_LOOKS: dict[str, tuple[str, Any, float]] = {
     "learner_linear_svm": (ORANGE, "-", 1.4),
     "gpca_pair": (GREEN, "-", 1.8),
 }
-OTHER_LOOK = (LIGHT_GREY, "-", 0.9)
+OTHER_LOOK = (LIGHT_GRAY, "-", 0.9)
 
 
 def use_style() -> Any:
@@ -66,7 +66,7 @@ def write_title(figure, words: str) -> None:
 
 
 def blues():
-    """Return the colour map of shares and densities: white to the palette's blue, dark in grey too."""
+    """Return the color map of shares and densities: white to the palette's blue, dark in gray too."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("blues", ["white", BLUE])

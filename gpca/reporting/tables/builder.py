@@ -19,7 +19,7 @@ Label = tuple[str, str]  # key for the CSV, title for the reader
 
 
 class TableBuilder:
-    """Collects labelled rows of cells and makes a :class:`Table` of them.
+    """Collects labeled rows of cells and makes a :class:`Table` of them.
 
     Attributes:
         name: The name of the table, which the error for an empty one mentions.

@@ -47,7 +47,7 @@ def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bo
 def cell_of_all_samples(values_R: Sequence[float], samples_R: Sequence[float]) -> Cell | None:
     """Return the mean over the samples of R seeds, which have unequally many, or None without any seed.
 
-    The interval is that of a ratio of two means over the seeds (by its linearisation), which for equally many samples
+    The interval is that of a ratio of two means over the seeds (by its linearization), which for equally many samples
     is the t-interval of the seeds' means.
 
     Args:

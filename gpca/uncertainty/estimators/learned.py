@@ -84,11 +84,11 @@ class _Ensemble:
         import torch
 
         ones = torch.ones(*features_E_K.shape[:-1], 1, dtype=torch.float64)
-        given = torch.cat([features_E_K, ones], dim=-1).expand(len(self._first), -1, -1)
-        hidden = torch.tanh(given @ self._first)
-        said = torch.cat([hidden, torch.ones_like(hidden[:, :, :1])], dim=2) @ self._second
+        inputs = torch.cat([features_E_K, ones], dim=-1).expand(len(self._first), -1, -1)
+        hidden = torch.tanh(inputs @ self._first)
+        outputs = torch.cat([hidden, torch.ones_like(hidden[:, :, :1])], dim=2) @ self._second
         # In units near those of the errors, so that weights near one suit both.
-        return 0.1 * said[:, :, :6], (2 * said[:, :, 6:] - 6).clamp(SMALLEST_LOG, LARGEST_LOG)
+        return 0.1 * outputs[:, :, :6], (2 * outputs[:, :, 6:] - 6).clamp(SMALLEST_LOG, LARGEST_LOG)
 
     def fit(
         self,
@@ -108,8 +108,8 @@ class _Ensemble:
         optimizer = Adam(parameters, learning_rate)
         for _ in range(steps):
             optimizer.zero_grad()
-            said, log_variance = self._predict(features)
-            misfit = ((mean - said).square() + variance) * torch.exp(-log_variance)
+            outputs, log_variance = self._predict(features)
+            misfit = ((mean - outputs).square() + variance) * torch.exp(-log_variance)
             decay = weight_decay * sum(parameter.square().sum() for parameter in parameters)
             loss = 0.5 * (log_variance + misfit).sum(dim=2).mean(dim=1).sum() + decay
             loss.backward()

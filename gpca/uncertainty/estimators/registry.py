@@ -37,7 +37,7 @@ def make_estimator(
     settings = dict(settings or {})
     require_estimator_settings(name, settings)
     entry = estimator_entry(name)
-    unlearned = ""
+    learning_failure = ""
     estimate: Callable[[RegisteredPair], np.ndarray] | None = None
     if entry.learn is not None:
         if not examples:
@@ -47,14 +47,14 @@ def make_estimator(
         try:
             estimate = entry.learn(examples, **settings)
         except FailedEstimate as failure:
-            unlearned = str(failure)
+            learning_failure = str(failure)
     elif entry.estimate is not None:
         function = entry.estimate
         estimate = lambda registered: function(registered, **settings)  # noqa: E731
 
-    def told(registered: RegisteredPair) -> Estimate:
+    def estimate_or_failure(registered: RegisteredPair) -> Estimate:
         if estimate is None:
-            return Estimate(None, unlearned)
+            return Estimate(None, learning_failure)
         if registered.outcome.fitness == 0:
             return Estimate(None, registered.outcome.failure or "no source point is near the target")
         try:
@@ -65,4 +65,4 @@ def make_estimator(
             return Estimate(None, str(failure))
         return Estimate((covariance_6_6 + covariance_6_6.T) / 2)
 
-    return told
+    return estimate_or_failure

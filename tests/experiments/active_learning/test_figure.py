@@ -53,7 +53,7 @@ def test_the_target_is_named_and_the_seeds_are_counted(files):
 
 
 def test_no_two_strategies_look_alike():
-    looks = [(colour, line) for colour, line, _ in STYLES.values()]
+    looks = [(color, line) for color, line, _ in STYLES.values()]
     assert len(set(looks)) == len(looks)
 
 

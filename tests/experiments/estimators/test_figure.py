@@ -10,7 +10,7 @@ from gpca.experiments.estimators.covariances import ReferenceSamples, covariance
 from gpca.experiments.estimators.ellipses import STYLES, WIDEST, draw_ellipses, ellipse
 from gpca.experiments.estimators.figure import LEVELS, coverages, draw_estimators
 from gpca.io.csv_file import write_csv
-from gpca.reporting.figures.style import GREY
+from gpca.reporting.figures.style import GRAY
 
 ESTIMATORS, METHODS = {"censi": "Censi", "own": "Own"}, {"point_to_point": "ICP"}
 
@@ -62,14 +62,14 @@ def test_the_reference_is_seen_above_and_the_axes_are_named(files):
     assert [panel.get_ylabel() for panel in upper] == [
         f"second axis ({unit})" for unit in ("degrees", "% of the diameter") * 2
     ]
-    assert all(GREY in [line.get_color() for line in panel.get_lines()] for panel in upper)
+    assert all(GRAY in [line.get_color() for line in panel.get_lines()] for panel in upper)
     sides = {panel.get_title(): [text.get_text() for text in panel.texts] for panel in figure.axes[4:]}
     assert sides["Reference"] == ["too confident", "too cautious"]  # above the diagonal, and below
     assert sides["Coverage"] == ["too cautious"]  # above it
 
 
 def test_estimators_of_one_color_differ_in_their_line():
-    looks = [(colour, str(line)) for colour, line in STYLES.values()]
+    looks = [(color, str(line)) for color, line in STYLES.values()]
     assert len(set(looks)) == len(looks)
     assert STYLES["bayesian_icp"][0] != STYLES["stein_icp"][0]
 

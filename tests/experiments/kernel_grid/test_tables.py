@@ -3,7 +3,7 @@ import pytest
 
 from gpca.comparison.published import read_published
 from gpca.errors import InputError
-from gpca.experiments.kernel_grid.figure import COLOURS, PRINTED_MARKERS, draw_kernel_curves, printed_accuracies
+from gpca.experiments.kernel_grid.figure import COLORS, PRINTED_MARKERS, draw_kernel_curves, printed_accuracies
 from gpca.experiments.kernel_grid.grid import GRID_COLUMNS
 from gpca.experiments.kernel_grid.tables import PRINTED, table4_grid, table4_kernels
 
@@ -84,8 +84,8 @@ def test_a_kernel_whose_curve_coincides_with_anothers_shows_below_it():
     figure = draw_kernel_curves(grid(), {"linemod": "LINEMOD"}, [])
     lines = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 1]
     widths = {line.get_color(): line.get_linewidth() for line in lines}
-    assert widths[COLOURS["matern32"]] > widths[COLOURS["rbf"]]
-    assert lines[0].get_color() == COLOURS["matern32"]
+    assert widths[COLORS["matern32"]] > widths[COLORS["rbf"]]
+    assert lines[0].get_color() == COLORS["matern32"]
 
 
 def test_without_a_grid_of_these_sources_nothing_is_drawn():

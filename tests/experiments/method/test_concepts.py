@@ -146,8 +146,8 @@ def test_draws_red_and_blue_in_three_panels_and_the_same_bytes_again(files, same
     image = same_bytes(lambda: draw_concepts_figure(*paths, "Boxes"))[..., :3] / 255
     head = image.shape[0] // 6
     red, blue = image[head:, :, 0] - image[head:, :, 2], image[head:, :, 2] - image[head:, :, 0]
-    for colour in (red, blue):
-        panels = np.array_split(colour > 0.3, 3, axis=1)
+    for color in (red, blue):
+        panels = np.array_split(color > 0.3, 3, axis=1)
         assert all(panel.sum() > 100 for panel in panels)
 
 

@@ -67,10 +67,10 @@ def test_rho_is_the_tables_alone_and_with_each_shift(learned):
 
 
 @pytest.mark.parametrize("draw", [draw_coverage_risk, draw_uncertainty_vs_distance])
-def test_the_papers_learners_have_a_colour_and_the_others_are_grey(learned, draw):
+def test_the_papers_learners_have_a_color_and_the_others_are_gray(learned, draw):
     figure = draw(learned, SOURCES, LEARNERS)
-    colours = [line.get_color() for line in figure.axes[0].get_lines()]
-    assert colours == [style.LIGHT_GREY, style.LIGHT_GREY, style.BLUE]  # in the order of drawing
+    colors = [line.get_color() for line in figure.axes[0].get_lines()]
+    assert colors == [style.LIGHT_GRAY, style.LIGHT_GRAY, style.BLUE]  # in the order of drawing
     assert [text.get_text()[-8:] for text in figure.legends[0].get_texts()] == [
         "GPC" if draw is draw_coverage_risk else "a: GPC",
         "2 others",

@@ -1,5 +1,4 @@
 import numpy as np
-import pandas as pd
 import pytest
 
 from gpca.active_learning.rounds import make_task
@@ -42,14 +41,7 @@ def test_the_file_is_read_as_it_was_written(runtime, tmp_path):
     np.testing.assert_allclose(rows["mean_s"], runtime["mean_s"], atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "message"),
-    [("component", "cooling", "unknown component 'cooling'"), ("mean_s", "long", "column 'mean_s' contains values")],
-)
-def test_a_spoilt_file_is_one_line(runtime, tmp_path, column, value, message):
-    write_csv(tmp_path / "runtime.csv", runtime.astype(object).assign(**{column: value}))
-    with pytest.raises(InputError, match=message):
-        read_runtime(tmp_path / "runtime.csv")
-    pd.DataFrame(columns=RUNTIME_COLUMNS[1:]).to_csv(tmp_path / "runtime.csv", index=False)
-    with pytest.raises(InputError, match="column 'component' is missing"):
+def test_a_spoiled_file_is_one_line(runtime, tmp_path):
+    write_csv(tmp_path / "runtime.csv", runtime.astype(object).assign(mean_s="long"))
+    with pytest.raises(InputError, match="column 'mean_s' contains values"):
         read_runtime(tmp_path / "runtime.csv")

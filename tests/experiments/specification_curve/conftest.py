@@ -8,7 +8,7 @@ import pytest
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.experiments.out_of_distribution.sets import DISTANCES, ShiftedSets
-from gpca.experiments.specification_curve.given import Given
+from gpca.experiments.specification_curve.run_files import RunFiles
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -32,7 +32,7 @@ def embedded(registrations):
 
 
 @pytest.fixture(scope="session")
-def given(embedded, tmp_path_factory):
+def run_files(embedded, tmp_path_factory):
     """Everything that a group of readings may read."""
     folder = tmp_path_factory.mktemp("run")
     names = ("registrations", "shifted", "predictions/tiny", "embeddings/tiny/dgcnn")
@@ -58,7 +58,7 @@ def given(embedded, tmp_path_factory):
     write_predictions(paths["predictions"], embedded, Attribution.of_scores(CONCEPTS, scores_S_3, seconds=0.0))
     arrays = {"h": embedded.embedding, "sample": embedded.sample, "split": embedded.split}
     save_arrays(paths["embeddings"], arrays, embedded.axes)
-    return Given(
+    return RunFiles(
         registrations={("tiny", 0): paths["registrations"]},
         sets={("tiny", 0): paths["sets"]},
         predictions={("tiny", "gpca_paper", 0): paths["predictions"]},
@@ -67,9 +67,9 @@ def given(embedded, tmp_path_factory):
     )
 
 
-def rows_of(run, given, choices, sizes=None):
+def rows_of(run, run_files, choices, sizes=None):
     """What a group yields: reading, method, metric and concept -> value."""
     from gpca.experiments.specification_curve.settings import ReadingSizes, readings_of
 
-    rows = run(given, readings_of(choices), sizes or ReadingSizes(samples=6))
+    rows = run(run_files, readings_of(choices), sizes or ReadingSizes(samples=6))
     return {(tuple(reading.values()), method, metric, concept): v for reading, _, method, metric, concept, _, v in rows}

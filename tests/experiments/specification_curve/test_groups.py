@@ -47,17 +47,17 @@ def test_the_protocols_start_is_the_classifiers_own_and_others_are_not(halves):
         assert np.abs(gpc_start.scores(*arguments, PROTOCOL | choice, "tiny", 0) - expected).max() > 1e-3
 
 
-def test_starts_touch_the_small_rate_and_table_v(given):
+def test_starts_touch_the_small_rate_and_table_v(run_files):
     sections = SECTIONS | {"gpca_paper": SECTIONS["gpca_paper"] | {"inducing": 4}}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gpc_start, "FITTED", (("polynomial", 0.001, 2), ("rbf", 0.01, 2)))
-        found = rows_of(gpc_start.run, replace(given, sections=sections), {k: [v] for k, v in PROTOCOL.items()})
+        found = rows_of(gpc_start.run, replace(run_files, sections=sections), {k: [v] for k, v in PROTOCOL.items()})
     methods = {(method, metric) for _, method, metric, concept in found if concept == "all"}
     assert {("polynomial-0.001-2", "accuracy"), ("gpca_paper", "ece")} <= methods
 
 
-def test_kernel_and_schedule_of_table_v(given):
-    found = rows_of(learners.kernel, given, {"kernel": ["rbf", "matern32"], "iterations": [1, 20]})
+def test_kernel_and_schedule_of_table_v(run_files):
+    found = rows_of(learners.kernel, run_files, {"kernel": ["rbf", "matern32"], "iterations": [1, 20]})
     accuracy = {reading: v for (reading, _, metric, concept), v in found.items() if (metric, concept) == ("ece", "all")}
     assert set(accuracy) == {("rbf", 1), ("rbf", 20), ("matern32", 1), ("matern32", 20)}
     assert accuracy["rbf", 1] != accuracy["rbf", 20] != accuracy["matern32", 20]
@@ -74,24 +74,24 @@ def test_the_protocols_svm_is_the_learners_own_and_probabilities_add_up(halves):
     assert accuracies(test.concept, softmax)["accuracy", "all"] > 0.8
 
 
-def test_another_head_trains_another_encoder_and_only_where_it_is_wanted(given):
+def test_another_head_trains_another_encoder_and_only_where_it_is_wanted(run_files):
     choices = {"head": ["linear", "two_layer"], "inputs": ["standardised"]}
-    found = rows_of(learners.encoder_head, given, choices)
+    found = rows_of(learners.encoder_head, run_files, choices)
     methods = {(reading[0], method) for reading, method, _, _ in found}
     assert methods == {(h, m) for h in choices["head"] for m in ("gpca_paper", "learner_forest", "learner_linear_svm")}
-    none = rows_of(learners.encoder_head, given, choices, ReadingSizes(encoders=0))
+    none = rows_of(learners.encoder_head, run_files, choices, ReadingSizes(encoders=0))
     assert {reading[0] for reading, *_ in none} == {"linear"}
 
 
-def test_diagnostics_follow_set_score_and_area(given, halves, tmp_path):
+def test_diagnostics_follow_set_score_and_area(run_files, halves, tmp_path):
     from gpca.experiments.out_of_distribution.learners import predict_sets
     from gpca.experiments.out_of_distribution.sets import ShiftedSets
     from gpca.io.csv_file import write_csv
 
     path = tmp_path / "tiny/learner_linear_svm/seed0.csv"
     path.parent.mkdir(parents=True)
-    write_csv(path, predict_sets(lambda: linear_svm("tiny", 0), ShiftedSets.load(given.sets["tiny", 0])))
-    [rows] = read_learner_predictions([path], given.sets.values()).values()
+    write_csv(path, predict_sets(lambda: linear_svm("tiny", 0), ShiftedSets.load(run_files.sets["tiny", 0])))
+    [rows] = read_learner_predictions([path], run_files.sets.values()).values()
     reading = {"set": "in_distribution", "distance": "knn_embedding", "score": "bald", "area": "aurc"}
     one = diagnostics.diagnostics(rows, reading)
     assert one == diagnostics.diagnostics(rows, reading | {"score": "entropy"})  # it has no BALD
@@ -103,7 +103,7 @@ def test_diagnostics_follow_set_score_and_area(given, halves, tmp_path):
     assert "aurc_max_score" not in diagnostics.diagnostics(right, reading | {"area": "auroc_error"})
 
 
-def test_severities_come_in_thirds_of_each_concept(given, halves):
+def test_severities_come_in_thirds_of_each_concept(run_files, halves):
     _, test = halves
     part_S = severities.parts(test)
     for concept in CONCEPTS:
@@ -112,13 +112,13 @@ def test_severities_come_in_thirds_of_each_concept(given, halves):
     crop_S = test.severity_crop
     overlap = test.concept == "overlap"
     assert crop_S[overlap & (part_S == "weakest")].max() < crop_S[overlap & (part_S == "strongest")].min()
-    found = rows_of(severities.run, given, {"part": ["all", "weakest"], "classifier": ["paper", "converged"]})
+    found = rows_of(severities.run, run_files, {"part": ["all", "weakest"], "classifier": ["paper", "converged"]})
     assert found[("all", "paper"), "gpca_paper", "accuracy", "all"] == pytest.approx(15 / 18)
     assert {reading[1] for reading, *_ in found} == {"paper"}  # there are no predictions of the other
 
 
-def test_pool_holds_the_share_and_labels_are_counted_to_the_target(given):
-    found = rows_of(labels.pool, given, {"new_share": [0.1, 0.4], "batch": [1, 2], "initial": [8, 400]})
+def test_pool_holds_the_share_and_labels_are_counted_to_the_target(run_files):
+    found = rows_of(labels.pool, run_files, {"new_share": [0.1, 0.4], "batch": [1, 2], "initial": [8, 400]})
     kinds = {(reading, method, metric) for reading, method, metric, _ in found}
     assert ((0.1, 1, 8), "random", "labels_to_target") in kinds
     assert not [reading for reading, *_ in kinds if reading[2] == 400]  # there are not so many
@@ -127,12 +127,12 @@ def test_pool_holds_the_share_and_labels_are_counted_to_the_target(given):
     assert same[0] == same[1]
 
 
-def test_epochs_fall_with_the_rate(given, monkeypatch):
+def test_epochs_fall_with_the_rate(run_files, monkeypatch):
     monkeypatch.setattr(labels, "EVERY", 5)
     monkeypatch.setattr(labels, "MOST", 50)
     within_reach = SECTIONS["active_learning"] | {"target": 0.5}
-    given = replace(given, sections=SECTIONS | {"active_learning": within_reach})
-    found = rows_of(labels.epochs, given, {"learning_rate": [0.001, 0.3], "labels": ["at_target", "all"]})
+    run_files = replace(run_files, sections=SECTIONS | {"active_learning": within_reach})
+    found = rows_of(labels.epochs, run_files, {"learning_rate": [0.001, 0.3], "labels": ["at_target", "all"]})
     slow, fast = (found[(rate, "all"), "bald_kmeans", "epochs_to_target", "overlap"] for rate in (0.001, 0.3))
     assert fast < slow <= labels.MOST
 
@@ -145,10 +145,10 @@ def saved_as(registrations, axes, folder):
     return path
 
 
-def test_repeats_on_frames_vary_in_what_they_say(given, embedded, tmp_path):
+def test_repeats_on_frames_vary_in_what_they_say(run_files, embedded, tmp_path):
     five = {("tiny", seed): saved_as(embedded, ("tiny", seed), tmp_path) for seed in range(3)}
-    predictions = {("tiny", "dgcnn-none", seed): given.predictions["tiny", "gpca_paper", 0] for seed in range(3)}
-    shown = replace(given, registrations=five, predictions=predictions)
+    predictions = {("tiny", "dgcnn-none", seed): run_files.predictions["tiny", "gpca_paper", 0] for seed in range(3)}
+    shown = replace(run_files, registrations=five, predictions=predictions)
     rows = list(
         frames.run(
             shown,
@@ -162,14 +162,14 @@ def test_repeats_on_frames_vary_in_what_they_say(given, embedded, tmp_path):
     assert frames.of_objects(shown.embedded("tiny", "dgcnn-none", 0), "unseen").sum() == 0
 
 
-def test_features_are_chosen_by_name(given):
-    found = rows_of(features.run, given, {"features": ["all", "counts", "residual"]})
+def test_features_are_chosen_by_name(run_files):
+    found = rows_of(features.run, run_files, {"features": ["all", "counts", "residual"]})
     counts = {reading[0]: v for (reading, _, _, concept), v in found.items() if concept == "overlap"}
     assert counts["counts"] == 1  # a cropped cloud has fewer points
     assert counts["residual"] < 1
 
 
-def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(given, embedded, tmp_path, monkeypatch):
+def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(run_files, embedded, tmp_path, monkeypatch):
     poses = tmp_path / "poses.csv"
     rows = {"sample": embedded.sample, "split": embedded.split, "instance": embedded.sample // 3, "dataset": "tiny"}
     pd.DataFrame(rows | {"in_training": True}).to_csv(poses, index=False)
@@ -181,8 +181,8 @@ def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(given, e
 
     monkeypatch.setattr(frame_input, "train_encoder", train)
     shown = replace(
-        given,
-        registrations=given.registrations | {("other", 0): saved_as(embedded, ("other", 0), tmp_path)},
+        run_files,
+        registrations=run_files.registrations | {("other", 0): saved_as(embedded, ("other", 0), tmp_path)},
         poses={("tiny", 0): poses},
         sections=SECTIONS | {"pretraining": {"epochs": 1}, "training": {"validation_share": 0.2}},
     )
@@ -199,10 +199,10 @@ def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(given, e
         rows_of(frame_input.run, replace(shown, poses={}), choices)
 
 
-def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(given, tmp_path, capsys):
+def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(run_files, tmp_path, capsys):
     choices = {"new_share": [0.33], "batch": [1], "initial": [400]}
-    settings = {"choices": choices, "active_learning": given.sections["active_learning"]}
-    [path] = given.sets.values()
+    settings = {"choices": choices, "active_learning": run_files.sections["active_learning"]}
+    [path] = run_files.sets.values()
     command = ["readings", "--group", "pool", "--settings", json.dumps(settings), "--sets", str(path)]
     assert main([*command, "--out", str(tmp_path / "pool.csv")]) == 2
     said = capsys.readouterr().err.splitlines()[-1]

@@ -13,20 +13,20 @@ from tests.experiments.specification_curve.conftest import rows_of
 
 
 @pytest.fixture(scope="module")
-def outcomes(given):
-    registrations = Registrations.load(given.registrations["tiny", 0])
+def outcomes(run_files):
+    registrations = Registrations.load(run_files.registrations["tiny", 0])
     chosen = registrations.subset(design_rows(registrations, "additive", 6))
-    return chosen.concept, evaluate_design("additive", chosen, "tiny", 0, given.uncertainty())[0].uncertainty
+    return chosen.concept, evaluate_design("additive", chosen, "tiny", 0, run_files.uncertainty())[0].uncertainty
 
 
 def accuracy(concept_S, values_S_3):
     return np.mean((np.array(CONCEPTS)[values_S_3.argmax(axis=1)] == concept_S) & (np.ptp(values_S_3, axis=1) > 0))
 
 
-def test_the_protocols_readings_are_what_the_explainers_say(given, outcomes):
+def test_the_protocols_readings_are_what_the_explainers_say(run_files, outcomes):
     concept_S, uncertainty_S_K = outcomes
     sa = {"quantity": ["divergence"], "sign": ["signed", "lowest"], "unit": ["range"], "step": ["small"]}
-    found = rows_of(knobs.sensitivity, given, sa)
+    found = rows_of(knobs.sensitivity, run_files, sa)
     expected = {
         sign: accuracy(concept_S, factor * local_derivatives(uncertainty_S_K))
         for sign, factor in (("signed", 1), ("lowest", -1))
@@ -37,17 +37,17 @@ def test_the_protocols_readings_are_what_the_explainers_say(given, outcomes):
         "starts": [5, 13], "background": ["observed", "clean"], "quantity": ["divergence"], "floor": [1e-4],
         "sign": ["signed"],
     }  # fmt: skip
-    found = rows_of(knobs.shap, given, shap)
+    found = rows_of(knobs.shap, run_files, shap)
     of_protocol = found[(13, "observed", "divergence", 1e-4, "signed"), "shap_additive", "accuracy", "all"]
     assert of_protocol == accuracy(concept_S, shapley_values(uncertainty_S_K[:, :8]))
     assert len(found) == 4
 
 
-def test_every_quantity_is_measured_in_every_condition(given):
+def test_every_quantity_is_measured_in_every_condition(run_files):
     quantities = ["divergence", "divergence_reversed", "log_determinant", "trace", "residual", "inlier_rmse",
                   "inlier_rmse_of_one"]  # fmt: skip
-    settings = given.uncertainty()
-    [(_, _, pairs)] = knobs._pairs(given, knobs.ReadingSizes(samples=3), settings, 13, "test")
+    settings = run_files.uncertainty()
+    [(_, _, pairs)] = knobs._pairs(run_files, knobs.ReadingSizes(samples=3), settings, 13, "test")
     measured = knobs._steps(next(pairs)[1]["observed"], settings)
     assert set(measured) == set(quantities)
     for values_K in measured.values():

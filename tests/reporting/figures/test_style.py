@@ -23,7 +23,7 @@ def figure():
 
 def test_the_palette_is_the_one_of_the_matplotlibrc():
     style.use_style()
-    cycle = [f"#{colour.lstrip('#')}" for colour in matplotlib.rcParams["axes.prop_cycle"].by_key()["color"]]
+    cycle = [f"#{color.lstrip('#')}" for color in matplotlib.rcParams["axes.prop_cycle"].by_key()["color"]]
     assert tuple(cycle) == style.PALETTE
     assert matplotlib.rcParams["figure.figsize"][0] == style.COLUMN_WIDTH_IN
     assert matplotlib.rcParams["xtick.labelsize"] == style.SMALL_PT
@@ -60,7 +60,7 @@ def test_an_edit_of_the_matplotlibrc_redraws_every_figure():
     assert "gpca/reporting/figures/matplotlibrc" not in code_files("gpca.classifier.gpc")
 
 
-def test_colours_are_named_in_the_style_alone():
+def test_colors_are_named_in_the_style_alone():
     folder = Path(style.__file__).parent
     strangers = {
         path.name: found
@@ -70,11 +70,11 @@ def test_colours_are_named_in_the_style_alone():
     assert not strangers
 
 
-def test_what_is_drawn_over_each_other_differs_in_grey():
-    def grey(colour):
-        return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
+def test_what_is_drawn_over_each_other_differs_in_gray():
+    def gray(color):
+        return float(np.dot(to_rgb(color), (0.299, 0.587, 0.114)))
 
-    shares = [grey(style.blues()(share)) for share in (0.0, 0.5, 1.0)]
+    shares = [gray(style.blues()(share)) for share in (0.0, 0.5, 1.0)]
     assert shares[0] > shares[1] + 0.1 > shares[2] + 0.2
-    assert len(set(style.CONCEPT_COLOURS.values())) == len(set(style.CONCEPT_MARKERS.values())) == 3
-    assert abs(grey(style.TARGET_COLOUR) - grey(style.SOURCE_COLOUR)) > 0.05
+    assert len(set(style.CONCEPT_COLORS.values())) == len(set(style.CONCEPT_MARKERS.values())) == 3
+    assert abs(gray(style.TARGET_COLOR) - gray(style.SOURCE_COLOR)) > 0.05

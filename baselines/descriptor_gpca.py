@@ -1,24 +1,23 @@
 """GP-CA on the pair: the paper's classifier with other eyes, which see both clouds and what ICP did.
 
 ``gpca_pair`` is the multi-class classifier. ``gpca_multilabel`` has a Gaussian process for each cause, and one for
-whether anything is wrong, so that several causes may have high scores at once.
+whether anything is wrong, so that several causes may have high scores at once. ``pair_committee`` is the mean of the
+scores of a forest, of boosting and of GP-CA, each on every descriptor.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from baselines.attached import attached
-from baselines.causes.described import joined
+from baselines.descriptors import DescriptorClassifier, boosted_trees, joined, randomized_trees
 from gpca.causes.labels import LABELS
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.settings import GPCArguments
 from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.gpca import DescriptorGPCA
-from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
+from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, ScoringExplainer, attached
 from gpca.features.groups import GROUPS
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 
 
 class CausePairGPCA(DescriptorGPCA):
@@ -51,7 +50,7 @@ class MultiLabelGPCA(ScoringExplainer):
     def fit(self, registrations: Registrations) -> None:
         """Fit the four classifiers; those of the causes to the sets of causes, which are attached as ``causes``."""
         known_concepts(registrations.concept, LABELS)
-        causes_N_3 = attached(registrations, "causes", len(CONCEPTS)) > 0.5
+        causes_N_3 = attached(registrations, "causes") > 0.5
         self._classifier.fit(joined(registrations, GROUPS), registrations.concept != NOMINAL, causes_N_3)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
@@ -60,7 +59,30 @@ class MultiLabelGPCA(ScoringExplainer):
         return np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
 
 
-EXPLAINERS = {
+class Committee(ScoringExplainer):
+    """Three explainers of unlike kinds, whose errors are not the same."""
+
+    labels = LABELS
+
+    def __init__(self, source: str, seed: int) -> None:
+        self._members: list[ConceptExplainer] = [
+            DescriptorClassifier(randomized_trees(source, seed), GROUPS),
+            DescriptorClassifier(boosted_trees(source, seed), GROUPS),
+            CausePairGPCA(source, seed, learning_rate=0.1, iterations=200),
+        ]
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit every member."""
+        for member in self._members:
+            member.fit(registrations)
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the mean of the members' scores."""
+        return np.mean([member.explain(registrations).scores_N_C for member in self._members], axis=0)
+
+
+CAUSE_EXPLAINERS = {
     "gpca_pair": ExplainerEntry("GP-CA on the pair", CausePairGPCA, reads="descriptors"),
     "gpca_multilabel": ExplainerEntry("GP-CA on the pair, multi-label", MultiLabelGPCA, reads="descriptors"),
+    "pair_committee": ExplainerEntry("Committee on the pair", Committee, reads="descriptors"),
 }

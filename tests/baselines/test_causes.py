@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.causes.nominal import NominalThreshold
+from baselines.gates import NominalThreshold
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.labels import LABELS, labeled
 from gpca.causes.truth import BORDERLINE, NOMINAL
@@ -61,7 +61,7 @@ def test_who_learns_finds_the_labels_of_the_samples_that_it_learned(name, seen):
 
 
 def test_a_committee_says_the_mean_of_what_its_members_say(seen):
-    from baselines.causes.committee import Committee
+    from baselines.descriptor_gpca import Committee
 
     committee = Committee("four", 100)
     committee.fit(seen)
@@ -104,7 +104,7 @@ def test_a_gate_alarms_where_its_number_is_bad(seen):
 
 
 def test_every_kind_of_explainer_has_its_own_names():
-    assert explainer_module("gpca", CAUSES) == "baselines.causes.embeddings"
+    assert explainer_module("gpca", CAUSES) == "baselines.aligned_source"
     assert explainer_module("gpca") == "gpca.explainers.gpca"
     with pytest.raises(InputError, match="explainer 'shap_oracle': unknown; choose one of"):
         explainer_entry("shap_oracle", CAUSES)

@@ -10,7 +10,7 @@ from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
 from gpca.experiments.recovery.example_figure import draw_recovery_example
-from gpca.experiments.recovery.policy_figure import draw_mitigation, read_policy
+from gpca.experiments.recovery.policy_figure import draw_mitigation
 from gpca.experiments.recovery.queue_figure import draw_queued_labels
 from gpca.experiments.recovery.rates_figure import draw_recovery_rates
 from gpca.experiments.recovery.tables import table8_recovery
@@ -120,15 +120,6 @@ def test_what_queued_cases_teach_is_drawn(queues, same_bytes):
     image = same_bytes(lambda: draw_queued_labels(queues, TITLE, POLICIES))
     flat = same_bytes(lambda: draw_queued_labels(queues.assign(error=0.5), TITLE, POLICIES))
     assert (image != flat).any()
-
-
-@pytest.mark.parametrize("text", ["{", "[]", '{"thresholds": {}}'])
-def test_a_faulty_policy_file_is_refused(text, tmp_path):
-    (tmp_path / "policy.json").write_text(text)
-    with pytest.raises(InputError, match="not a policy with its thresholds"):
-        read_policy(tmp_path / "policy.json")
-    with pytest.raises(InputError, match="no such file"):
-        read_policy(tmp_path / "none.json")
 
 
 def test_the_example_is_drawn_and_one_without_its_second_view_refused(tmp_path, same_bytes):

@@ -30,7 +30,7 @@ class CauseHead(SoftmaxHead):
     labels = LABELS
 
 
-EXPLAINERS = {
+CAUSE_EXPLAINERS = {
     "gpca": ExplainerEntry("GP-CA (aligned source)", CauseGPCA, reads="embeddings"),
     "softmax_head": ExplainerEntry("Softmax head (aligned source)", CauseHead, reads="embeddings"),
     "concept_vectors": ExplainerEntry("Concept activation vectors", CauseVectors, reads="embeddings"),

@@ -29,7 +29,7 @@ Row = tuple[Reading, str, str, str, str, int, float]
 
 
 @dataclass(frozen=True)
-class Given:
+class RunFiles:
     """Paths by what names them.
 
     Attributes:

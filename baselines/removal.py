@@ -11,14 +11,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from baselines.attached import attached
-from baselines.causes.nominal import NominalThreshold
+from baselines.gates import NominalThreshold
 from baselines.sensitivity import single_drops
 from baselines.shap_kl import shapley_values
 from gpca.causes.labels import LABELS
 from gpca.causes.shapley import ALL, SUBSETS
 from gpca.causes.truth import NOMINAL
-from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 
 SMALLEST = 1e-4  # diameters: what a remedy moves less is rounding and chance
@@ -51,7 +50,7 @@ class RemovalValues(ScoringExplainer):
 
 
 def _errors(registrations: Registrations) -> np.ndarray:
-    return attached(registrations, "remedied", None)[:, : len(SUBSETS)]
+    return attached(registrations, "remedied")[:, : len(SUBSETS)]
 
 
 def _alarm(errors_N_8: np.ndarray) -> np.ndarray:
@@ -68,7 +67,7 @@ def sa_removal(source: str, seed: int) -> RemovalValues:
     return RemovalValues(lambda errors_N_8: single_drops(-errors_N_8[:, ::-1]))
 
 
-EXPLAINERS = {
+CAUSE_EXPLAINERS = {
     "shap_removal": ExplainerEntry("SHAP, remedies", shap_removal, reads="descriptors"),
     "sa_removal": ExplainerEntry("SA, remedies", sa_removal, reads="descriptors"),
 }

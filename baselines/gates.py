@@ -1,0 +1,110 @@
+"""Gates: one number that the registration itself gives, read as "is it fine?". They name no cause.
+
+Below the best threshold of an alarm nothing is wrong: so a method that has no class "nominal" gets one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from gpca.attribution.scores import Attribution
+from gpca.causes.labels import LABELS
+from gpca.causes.truth import NOMINAL
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
+from gpca.features.groups import MOTION
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+
+
+class NominalThreshold:
+    """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`."""
+
+    def fit(self, alarm_N: np.ndarray, label_N: np.ndarray) -> NominalThreshold:
+        """Find the threshold of the best balanced accuracy on labeled samples, and the scale of the alarm.
+
+        Where one of the two is missing among the labels, the threshold is the median.
+        """
+        nominal_N = label_N == NOMINAL
+        order = np.argsort(alarm_N, kind="stable")
+        if nominal_N.all() or not nominal_N.any():
+            self._threshold = float(np.median(alarm_N))
+        else:
+            kept_N = np.cumsum(nominal_N[order]) / nominal_N.sum()
+            lost_N = np.cumsum(~nominal_N[order]) / (~nominal_N).sum()
+            best = int(np.argmax(kept_N - lost_N))
+            following = min(best + 1, len(order) - 1)
+            self._threshold = float(alarm_N[order[[best, following]]].mean())
+        self._scale = max(float(np.quantile(alarm_N, 0.75) - np.quantile(alarm_N, 0.25)), 1e-9)
+        return self
+
+    def scores(self, alarm_N: np.ndarray, shares_N_3: np.ndarray) -> np.ndarray:
+        """Return scores (N, 4) that add up to one: of nominal, and of the causes in these shares of the rest.
+
+        At the threshold nominal has as much as the largest cause, so the label named is the threshold's.
+        """
+        from scipy.special import expit
+
+        wrong_N = expit((alarm_N - self._threshold) / self._scale)
+        largest_N = shares_N_3.max(axis=1)
+        nominal_N = (1 - wrong_N) * largest_N
+        causes_N_3 = wrong_N[:, None] * shares_N_3
+        scores_N_4 = np.column_stack([nominal_N, causes_N_3])
+        return scores_N_4 / scores_N_4.sum(axis=1, keepdims=True)
+
+
+assert LABELS[0] == NOMINAL  # scores have its column first
+
+
+class Gate(ScoringExplainer):
+    """An alarm by one of the numbers of the motion, times a sign.
+
+    Args:
+        name: in :data:`gpca.features.groups.MOTION`.
+        sign: −1 where small values are bad.
+    """
+
+    labels = LABELS
+
+    def __init__(self, name: str, sign: int = 1) -> None:
+        self._column = MOTION.index(name)
+        self._sign = sign
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn the threshold."""
+        self._threshold = NominalThreshold().fit(self._alarm(registrations), registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration, and name no cause of any."""
+        return replace(super().explain(registrations), abstained_N=np.ones(len(registrations), bool))
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Score nominal by the alarm, and all causes alike."""
+        even_N_3 = np.full((len(registrations), len(CONCEPTS)), 1 / len(CONCEPTS))
+        return self._threshold.scores(self._alarm(registrations), even_N_3)
+
+    def _alarm(self, registrations: Registrations) -> np.ndarray:
+        return self._sign * attached(registrations, "motion")[:, self._column]
+
+
+def gate_rmse(source: str, seed: int) -> Gate:
+    """Make the gate on ICP's inlier RMSE."""
+    return Gate("inlier_rmse")
+
+
+def gate_fitness(source: str, seed: int) -> Gate:
+    """Make the gate on ICP's fitness, the share of points with a partner."""
+    return Gate("fitness", sign=-1)
+
+
+def gate_spread(source: str, seed: int) -> Gate:
+    """Make the gate on the log-determinant of the covariance over other starts, which needs no clean run."""
+    return Gate("log_determinant")
+
+
+CAUSE_EXPLAINERS = {
+    "gate_rmse": ExplainerEntry("Inlier RMSE (gate)", gate_rmse, reads="descriptors"),
+    "gate_fitness": ExplainerEntry("Fitness (gate)", gate_fitness, reads="descriptors"),
+    "gate_spread": ExplainerEntry("Spread of the runs (gate)", gate_spread, reads="descriptors"),
+}
