@@ -26,8 +26,10 @@ def run(job: Job) -> None:
     given, of_icp = job.settings_and_icp()
     settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
     poses, weights = job.get("poses"), job.get("start")
-    files = zip(job.files("registrations"), job.get("registrations_of", [job.source]), strict=True)
-    registrations = joined([Registrations.load(path, (source, job.seed)) for path, source in files])
+    files = job.files("registrations")
+    sources = job.get("registrations_of", [job.source])
+    parts = [Registrations.load(path, (source, job.seed)) for path, source in zip(files, sources, strict=True)]
+    registrations = joined(parts)
     # Clouds of frames are as small as objects look, so some of their points are drawn twice; others are as configured.
     if poses is None and settings.draw_points > (most := int(np.diff(registrations.offsets).max())):
         fault = f"the largest cloud has {most} points, fewer than draw_points, {settings.draw_points}"
@@ -38,7 +40,7 @@ def run(job: Job) -> None:
     start = load_model(weights, settings).state_dict() if weights else None
     # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
     checkpoint = job.weights.with_suffix(".checkpoint")
-    inputs = [*job.files("registrations"), *(path for path in (poses, weights) if path)]
+    inputs = [*files, *(path for path in (poses, weights) if path)]
     with record_provenance([job.weights, job.curve], inputs, job.settings, seed=job.seed):
         seen = read_as(settings.reading, registrations, icp)
         model, curve = train_encoder(seen, job.source, job.seed, settings, checkpoint, start=start, group_S=instance_S)

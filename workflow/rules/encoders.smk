@@ -153,8 +153,8 @@ rule embed:
 use rule embed as embed_condition with:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
-        timings="<results>/timings/{source}/icp/seed{seed}.csv",
-        weights=f"<results>/encoders/{FRAMES}/{{backbone}}/seed{{seed}}.pt",
+        registration_timings="<results>/timings/{source}/icp/seed{seed}.csv",
+        encoder=f"<results>/encoders/{FRAMES}/{{backbone}}/seed{{seed}}.pt",
         code=encoder_code("embed"),
     wildcard_constraints:
         source="|".join(NAMES["condition"]) or "none",

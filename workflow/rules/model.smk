@@ -27,7 +27,7 @@ use rule sample_causes as sample_model_causes with:
     output:
         causes="<results>/model_causes/{source}/seed{seed}.npz",
         candidates="<results>/model_causes/{source}/seed{seed}.csv",
-        causes_timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
+        timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
     log:
         "<logs>/model_causes/{source}/seed{seed}.log",
     benchmark:
