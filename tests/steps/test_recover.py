@@ -1,4 +1,4 @@
-"""The step ``recover`` as a command, on the smallest tables, and what it says of faulty calls."""
+"""The step ``recover`` on the smallest tables, and what it says of names that it does not know."""
 
 import json
 
