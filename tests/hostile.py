@@ -65,7 +65,7 @@ def _run(arguments: list[str], folder: Path) -> dict:
 
 
 def _child(arguments: list[str], folder: str, environment: dict[str, str], sender: Connection) -> None:
-    from gpca.__main__ import main
+    from tests.steps.by_words import main
 
     os.chdir(folder)
     os.environ.update(environment)

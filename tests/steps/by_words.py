@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 from gpca.__main__ import COMMANDS
 from gpca.__main__ import main as command
+from gpca.code_files import ROOT
 from gpca.process.job import Job, as_process, call
+from gpca.process.processor import THREAD_VARIABLES
 
 IN = "gpca.experiments."
 MODULES = {  # of steps whose module is not gpca.steps.<name>
@@ -60,6 +64,7 @@ TEXTS = {
     *("methods", "encoders_of", "data_dir"),
 }
 SWITCHES = {"stand_in"}
+CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"
 
 
 def main(words: list[str]) -> int:
@@ -70,11 +75,21 @@ def main(words: list[str]) -> int:
     return as_process(f"gpca {step}", lambda: call(module_of(step), job_of(step, words[1:])))
 
 
+def run_apart(words: list[str], folder: Path, code: str = CODE, threads: int = 1) -> subprocess.CompletedProcess:
+    """Run a step or a command in a process of its own, or code that runs it."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)} | dict.fromkeys(THREAD_VARIABLES, str(threads))
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], cwd=folder, env=environment, capture_output=True, text=True
+    )
+
+
 def module_of(step: str) -> str:
+    """Return the module of the step that has this name in tests."""
     return MODULES.get(step, f"gpca.steps.{step}")
 
 
 def job_of(step: str, words: list[str]) -> Job:
+    """Read the words as the files, names and settings that a rule would give the step."""
     values: dict[str, list[str]] = {}
     for word in words:
         if word.startswith("--"):
