@@ -36,7 +36,7 @@ pathvars:
 
 
 TOPICS = (
-    "common functions objects registrations methods causes frames virtual_frames encoders "
+    "common functions objects registrations causes frames virtual_frames encoders "
     "uncertainty explainers active_learning diagnostics model"
 )
 RULES = Path(workflow.current_basedir, "workflow/rules")

@@ -11,7 +11,6 @@ from dataclasses import is_dataclass
 from difflib import get_close_matches
 from functools import cache, partial
 from inspect import Parameter, isclass, signature
-from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_type_hints
 
 from gpca.errors import InputError
@@ -248,52 +247,3 @@ def _keys_at(schema: dict, path: Iterable[str | int]) -> Iterator[str]:
         parts = inside
     for part in (each for whole in parts for each in alternatives(whole)):
         yield from part.get("properties", ())
-
-
-# Until no step is called by a command line: checks of what was given with --settings. The class of the whole config is
-# found by name, so that it counts as no code of the steps.
-
-
-def check_settings(settings: Mapping, *section: str) -> None:
-    """Check what a step was given with ``--settings`` like that section of the config; none of its keys is required."""
-    from importlib import import_module
-
-    from pydantic import ValidationError
-
-    adapter = _adapter(import_module("gpca.config.schema").whole_config())
-    whole: Any = settings
-    section = tuple("causal" if (name, key) == ("*", "uncertainty") else name for key, name in pairwise(("", *section)))
-    for key in reversed(section):
-        whole = {key: whole}
-    try:
-        adapter.validate_json(json.dumps([whole]))
-    except ValidationError as invalid:
-        faults = [fault for fault in invalid.errors() if fault["loc"][1 : len(section) + 1] == section]
-        if faults := [fault for fault in faults if not {fault["type"], *fault["loc"]} & {"missing", "[key]"}]:
-            raise _input_error(faults, whole, adapter, "setting") from None
-
-
-def checked_sections(
-    settings: Mapping[str, dict], sections: Mapping[str, tuple[str, ...]], by_name: Collection[str] = ()
-) -> dict[str, dict]:
-    """Return the parts of ``--settings`` by name, each checked like a section of the config; absent ones are empty."""
-    given = {name: settings.get(name) or {} for name in (*sections, *by_name)}
-    for name, section in sections.items():
-        check_settings(given[name], *section)
-    return given
-
-
-def checked_by_name(
-    given: dict[str, Any], _section: str, names: Collection[str], require: Callable[[str, Mapping], None]
-) -> dict[str, dict]:
-    """Return the settings of each of the names, none for those that a section of the config does not give."""
-    for name in (*given, *names):
-        require(name, given.get(name) or {})
-    return {name: given.get(name) or {} for name in names}
-
-
-def checked_with_icp(settings: Mapping[str, Any], *section: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return ``--settings`` that are a section of the config, and those of ICP, which they hold under ``icp``."""
-    given = {name: value for name, value in settings.items() if name != "icp"}
-    check_settings(given, *section)
-    return given, settings.get("icp", {})

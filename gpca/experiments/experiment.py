@@ -77,8 +77,6 @@ class Experiment:
 
     Attributes:
         name: of its file of rules, if it has one, and of its folder.
-        folder: of its code, where that is named otherwise.
-        summary: files that its step reads -> those that it writes, in a line.
         sections: its sections of the config -> their types; every key has to be given.
         tidy: its files of numbers, which every run makes that has the experiment.
         needs: names that must not be empty, or a run does without it.
@@ -92,8 +90,6 @@ class Experiment:
     """
 
     name: str
-    folder: str = ""
-    summary: str = ""
     sections: Mapping[str, Any] = field(default_factory=dict)
     tidy: tuple[Tidy, ...] = ()
     needs: tuple[str, ...] = ()
@@ -105,14 +101,9 @@ class Experiment:
     lists: Mapping[str, str | Callable[[LeftOut], Collection[str]]] = field(default_factory=dict)
 
     @property
-    def step(self) -> str:
-        """The module that runs it."""
-        return f"{__package__}.{self.folder or self.name}.step"
-
-    @property
     def results(self) -> Path:
         """Its part of the registry of tables and figures."""
-        return Path(__file__).parent / (self.folder or self.name) / "results.yaml"
+        return Path(__file__).parent / self.name / "results.yaml"
 
     def is_run(self, names: Mapping[str, Any]) -> bool:
         """Return whether a run with these names has it."""

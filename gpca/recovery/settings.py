@@ -8,22 +8,12 @@ from typing import Annotated
 
 from gpca.alignment.icp import ICPSettings
 from gpca.encoders.settings import EncoderSettings
-from gpca.errors import InputError
 from gpca.frames.camera import Camera
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.situations import SituationSettings
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.settings import Bounds, Count, check_settings
+from gpca.settings import Bounds, Count
 from gpca.uncertainty.settings import UncertaintySettings
-
-SECTIONS = {
-    "recovery": ("recovery",),
-    "objects": ("sources", "*"),
-    "scenes": ("real_world", "scenes"),
-    "registrations": ("registrations",),
-    "encoder": ("encoders", "*"),
-    "uncertainty": ("uncertainty", "*"),
-}
 
 
 @dataclass(frozen=True)
@@ -67,22 +57,14 @@ class RecoverySettings:
     explainers: Mapping[str, Mapping]
 
     @classmethod
-    def from_sections(cls, given: Mapping[str, dict]) -> RecoverySettings:
-        """Build from the sections of the config that `SECTIONS` names, and from ``explainers``.
-
-        Raises:
-            InputError: a section is missing, or holds an unknown setting or a value out of range.
-        """
-        for part, path in SECTIONS.items():
-            if part not in given:
-                raise InputError("--settings", f"has no section '{part}'", "see workflow/rules/recovery.smk")
-            check_settings(given[part], *path)
-        recovery = given["recovery"]
-        registration = RegistrationSettings.from_dict(given["registrations"])
-        scenes = SceneSettings.from_dict(given["scenes"])
+    def from_sections(cls, sections: Mapping[str, dict]) -> RecoverySettings:
+        """Build from the sections of the config by name, and from ``explainers``."""
+        recovery = sections["recovery"]
+        registration = RegistrationSettings.from_dict(sections["registrations"])
+        scenes = SceneSettings.from_dict(sections["scenes"])
         return cls(
             section=recovery,
-            objects=given["objects"],
+            objects=sections["objects"],
             loop=LoopSettings(**recovery["loop"], cloud_points=registration.cloud_points, icp=registration.icp),
             situation=SituationSettings(
                 replace(scenes, count=recovery["tables"], camera=Camera(**recovery["camera"])),
@@ -90,7 +72,7 @@ class RecoverySettings:
                 hidden=tuple(recovery["hidden"]),
                 severities=registration.severities,
             ),
-            encoder=EncoderSettings(**given["encoder"]),
-            uncertainty=UncertaintySettings(**given["uncertainty"], icp=registration.icp),
-            explainers=given.get("explainers", {}),
+            encoder=EncoderSettings(**sections["encoder"]),
+            uncertainty=UncertaintySettings(**sections["uncertainty"], icp=registration.icp),
+            explainers=sections.get("explainers", {}),
         )

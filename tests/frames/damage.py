@@ -8,7 +8,7 @@ from PIL import Image
 SCENE = Path("tiny/test/000001")
 CAMERA, TRUTH = SCENE / "scene_camera.json", SCENE / "scene_gt.json"
 DEPTH, MASK = SCENE / "depth/000000.png", SCENE / "mask_visib/000000_000001.png"
-FILES = ["--out", "instances.npz", "--objects", "objects.npz", "--surface-points", "4096"]
+FILES = ["--instances", "instances.npz", "--objects", "objects.npz", "--surface-points", "4096"]
 
 
 def instances(settings=None, scenes="tiny"):

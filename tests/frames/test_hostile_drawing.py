@@ -11,9 +11,6 @@ SETTINGS = {
     "no room": ({"gap_m": 1.0, "objects": [8, 8]}, "there is no room for 8 objects 1.0 m apart"),
     "downwards": ({"objects": [5, 2]}, "scenes objects: [5, 2] is in descending order"),
     "a family that is none": ({"families": ["spoons"]}, "family 'spoons': no such procedural family"),
-    "no family": ({"families": []}, "families"),
-    "a camera without pixels": ({"camera": {"width": 0}}, "camera.width"),
-    "unknown": ({"lamps": 3}, "lamps: unknown"),
 }
 
 
@@ -23,18 +20,6 @@ def test_settings_of_scenes_that_cannot_be(tmp_path, name):
     small = {"count": 2, "views": 1, "camera": {"width": 64, "height": 48, "focal_px": 60}, "families": ["linemod"]}
     arguments = ["scenes", "--source", "tiny", "--settings", json.dumps({**small, **given}), "--out", "drawn"]
     refusal(arguments, tmp_path, words)
-
-
-def test_scenes_replace_nothing_but_scenes(tmp_path):
-    (tmp_path / "home").mkdir()
-    (tmp_path / "home/thesis.tex").write_text("five years")
-    (tmp_path / "file").write_text("x")
-    for out, words in (
-        ("home", "was not made by this step"),
-        (".", "was not made by this step"),
-        ("file", "is not a folder"),
-    ):
-        refusal(["scenes", "--source", "tiny", "--out", out], tmp_path, out, words, "another")
 
 
 def test_scenes_replace_scenes(scenes, tmp_path):

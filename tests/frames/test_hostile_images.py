@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from ..hostile import refusal
+from ..steps.by_words import main
 from .damage import DEPTH, MASK, SCENE, TRUTH, edit, instances, save
 
 SHAPE = (120, 160)
@@ -205,8 +206,6 @@ def test_depth_that_lies_elsewhere_than_the_pose(damaged, name):
 
 
 def test_the_dataset_itself_is_none_of_this(scenes, tmp_path):
-    from gpca.__main__ import main
-
     shutil.copytree(scenes, tmp_path / "tiny")
     arguments = instances(scenes=str(tmp_path / "tiny"))
     outputs = {"instances.npz": tmp_path / "instances.npz", "objects.npz": tmp_path / "objects.npz"}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ..hostile import refusal
+from ..steps.by_words import main
 from .damage import instances
 
 HEAD = "scene_id,im_id,obj_id,score,R,t,time"
@@ -135,7 +136,6 @@ def test_no_results_where_poses_come_from_them(damaged):
 
 
 def test_good_results_are_read(call, damaged, lines, capsys):
-    from gpca.__main__ import main
     from gpca.frames.instances import Instances
 
     def add(rows):

@@ -24,7 +24,7 @@ def settings(**given):
 def read(scenes, tmp_path):
     def run(*more, given=None):
         given = given or {"initial_pose": {"form": "true_pose"}, "datasets": {"tiny": {"location": str(scenes)}}}
-        files = ("--out", str(tmp_path / "instances.npz"), "--objects", str(tmp_path / "objects.npz"))
+        files = ("--instances", str(tmp_path / "instances.npz"), "--objects", str(tmp_path / "objects.npz"))
         arguments = (
             "instances",
             "--source",
@@ -51,7 +51,7 @@ def test_a_dataset_becomes_registrations(read, capsys):
     sources = ("--instances", str(folder / "instances.npz"), "--objects", str(folder / "objects.npz"))
     outputs = [str(folder / name) for name in ("seed0.npz", "poses.csv", "timings.csv")]
     step = ["frame_registrations", *sources, "--source", "tiny", "--seed", "0", "--settings", settings(**REGISTRATIONS)]
-    assert main([*step, "--out", outputs[0], "--poses", outputs[1], "--timings", outputs[2]]) == 0
+    assert main([*step, "--registrations", outputs[0], "--poses", outputs[1], "--timings", outputs[2]]) == 0
     registrations, poses = Registrations.load(outputs[0]), pd.read_csv(outputs[1])
     assert (poses["sample"].to_numpy() == registrations.sample).all()
     assert np.isfinite(poses[["init_error", "icp_error"]]).all(axis=None)
@@ -137,8 +137,6 @@ def test_datasets_without_any_model_that_can_stand_are_refused(scenes, tmp_path,
     [
         ({"datasets": {"tiny": {"location": "/nowhere/at/all"}}}, "/nowhere/at/all does not exist"),
         ({"datasets": {"tiny": {"location": "/", "results": "/lost.csv"}}}, "/lost.csv: no such results file; correct"),
-        ({"datasets": {"tiny": {"place": "x"}}}, "datasets.tiny.place: unknown"),
-        ({"initial_pose": {"form": "guess"}}, "initial_pose.form: 'guess' should be"),
     ],
 )
 def test_a_faulty_call_ends_in_one_line(read, capsys, given, expected):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 from gpca.__main__ import COMMANDS
 from gpca.__main__ import main as command
+from gpca.code_files import ROOT
 from gpca.process.job import Job, as_process, call
 
 IN = "gpca.experiments."
@@ -60,6 +63,7 @@ TEXTS = {
     *("methods", "encoders_of", "data_dir"),
 }
 SWITCHES = {"stand_in"}
+CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"
 
 
 def main(words: list[str]) -> int:
@@ -68,6 +72,14 @@ def main(words: list[str]) -> int:
         return command(words)
     step = words[0]
     return as_process(f"gpca {step}", lambda: call(module_of(step), job_of(step, words[1:])))
+
+
+def run_apart(words: list[str], folder: Path, code: str = CODE) -> subprocess.CompletedProcess:
+    """Run a step or a command in a process of its own, or code that runs it."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-c", code, *words], cwd=folder, env=environment, capture_output=True, text=True
+    )
 
 
 def module_of(step: str) -> str:

@@ -14,10 +14,8 @@ FAULTS = [
     (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"embeddings.npz: its samples differ from"),
     (untouched, settings("active_learning", held_out=["noise", "pose"]), r"array 'h_pose' is missing"),
     (untouched, settings("active_learning", initial=18), r"leaves none of 18 training samples for the pool; lower"),
-    (untouched, settings("active_learning", label=4), r"setting label: unknown; did you mean labels\?"),
     (untouched, settings("active_learning", stream={"arrivals": 60, "quiet": 2}), r"stream of 60 arrivals: needs"),
     (untouched, {"--strategies": ["random", "bald", "oracle"]}, r"strategy 'oracle': unknown; choose one of random"),
-    (untouched, {"--strategies": ["random"]}, r"--out: 3 file\(s\) for 1 strategies"),
 ]
 
 

@@ -7,7 +7,7 @@ from baselines import analytical
 from gpca.attribution.predictions import write_timings
 from tests.steps.by_words import main
 
-from .command_lines import arguments, arrays_changed, lines_kept, refused, removed, settings, untouched, written
+from .command_lines import arguments, arrays_changed, lines_kept, refused, removed, untouched, written
 
 SHAP = {
     "--explainer": "shap_removal", "--settings": {}, "--embeddings": None, "--uncertainty": "uncertainty.npz",
@@ -21,17 +21,12 @@ FAULTS = [
     (removed("uncertainty_timings.csv"), SHAP, r"uncertainty_timings.csv: no such file"),
     (lines_kept("uncertainty_timings.csv", 20), SHAP, r"its samples differ"),
     (untouched, SHAP | {"--settings": {"worth": "rmse"}}, r"rmse"),
-    (untouched, {"--explainer": "shapley"}, r"explainer 'shapley': unknown; choose one of gpca_paper, gpca"),
-    (untouched, {"--seeds": [0, 1]}, r"--registrations: 1 file\(s\) for 2 seed\(s\); give one for each"),
-    (untouched, {"--embeddings": ["embeddings.npz"] * 2}, r"--embeddings: 2 file\(s\) for 1 seed\(s\)"),
     (untouched, {"--embeddings": None}, r"explainer 'gpca': reads embeddings; give them with --embeddings"),
     (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
     (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"its samples differ from those of the registr"),
     (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
     (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'head_logits' is 24×3, not 23"),
     (written("dgcnn.csv", "sample,seconds\n"), {}, r"dgcnn.csv: column 'split' is missing"),
-    (untouched, settings("attribute", iteratons=5), r"setting iteratons: unknown; did you mean iterations\?"),
-    (untouched, settings("attribute", kernel="cubic"), r"setting kernel: 'cubic' is not one of"),
     (untouched, {"--predictions": "meshes"}, r"meshes"),
 ]
 

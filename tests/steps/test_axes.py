@@ -12,9 +12,8 @@ from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
 from tests.steps.by_words import main
 
-from .command_lines import STEP_OPTIONS, arguments, refused
+from .command_lines import OF_ANOTHER_SOURCE, STEP_OPTIONS, arguments, refused
 
-OUTPUTS = ("--out", "--maps", "--samples", "--weights")
 FREE = {  # what a user may take from anywhere
     ("shift", "--other-registrations"),
     ("new_concepts", "--encoders"),
@@ -24,13 +23,15 @@ ELSEWHERE = ("elsewhere", 7)
 
 
 def given_files():
-    """Step and option of every file of arrays or weights that a step reads, and the file."""
+    """Step and option of every file of arrays or weights that a step reads of an earlier one, and the file."""
+    made = {value for options in OF_ANOTHER_SOURCE.values() for value in options.values()}
     for step, options in STEP_OPTIONS.items():
         for option, value in options.items():
             name = option if option.endswith(".npz") else value
-            is_read = isinstance(name, str) and name.endswith((".npz", ".pt")) and option not in OUTPUTS
-            if is_read and name != "model.pt" and (step, option) not in FREE:
+            is_labeled = isinstance(name, str) and name.endswith((".npz", ".pt")) and name != "model.pt"
+            if is_labeled and name in made and (step, option) not in FREE:
                 yield step, option, name
+        made |= {value for value in options.values() if isinstance(value, str)}
 
 
 def relabeled(path, source, seed):
@@ -78,7 +79,7 @@ def test_a_file_of_ours_that_does_not_say_of_what_it_is_has_to_be_made_anew(fold
 
 def test_objects_of_a_users_own_program_need_not_say_of_which_source_they_are(folder):
     unlabelled(folder / "objects.npz")
-    assert main(arguments("registrations", {"--out": "new.npz", "--timings": "new.csv"})) == 0
+    assert main(arguments("registrations", {"--registrations": "new.npz", "--timings": "new.csv"})) == 0
     assert Registrations.load(folder / "new.npz").axes == ("tiny", 0)
 
 
@@ -101,8 +102,7 @@ def test_the_own_source_is_not_another_one(folder, capsys):
 
 
 def test_several_files_are_trained_on_together_where_each_has_its_source(folder, capsys):
-    both = {"--registrations": ["registrations.npz", "other.npz"], "--source": "both", "--out": "both.pt"}
-    refused(folder, capsys, "train", lambda _: None, both, "2 file.s. for 1 source")
+    both = {"--registrations": ["registrations.npz", "other.npz"], "--source": "both", "--weights": "both.pt"}
     swapped = both | {"--registrations-of": ["other", "tiny"]}
     refused(folder, capsys, "train", lambda _: None, swapped, "registrations.npz: is of source 'tiny'")
     assert main(arguments("train", both | {"--registrations-of": ["tiny", "other"]})) == 0
@@ -110,7 +110,7 @@ def test_several_files_are_trained_on_together_where_each_has_its_source(folder,
 
 def test_an_encoder_and_files_may_be_of_a_source_that_is_named(folder, capsys):
     """As under other initial poses, and where seeds are those of the classifier alone."""
-    embed = {"--encoder": "other.pt", "--out": "new.npz", "--timings": "new.csv"}
+    embed = {"--encoder": "other.pt", "--embeddings": "new.npz", "--timings": "new.csv"}
     refused(folder, capsys, "embed", lambda _: None, embed, "other.pt: is of source 'other', seed 0, not of")
     assert main(arguments("embed", embed | {"--encoder-of": "other"})) == 0
     attribute = {"--source": "same", "--seeds": 5, "--predictions": "new.csv", "--timings": "new_seconds.csv"}

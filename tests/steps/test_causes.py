@@ -1,15 +1,10 @@
 """The step ``causes`` by hand: the same bytes whatever the threads, and what it says of faulty files and settings."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
-from gpca.code_files import ROOT
-
 from ..hostile import refusal
+from .by_words import run_apart
 from .command_lines import arguments, arrays_changed, settings, truncated, untouched
 
 
@@ -28,14 +23,8 @@ FAULTS = [
     (truncated("objects.npz"), {}, "objects.npz: is not a readable npz archive"),
     (arrays_changed("objects.npz", points_m=lambda points: points * np.nan), {}, "array 'points_m' contains NaN"),
     (one_object, {}, "causes of tiny: 1 object(s) cannot be split"),
-    (untouched, settings("causes", trian=9), "setting trian: unknown; did you mean train?"),
-    (untouched, settings("causes", icp_points=64), "setting icp_points: unknown"),
-    (untouched, settings("causes", icp={"max_iterations": 0}), "setting max_iterations: 0 is less"),
     (untouched, settings("causes", icp={"method": "generalized"}), "the target has no normals; use point_to_point"),
-    (untouched, settings("causes", points=[128, 64]), "causes points: [128, 64] is in descending order"),
-    (untouched, settings("causes", shares={"nominal": 1.0}), "causes shares: add up to 1.7"),
-    (untouched, settings("causes", starts=12), "setting starts: 12 should be greater than or equal to 13"),
-    (untouched, {"--candidates": "causes.npz", "--out": "causes.npz"}, "causes.npz"),
+    (untouched, {"--candidates": "causes.npz"}, "causes.npz"),
 ]
 
 
@@ -58,10 +47,7 @@ def test_states_that_cannot_be_filled_end_with_what_to_widen(folder):
 
 
 def test_objects_that_fail_when_clean_are_named_and_the_last_is_a_refusal(folder):
-    command = [sys.executable, "-m", "gpca", *arguments("causes", settings("causes", limits=TIGHT))]
-    done = subprocess.run(
-        command, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
-    )
+    done = run_apart(arguments("causes", settings("causes", limits=TIGHT)), folder)
     assert done.returncode == 2
     said = [line for line in done.stderr.splitlines() if "%|" not in line]
     assert [line.split("'")[1] for line in said[:-1]] == ["brick", "cone"]
@@ -69,7 +55,6 @@ def test_objects_that_fail_when_clean_are_named_and_the_last_is_a_refusal(folder
 
 
 def test_one_thread_or_two_give_the_same_bytes(folder, made):
-    command = [sys.executable, "-m", "gpca", *arguments("causes"), "--threads", "2"]
-    subprocess.run(command, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, check=True)
+    assert run_apart([*arguments("causes"), "--threads", "2"], folder).returncode == 0
     for name in ("causes.npz", "candidates.csv"):
         assert (folder / name).read_bytes() == (made / name).read_bytes()

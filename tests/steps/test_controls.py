@@ -6,29 +6,11 @@ import pytest
 
 from tests.steps.by_words import main
 
-from .command_lines import CONTROLS, ENCODER, STEP_OPTIONS, arguments, arrays_changed, refused, settings, untouched
+from .command_lines import CONTROLS, STEP_OPTIONS, arguments, arrays_changed, refused, settings
 
 FAULTS = {
-    "train_control": [
-        (untouched, settings("train_control", control={}), "setting control: unknown; choose one of controls, encoder"),
-        (
-            untouched,
-            settings("train_control", controls={"folds": 1}),
-            "setting folds: 1 should be greater than or equal to 2",
-        ),
-        (
-            untouched,
-            settings("train_control", controls={"draw_points": [64, 32]}),
-            r"\[64, 32\] is in descending order",
-        ),
-        (untouched, settings("train_control", encoder=ENCODER | {"fewest_points": 65}), "65 exceeds draw_points, 64"),
-    ],
+    "train_control": [],
     "controls": [
-        (untouched, settings("controls", explainers={}), "setting explainers: is empty"),
-        (untouched, settings("controls", explainers={"gpc": {}}), "explainer 'gpc': unknown; choose one of"),
-        (untouched, settings("controls", explainers={"gpca": {"draw": 3}}), "draw"),
-        (untouched, {"--retrained": [], "--retrained-embeddings": []}, "--retrained: lacks control 'density'"),
-        (untouched, {"--other-registrations": []}, r"--other-registrations: 0 file\(s\) for 1 name\(s\)"),
         (arrays_changed("control.npz", sample=lambda s: s + 1), {}, "control.npz: its samples differ"),
         (arrays_changed("registrations.npz", fitness=lambda f: f - 2), {}, "'fitness' contains impossible values"),
     ],
@@ -50,5 +32,5 @@ def test_a_control_that_the_source_does_not_admit_is_named_and_its_file_holds_no
     changes = settings("controls", **chosen) | {"--retrained": "unseen_objects"}
     assert main(arguments("controls", changes)) == 0
     assert "controls of tiny: 'unseen_objects' is skipped" in capsys.readouterr().err
-    rows = pd.read_csv(folder / STEP_OPTIONS["controls"]["--out"])
+    rows = pd.read_csv(folder / STEP_OPTIONS["controls"]["--predictions"])
     assert set(rows["control"]) == {"paper", "shuffled"}

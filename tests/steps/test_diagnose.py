@@ -6,26 +6,21 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.labels import LABELS
 
 from ..hostile import refusal
-from .command_lines import STEP_OPTIONS, arguments, arrays_changed, lines_kept, settings, truncated, untouched
+from .command_lines import STEP_OPTIONS, arguments, arrays_changed, lines_kept, truncated, untouched
 
 FAULTS = {
     "describe": [
         (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
         (truncated("causes.npz"), {}, "causes.npz: is not a readable npz archive"),
-        (untouched, settings("describe", restarts=0), "setting restarts: 0 should be greater than or equal to 1"),
-        (untouched, settings("describe", restart=3), "setting restart: unknown; did you mean restarts?"),
         (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not contain the times of these samples"),
-        (untouched, {"--out": "causes.npz"}, "causes.npz"),
+        (untouched, {"--descriptors": "causes.npz"}, "causes.npz"),
     ],
     "train_on_causes": [
         (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
-        (untouched, settings("train_on_causes", epochs=0), "setting epochs: 0 should be greater than or equal to 1"),
         (lines_kept("causes_timings.csv", 3), {}, "causes_timings.csv: does not contain the times of these samples"),
-        (untouched, {"--out": "causes.npz"}, "causes.npz"),
+        (untouched, {"--embeddings": "causes.npz"}, "causes.npz"),
     ],
     "diagnose": [
-        (untouched, {"--explainer": "shap_oracle"}, "explainer 'shap_oracle': unknown; choose one of"),
-        (untouched, settings("diagnose", iteration=3), "setting iteration: unknown; did you mean iterations?"),
         (untouched, {"--read": "registrations.npz"}, "registrations.npz: array"),
         (arrays_changed("descriptors.npz", sample=lambda s: s[::-1]), {}, "descriptors.npz: its samples differ"),
         (arrays_changed("descriptors.npz", motion=lambda m: m * float("nan")), {}, "array 'motion' contains NaN"),

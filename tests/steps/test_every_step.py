@@ -1,15 +1,12 @@
 """Every step by hand: all files with their provenance, the same bytes again, faults as the process's last word."""
 
-import os
 import re
-import subprocess
-import sys
 
 import pytest
 
 from gpca.__main__ import COMMANDS
 from gpca.code_files import ROOT
-from tests.steps.by_words import main, module_of
+from tests.steps.by_words import main, module_of, run_apart
 
 from .command_lines import STEP_OPTIONS, arguments
 
@@ -118,10 +115,7 @@ def test_a_step_made_anew_gives_the_same_bytes(folder, made):
     ],
 )
 def test_the_process_ends_with_status_2_and_that_line_alone(folder, step, changes, message):
-    done = subprocess.run(
-        [sys.executable, "-m", "gpca", *arguments(step, changes)],
-        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-    )  # fmt: skip
+    done = run_apart(arguments(step, changes), folder)
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith(message)

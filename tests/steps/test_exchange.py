@@ -16,22 +16,12 @@ FAULTS = [
     (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with 'python -m gpca train'"),
     (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
     (arrays_changed("objects.npz", names=lambda names: names[::-1]), {}, r"objects of tiny: object \d is not '\w+'"),
-    (untouched, exchange(methods=["icp"]), r"registration method 'icp': unknown; choose one of"),
-    (untouched, exchange(methods=[]), r"setting methods: is empty"),
-    (untouched, exchange(estimators=["gauss"]), r"estimator 'gauss': unknown; choose one of"),
     (untouched, exchange(train=10), r"setting train: 10 is not a multiple of 3"),
-    (untouched, exchange(tests=3), r"setting tests: unknown; did you mean test\?"),
-    (untouched, settings("exchange", estimators={"cello": {"sigma": 1}}), r"setting sigma: unknown"),
-    (untouched, settings("exchange", methods={"point_to_point": {"k": 1}}), r"setting k: unknown"),
-    (untouched, settings("exchange", explainers={}), r"setting explainers: is empty; name at least one"),
-    (untouched, settings("exchange", explainers={"gpc": {}}), r"explainer 'gpc': unknown"),
     (
         untouched,
         settings("exchange", explainers={"shap_removal": {}}),
         r"'shap_removal': reads design 'removal'",
     ),
-    (untouched, settings("exchange", control={}), r"setting control: unknown; choose one of exchange, uncertainty,"),
-    (untouched, {"--out": ["a.csv", "b.csv"]}, r"--out: 2 file\(s\) for 1 seed\(s\)"),
 ]
 
 

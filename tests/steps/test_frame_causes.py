@@ -37,7 +37,7 @@ def call(made, tiny, scenes, tmp_path_factory):
     words += ["--instances", "instances.npz", "--objects", "objects.npz", "--encoders", made / "cause_weights.pt"]
     for name, option in lessons.items():
         words += [f"--{option}", made / f"{name}.npz"]
-    outputs = {"--out": "seed100.npz", "--samples": "seed100.csv", "--predictions": "said.csv"}
+    outputs = {"--frame-causes": "seed100.npz", "--samples": "seed100.csv", "--predictions": "said.csv"}
     words += [word for pair in outputs.items() for word in pair]
     return folder, ["frame_causes", *map(str, words)]
 
@@ -86,20 +86,13 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
 @pytest.mark.parametrize(
     ("option", "value", "words"),
     [
-        ("--descriptors", ["descriptors.npz", "descriptors.npz"], "--descriptors: 2 file(s) for 1 file(s) of --causes"),
         ("--instances", ["objects.npz"], "objects.npz: array"),
         (
             "--settings",
             [json.dumps(SETTINGS | {"datasets": {"tiny": {"location": "/not/there"}}})],
             "/not/there does not exist",
         ),
-        (
-            "--settings",
-            [json.dumps({"frames": {"points": 3}})],
-            "setting points: 3 should be greater than or equal to 64",
-        ),
-        ("--settings", [json.dumps({"explainers": {"oracle": {}}})], "explainer 'oracle': unknown; choose one of"),
-        ("--out", ["objects.npz"], "objects.npz"),
+        ("--frame-causes", ["objects.npz"], "objects.npz"),
     ],
 )
 def test_a_fault_is_one_line_and_harms_nothing(call, asked, option, value, words):

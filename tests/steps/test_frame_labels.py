@@ -11,21 +11,6 @@ FAULTS = [
         r"embeddings.npz: its samples differ from those of the regi",
     ),
     (untouched, settings("frame_labels", frame_labels={"initial": 18}), r"leaves none of 18 training samples"),
-    (
-        untouched,
-        settings("frame_labels", frame_labels={"targets": [2]}),
-        r"setting targets.0: 2 is greater than the ma",
-    ),
-    (
-        untouched,
-        {"--backbones": ["dgcnn", "pointnet"]},
-        r"--embeddings: 1 file\(s\) for 2 value\(s\) of --backbones",
-    ),
-    (
-        untouched,
-        {"--strategies": ["random"]},
-        r"--out: 2 file\(s\) for 1 value\(s\) of --strategies; give one for each",
-    ),
 ]
 
 

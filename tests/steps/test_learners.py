@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from .command_lines import arrays_changed, refused, removed, settings, untouched
+from .command_lines import arrays_changed, refused, removed, untouched
 
 FAULTS = [
     (removed("shifted.npz"), {}, r"shifted.npz: no such file; make it with 'python -m gpca shift'"),
@@ -13,11 +13,8 @@ FAULTS = [
         {"--learners": ["learner_nearest", "gpca"]},
         r"fewer than two concepts",
     ),
-    (untouched, settings("learners", gpca={"iteration": 5}), r"explainer 'gpca': .*iteration|setting iteration"),
     (untouched, {"--learners": ["gpca", "learner_oracle"]}, r"explainer 'learner_oracle': unknown"),
     (untouched, {"--learners": ["gpca", "residuals_forest"]}, r"'residuals_forest': does not read embeddings"),
-    (untouched, {"--learners": ["gpca"]}, r"--out: 2 file\(s\) for 1 pair\(s\) of learner and seed; give one for each"),
-    (untouched, {"--seeds": [0, 1]}, r"--sets: 1 file\(s\) for 2 seed\(s\)"),
 ]
 
 

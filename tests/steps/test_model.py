@@ -6,21 +6,12 @@ from gpca.model.file import Model
 from gpca.recovery.policy import RecoveryPolicy, Thresholds
 from tests.steps.by_words import main
 
-from .command_lines import POLICY, STEP_OPTIONS, arguments, refused, removed, untouched
+from .command_lines import POLICY, STEP_OPTIONS, arguments, refused, removed
 
 FAULTS = [
     (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with 'python -m gpca train'"),
     (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
     (removed("causes.npz"), {}, r"causes.npz: no such file; make it with 'python -m gpca causes'"),
-    (
-        untouched,
-        {"--causes": ["causes.npz", "causes.npz"]},
-        r"--descriptors: 1 file\(s\) for 2 file\(s\) of --causes; give one",
-    ),
-    (untouched, {"--settings": {"model": {"false_alarms": 1.5}}}, r"setting false_alarms: 1.5 is"),
-    (untouched, {"--settings": {"encoder": {"layers": 3}}}, r"setting layers: unknown; choose one of backbone"),
-    (untouched, {"--settings": {"gpc": {"kernel": "cubic"}}}, r"setting kernel: 'cubic' is not one of"),
-    (untouched, {"--settings": {"registrations": {"icp": {"method": "x"}}}}, r"setting icp.method: 'x' is not"),
 ]
 
 

@@ -10,11 +10,6 @@ FAULTS = [
     (lambda folder: (folder / "empty").mkdir(), settings("objects", location="empty"), r"the folder has none of"),
     (truncated("meshes/cone.ply"), {}, r"cone.ply: is truncated or not a readable .ply file"),
     (untouched, settings("objects", unit="m"), r"object 'brick': its diameter is 128.5 m, so the declared unit"),
-    (untouched, settings("objects", unit="inch"), r"setting unit: 'inch' is not one of"),
-    (untouched, settings("objects", unti="mm"), r"setting unti: unknown; did you mean unit\?"),
-    (untouched, {"--settings": {}}, r"kind 'None': is not a kind"),
-    (untouched, {"--settings": "{kind: x"}, r"--settings: invalid JSON"),
-    (untouched, {"--settings": "[1]"}, r"--settings: not a JSON object"),
     (untouched, {"--out": "meshes/brick.stl/objects.npz"}, r"meshes/brick.stl"),
 ]
 

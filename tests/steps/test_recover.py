@@ -45,7 +45,7 @@ def settings(**changed):
 
 
 def call(folder, given):
-    files = {"--out": "seed7.csv", "--timings": "t/seed7.csv", "--queue": "q/seed7.csv"} | OTHERS
+    files = {"--rows": "seed7.csv", "--timings": "t/seed7.csv", "--queue": "q/seed7.csv"} | OTHERS
     paths = [word for option, name in files.items() for word in (option, str(folder / name))]
     return main(["recover", "--seed", "7", "--settings", given, *paths])
 

@@ -18,14 +18,12 @@ FAULTS = [
         settings("reduce", components=19),
         r"19 components are too many for 18 training embeddings of 32 numbers",
     ),
-    (untouched, settings("reduce", components=0), r"setting components: 0 should be greater than or equal to 1"),
     (
         untouched,
         settings("reduce", neighbours=3),
         r"'autoencoder': has no setting 'neighbours'; its settings are components",
     ),
     (untouched, {"--reduction": "tsne"}, r"reduction 'tsne': unknown; choose one of none, pca"),
-    (untouched, {"--seeds": [0, 1]}, r"--embeddings: 1 file\(s\) for 2 seed\(s\); give one for each"),
 ]
 
 

@@ -20,22 +20,9 @@ FAULTS = [
         {},
         r"object 0 is not '\w+', as in the registr",
     ),
-    (untouched, settings("register_methods", gicp={}), r"setting gicp: unknown; choose one of method_pairs, methods"),
-    (
-        untouched,
-        settings("register_methods", methods={"gicpp": {}}),
-        r"registration method 'gicpp': unknown; choose",
-    ),
-    (untouched, settings("register_methods", methods={"fgr": {"radius": 1}}), r"setting radius: unknown"),
-    (untouched, settings("register_methods", methods={"fgr": 3}), r"setting fgr: 3 should be a valid dictionary"),
-    (untouched, pairs(samples=4), r"setting samples: 4 is not a multiple of 3"),
-    (untouched, pairs(sucess=0.1), r"setting sucess: unknown; did you mean success\?"),
     (untouched, pairs(global_start="teaser"), r"global_start: 'teaser' is not among the methods"),
     (untouched, pairs(global_start="point_to_point"), r"'point_to_point': needs an initial pose"),
-    (untouched, {"--methods": ["fgr", "icp"]}, r"registration method 'icp': unknown"),
-    (untouched, {"--out": ["a.csv"]}, r"--out: 1 file\(s\) for 2 pair\(s\) of method and seed; give one for each"),
-    (untouched, {"--seeds": [0, 1]}, r"--out: 2 file\(s\) for 4 pair"),
-    (untouched, {"--out": ["a.csv", "registrations.npz"]}, r"registrations.npz"),
+    (untouched, {"--rows": ["a.csv", "registrations.npz"]}, r"registrations.npz"),
 ]
 
 

@@ -6,7 +6,6 @@ from .command_lines import refused, removed, untouched
 
 FAULTS = [
     (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),
-    (untouched, {"--settings": {"runtime": {"repeats": 1}}}, r"setting repeats: 1 should be greater than or equal to"),
     (untouched, {"--settings": {}}, r"leaves none of 18 training samples"),
 ]
 

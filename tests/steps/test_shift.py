@@ -2,15 +2,11 @@
 
 import pytest
 
-from .command_lines import SHIFT, arrays_changed, refused, removed, settings, untouched
+from .command_lines import arrays_changed, refused, removed
 
 FAULTS = [
     (removed("weights.pt"), {}, r"weights.pt: no such weights"),
     (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"embeddings.npz: its samples differ from"),
-    (untouched, settings("shift", shift=SHIFT | {"sample": 3}), r"setting sample: unknown; did you mean samples\?"),
-    (untouched, settings("shift", shift=SHIFT | {"encoder": {"options": {}}}), r"setting encoder.options: unknown"),
-    (untouched, settings("shift", shifts={}), r"setting shifts: unknown; choose one of shift, registrations, encoder"),
-    (untouched, {"--other-registrations": ["registrations.npz"] * 2}, r"--other-registrations: 2 file\(s\) for 1"),
 ]
 
 

@@ -2,11 +2,10 @@
 
 import pytest
 
-from .command_lines import refused, removed, settings, untouched
+from .command_lines import refused, removed
 
 FAULTS = [
     (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
-    (untouched, settings("without", epochs=0), r"setting epochs: 0 should be greater than or equal to 1"),
 ]
 
 

@@ -3,6 +3,7 @@ import json
 from pathlib import Path
 
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
+from gpca.alignment.methods.registry import method_module
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.objects.procedural import FAMILIES

@@ -31,7 +31,6 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="gradients",
-    summary="registrations, encoder and embeddings -> what GP-CA's scores respond to: saliency maps and TCAV",
     sections={"gradients": GradientSettings},
     tidy=(
         Tidy(

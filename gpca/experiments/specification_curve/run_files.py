@@ -14,16 +14,6 @@ from gpca.experiments.specification_curve.settings import Reading
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.uncertainty.settings import UncertaintySettings
 
-SECTIONS = {
-    "uncertainty": ("uncertainty", "additive"),
-    "icp": ("registrations", "icp"),
-    "encoder": ("encoders", "*"),
-    "pretraining": ("real_world", "pretraining"),
-    "training": ("real_world", "training", "*"),
-    "active_learning": ("active_learning",),
-    "gpca_paper": ("explainers", "gpca_paper"),
-    "gpca": ("explainers", "gpca"),
-}
 # Reading, and the value of a printed number's counterpart under it: source, method, metric, concept, seed, value.
 Row = tuple[Reading, str, str, str, str, int, float]
 

@@ -62,9 +62,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 
 EXPERIMENT = Experiment(
-    name="exchange",
-    summary="registrations -> explanations based on other registration methods and estimators",
-    folder="substitution",
+    name="substitution",
     sections={"exchange": Section},
     tidy=(
         Tidy(

@@ -2,9 +2,9 @@
 
 COMMON = ["--source", "tiny"]
 COMMANDS = {
-    "objects.npz": ["registrations", *COMMON, "--seed", 0, "--objects", "objects.npz", "--out", "new.npz",
+    "objects.npz": ["registrations", *COMMON, "--seed", 0, "--objects", "objects.npz", "--registrations", "new.npz",
                     "--timings", "new.csv"],
-    "registrations.npz": ["train", *COMMON, "--seed", 0, "--registrations", "registrations.npz", "--out", "new.pt",
+    "registrations.npz": ["train", *COMMON, "--seed", 0, "--registrations", "registrations.npz", "--weights", "new.pt",
                           "--curve", "new.csv"],
     "embeddings.npz": ["reduce", *COMMON, "--reduction", "none", "--seeds", 0, "--embeddings", "embeddings.npz",
                        "--out", "new.npz"],

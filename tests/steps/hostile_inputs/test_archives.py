@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from ...hostile import refusal
+from ..by_words import main
 from .commands import COMMANDS
 
 NEEDED = {"objects.npz": "points_m", "registrations.npz": "points", "embeddings.npz": "h"}
@@ -113,8 +114,6 @@ def test_other_files_that_are_no_arrays_are_refused(fault, name, folder):
 @pytest.mark.parametrize("name", ["embeddings.npz", "objects.npz"])
 def test_the_same_files_unspoilt_are_read(name, folder, monkeypatch):
     """Compressed as well, and with arrays of a user's own."""
-    from gpca.__main__ import main
-
     with np.load(folder / name) as archive:
         np.savez_compressed(folder / name, **archive, own=np.arange(3))
     monkeypatch.chdir(folder)

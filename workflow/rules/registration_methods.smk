@@ -1,5 +1,5 @@
 # The test pairs of the registrations by every registration method -> registration_methods.csv.
-from gpca.alignment.methods.registry import left_out, method_module
+from gpca.alignment.methods.registry import left_out
 
 METHODS = NAMES["method"]
 for name, package in left_out(config["methods"]).items():
