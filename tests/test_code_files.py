@@ -94,7 +94,10 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/encoders/reduction.py", "gpca/seeds.py"},
         {"gpca/encoders/training.py", "gpca/pairs/dataset.py", "gpca/classifier/gpc.py"},
     ),
-    "gpca.experiments.active_learning.without_step": ({"gpca/encoders/training.py"}, {"gpca/classifier/gpc.py", "gpca/active_learning/acquisition.py"}),
+    "gpca.experiments.active_learning.without_step": (
+        {"gpca/encoders/training.py"},
+        {"gpca/classifier/gpc.py", "gpca/active_learning/acquisition.py"},
+    ),
     "gpca.experiments.active_learning.step": (
         {"gpca/classifier/latents.py", "gpca/active_learning/stream.py"},
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
@@ -115,7 +118,10 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/classifier/gpc.py", "gpca/encoders/training.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/acquisition.py"},
     ),
-    "gpca.experiments.runtime.step": ({"gpca/model/explainer.py", "gpca/active_learning/acquisition.py"}, {"gpca/explainers/interface.py"}),
+    "gpca.experiments.runtime.step": (
+        {"gpca/model/explainer.py", "gpca/active_learning/acquisition.py"},
+        {"gpca/explainers/interface.py"},
+    ),
     "gpca.steps.attribute": (
         {"gpca/explainers/interface.py", "gpca/attribution/scores.py"},
         {"gpca/classifier/gpc.py", "gpca/uncertainty/designs.py", "gpca/encoders/training.py"},

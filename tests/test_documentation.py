@@ -13,7 +13,7 @@ from importlib.util import find_spec
 import pytest
 import yaml
 
-from gpca.__main__ import STEPS, module_of
+from gpca.__main__ import COMMANDS
 from gpca.experiments.controls.settings import CONTROLS
 from gpca.experiments.results import registered
 from gpca.objects.entry import Source
@@ -61,10 +61,10 @@ def test_every_make_target_and_variable_exists(command):
 
 @cache
 def options_of(program):
-    """The options that a step of `python -m gpca`, or a script, has."""
-    if program in STEPS:
+    """The options that a command of `python -m gpca`, or a script, has."""
+    if program in COMMANDS:
         parser = ArgumentParser()
-        import_module(module_of(program)).add_arguments(parser)
+        import_module(f"gpca.commands.{program.replace('-', '_')}").add_arguments(parser)
         return {"--threads", "--settings", *parser._option_string_actions}
     shown = subprocess.run([sys.executable, program, "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
     return set(re.findall(r"--[\w-]+", shown.stdout))
@@ -78,9 +78,9 @@ def test_every_python_command_names_something_that_is_there(command):
         assert (ROOT / words[0]).is_file()
         assert not flags or flags <= options_of(words[0])
     elif words[1] == "gpca":
-        step = (*words[2:], "--help")[0]
-        assert step in STEPS or step in ("<step>", "--help", "--version")
-        assert step not in STEPS or flags <= options_of(step)
+        name = (*words[2:], "--help")[0]
+        assert name in (*COMMANDS, "--help", "--version")
+        assert name not in COMMANDS or flags <= options_of(name)
     else:
         assert find_spec(words[1]) is not None
 

@@ -48,7 +48,9 @@ LEARNERS = {
     "learner_rbf_svm": {},
 }
 PREPARED = "from gpca.process.processor import prepare; prepare(); import json, sys; "
-CHAIN = PREPARED + "from tests.steps.by_words import main; sys.exit(any([main(words) for words in json.load(sys.stdin)]))"
+CHAIN = (
+    PREPARED + "from tests.steps.by_words import main; sys.exit(any([main(words) for words in json.load(sys.stdin)]))"
+)
 GUARDED = PREPARED + "from tests.vendor_guard import main; sys.exit(main())"
 LEFT_OUT = {"label", "runtime", "explain"}  # they give seconds, or text
 # Files of seconds; and a model's and an explanation's provenance.
@@ -77,11 +79,11 @@ def chain() -> list[list[str]]:
     tiny = {"source": "tiny", "seed": 0}
     lines = [
         words("scenes", source="frames", settings=frames, out="scenes"),
-        words("instances", source="frames", settings={}, scenes="scenes", surface_points=1024, instances="instances.npz",
-              objects="seen.npz"),
+        words("instances", source="frames", settings={}, scenes="scenes", surface_points=1024,
+              instances="instances.npz", objects="seen.npz"),
         words("frame_registrations", source="frames", seed=0, settings={"train": 9, "test": 6, "cloud_points": 128,
-              "test_share": 0.4}, instances="instances.npz", objects="seen.npz", registrations="frames.npz", poses="poses.csv",
-              timings="frame_icp.csv"),
+              "test_share": 0.4}, instances="instances.npz", objects="seen.npz", registrations="frames.npz",
+              poses="poses.csv", timings="frame_icp.csv"),
         words("objects", source="linemod", settings={"kind": "procedural", "family": "linemod"}, surface_points=400,
               out="procedural.npz"),
         *every_step(LEFT_OUT),

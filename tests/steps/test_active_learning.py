@@ -5,7 +5,7 @@ import pytest
 from .command_lines import arrays_changed, refused, removed, settings, untouched
 
 FAULTS = [
-    (removed("without.npz"), {}, r"without.npz: no such file; make it with 'python -m gpca without'"),
+    (removed("without.npz"), {}, r"without.npz: no such file; make it with Snakemake"),
     (
         arrays_changed("without.npz", sample=lambda s: s + 1),
         {},

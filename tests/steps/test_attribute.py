@@ -14,15 +14,13 @@ SHAP = {
     "--uncertainty-timings": "uncertainty_timings.csv", "--input-timings": "icp.csv",
 }  # fmt: skip
 FAULTS = [
-    (untouched, SHAP | {"--uncertainty": None}, r"'shap_removal': reads the uncertainty of design 'removal'"),
-    (removed("uncertainty.npz"), SHAP, r"uncertainty.npz: no such file; make it with 'python -m gpca"),
+    (removed("uncertainty.npz"), SHAP, r"uncertainty.npz: no such file; make it with Snakemake"),
     (arrays_changed("uncertainty.npz", sample=lambda s: s + 50), SHAP, r"its samples differ"),
     (arrays_changed("uncertainty.npz", residual=lambda r: r * np.nan), SHAP, r"array 'residual' contains NaN"),
     (removed("uncertainty_timings.csv"), SHAP, r"uncertainty_timings.csv: no such file"),
     (lines_kept("uncertainty_timings.csv", 20), SHAP, r"its samples differ"),
     (untouched, SHAP | {"--settings": {"worth": "rmse"}}, r"rmse"),
-    (untouched, {"--embeddings": None}, r"explainer 'gpca': reads embeddings; give them with --embeddings"),
-    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with Snakemake"),
     (arrays_changed("embeddings.npz", sample=lambda s: s + 1), {}, r"its samples differ from those of the registr"),
     (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, r"array 'h' is 24, not S×d"),
     (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, r"array 'head_logits' is 24×3, not 23"),

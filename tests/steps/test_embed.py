@@ -5,7 +5,7 @@ import pytest
 from .command_lines import refused, removed, settings, truncated, untouched, written
 
 FAULTS = [
-    (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with 'python -m gpca train'"),
+    (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with Snakemake"),
     (truncated("weights.pt"), {}, r"weights.pt: not the weights of backbone 'dgcnn'"),
     (written("weights.pt", "no weights"), {}, r"weights.pt: not the weights of backbone 'dgcnn'"),
     (untouched, settings("embed", options={"k": 8}), r"weights.pt: not the weights of backbone 'dgcnn'"),

@@ -12,7 +12,7 @@ def pairs(**changed):
 
 
 FAULTS = [
-    (removed("causes.npz"), {}, r"causes.npz: no such file; make it with 'python -m gpca causes'"),
+    (removed("causes.npz"), {}, r"causes.npz: no such file; make it with Snakemake"),
     (truncated("objects.npz"), {}, r"objects.npz: is not a readable npz archive"),
     (arrays_changed("objects.npz", names=lambda names: names[::-1]), {}, r"objects of tiny: object \d is not '\w+'"),
     (untouched, pairs(methods={"fgr": 3}), r"registration method 'fgr': is global, so its results have no spread"),

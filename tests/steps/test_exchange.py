@@ -13,7 +13,7 @@ def exchange(**changed):
 
 
 FAULTS = [
-    (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with 'python -m gpca train'"),
+    (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with Snakemake"),
     (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
     (arrays_changed("objects.npz", names=lambda names: names[::-1]), {}, r"objects of tiny: object \d is not '\w+'"),
     (untouched, exchange(train=10), r"setting train: 10 is not a multiple of 3"),

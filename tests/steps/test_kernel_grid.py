@@ -6,7 +6,7 @@ import pytest
 from .command_lines import arrays_changed, refused, removed
 
 FAULTS = [
-    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with Snakemake"),
     (arrays_changed("embeddings.npz", h=lambda h: h * np.nan), {}, r"embeddings.npz: array 'h' contains NaN"),
 ]
 

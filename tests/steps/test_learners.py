@@ -6,7 +6,7 @@ import pytest
 from .command_lines import arrays_changed, refused, removed, untouched
 
 FAULTS = [
-    (removed("shifted.npz"), {}, r"shifted.npz: no such file; make it with 'python -m gpca shift'"),
+    (removed("shifted.npz"), {}, r"shifted.npz: no such file; make it with Snakemake"),
     (arrays_changed("shifted.npz", h=lambda h: h * np.nan), {}, r"shifted.npz: array 'h' contains NaN"),
     (
         arrays_changed("shifted.npz", concept=lambda c: np.full_like(c, "pose")),

@@ -9,9 +9,9 @@ from tests.steps.by_words import main
 from .command_lines import POLICY, STEP_OPTIONS, arguments, refused, removed
 
 FAULTS = [
-    (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with 'python -m gpca train'"),
-    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
-    (removed("causes.npz"), {}, r"causes.npz: no such file; make it with 'python -m gpca causes'"),
+    (removed("weights.pt"), {}, r"weights.pt: no such weights; regenerate them with Snakemake"),
+    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with Snakemake"),
+    (removed("causes.npz"), {}, r"causes.npz: no such file; make it with Snakemake"),
 ]
 
 

@@ -13,9 +13,9 @@ def changed(section, **keys):
 
 
 FAULTS = [
-    (removed("other.pt"), {}, r"other.pt: no such weights; regenerate them with 'python -m gpca train'"),
+    (removed("other.pt"), {}, r"other.pt: no such weights; regenerate them with Snakemake"),
     (truncated("cause_weights.pt"), {}, r"cause_weights.pt: not the weights of backbone 'dgcnn', or damaged"),
-    (removed("causes.npz"), {}, r"causes.npz: no such file; make it with 'python -m gpca causes'"),
+    (removed("causes.npz"), {}, r"causes.npz: no such file; make it with Snakemake"),
     (arrays_changed("cause_embeddings.npz", sample=lambda s: s + 1), {}, r"cause_embeddings.npz: its samples differ"),
     (arrays_changed("descriptors.npz", sample=lambda s: s + 1), {}, r"descriptors.npz: its samples differ from those"),
     (untouched, changed("new_concepts", erring=["other_samples"]), r"'other_samples' is not among the embeddings; cho"),

@@ -9,7 +9,7 @@ from tests.steps.by_words import main
 from .command_lines import arguments, arrays_changed, refused, removed, settings, untouched
 
 FAULTS = [
-    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with Snakemake"),
     (arrays_changed("embeddings.npz", h=lambda h: h * np.nan), {}, r"array 'h' contains NaN"),
     (arrays_changed("embeddings.npz", h=np.ones_like), {}, r"training embeddings: are all identical"),
     (arrays_changed("embeddings.npz", split=lambda s: np.full_like(s, "test")), {}, r"has no training samples"),

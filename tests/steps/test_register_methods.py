@@ -12,7 +12,7 @@ def pairs(**changed):
 
 
 FAULTS = [
-    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registrations'"),
+    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with Snakemake"),
     (truncated("objects.npz"), {}, r"objects.npz: is not a readable npz archive"),
     (arrays_changed("registrations.npz", points=lambda p: p * float("nan")), {}, r"array 'points' contains NaN"),
     (

@@ -8,7 +8,7 @@ from tests.steps.by_words import main, run_apart
 from .command_lines import arguments, arrays_changed, refused, removed, settings, truncated, untouched
 
 FAULTS = [
-    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
+    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with Snakemake"),
     (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
     (arrays_changed("registrations.npz", concept=lambda c: np.full_like(c, "x")), {}, r"unknown concept 'x'"),
     (untouched, settings("train", draw_points=129), r"the largest cloud has \d+ points, fewer than draw_points, 129"),

@@ -5,7 +5,7 @@ import pytest
 from .command_lines import refused, removed
 
 FAULTS = [
-    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with 'python -m gpca registr"),
+    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with Snakemake"),
 ]
 
 
