@@ -1,6 +1,5 @@
 # GP-CA Bench. `snakemake -j2 all` makes all that the config names; each table, figure and stage is a target: `table2`.
 import sys
-from pathlib import Path
 
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
@@ -35,16 +34,11 @@ pathvars:
     benchmarks=f"results/{config['run']}/benchmarks",
 
 
-TOPICS = (
-    "common functions objects registrations causes frames virtual_frames encoders "
-    "uncertainty explainers active_learning diagnostics model"
-)
-RULES = Path(workflow.current_basedir, "workflow/rules")
-EXPERIMENTS = [
-    each.name for each in experiments() if (RULES / f"{each.name}.smk").is_file()
-]
-ENDING = ["results", "readings", "comparison", "targets"]
-for topic in dict.fromkeys([*TOPICS.split(), *EXPERIMENTS, *ENDING]):
+STAGES = "objects registrations causes frames virtual_frames encoders uncertainty explainers model"
+EXPERIMENTS = [each.name for each in experiments() if each.has_rules]
+ENDS_WITH = ["collected", "results", "comparison", "targets"]
+TOPICS = ["common", "functions", *STAGES.split(), *EXPERIMENTS, *ENDS_WITH]
+for topic in dict.fromkeys(TOPICS):
 
     include: f"workflow/rules/{topic}.smk"
 

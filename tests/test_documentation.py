@@ -188,16 +188,18 @@ def test_every_key_of_a_source_is_described():
     assert sorted(names) == sorted(keys)
 
 
-def test_the_resources_of_the_cluster_page_are_those_of_the_rules():
+def test_the_resources_of_the_cluster_page_are_those_of_the_rules_and_the_profile():
     files = set((ROOT / "workflow/rules").rglob("*.smk")) - {ROOT / "workflow/rules/targets.smk"}
     rules = "".join(path.read_text() for path in files)
+    profile = yaml.safe_load((ROOT / "profiles/default/config.yaml").read_text())
     page = (ROOT / "docs/cluster.md").read_text()
+    usual = {"threads": 1} | profile["default-resources"]
     for declared, pattern in {
         "threads": r"threads: (\d+)$",
         "mem_mb": r"mem_mb=(\d+)",
         "runtime": r"runtime=(\d+)",
     }.items():
-        values = sorted(set(map(int, re.findall(pattern, rules, re.MULTILINE))))
+        values = sorted({usual[declared], *map(int, re.findall(pattern, rules, re.MULTILINE))})
         [shown] = re.findall(rf"^\| `{declared}`.*\| (\d+(?: to \d+)?)\b[^|]*\|$", page, re.MULTILINE)
         assert shown == (f"{values[0]} to {values[-1]}" if len(values) > 1 else str(values[0]))
 

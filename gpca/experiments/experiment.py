@@ -15,6 +15,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from gpca.code_files import ROOT
 from gpca.explainers.registry import explainers
 from gpca.reporting.registry import expand
 
@@ -104,6 +105,11 @@ class Experiment:
     def results(self) -> Path:
         """Its part of the registry of tables and figures."""
         return Path(__file__).parent / self.name / "results.yaml"
+
+    @property
+    def has_rules(self) -> bool:
+        """Whether the workflow has a file of rules of its name; what a stage or a collector makes needs none."""
+        return (ROOT / f"workflow/rules/{self.name}.smk").is_file()
 
     def is_run(self, names: Mapping[str, Any]) -> bool:
         """Return whether a run with these names has it."""

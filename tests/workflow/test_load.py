@@ -52,10 +52,10 @@ def test_the_snakefile_fits_on_a_page():
 
 
 @pytest.mark.parametrize("path", [path for path in RULES if path.name != "targets.smk"], ids=lambda path: path.name)
-def test_every_rule_says_what_it_needs_and_where_it_logs(path):
+def test_every_rule_says_its_environment_and_where_it_logs(path):
     rules = re.split(r"^ *rule\b", path.read_text(), flags=re.MULTILINE)[1:]
     for rule in (rule for rule in rules if re.search("^ *(shell|script):", rule, re.MULTILINE)):
-        for keyword in ("log", "benchmark", "threads", "resources", "conda"):
+        for keyword in ("log", "benchmark", "conda"):
             assert re.search(rf"^ *{keyword}:", rule, re.MULTILINE), (rule.split(":")[0], keyword)
         assert not re.search("^ *run:", rule, re.MULTILINE)
         # The path of a script, read when its job runs, would be that of the last rule of a loop.

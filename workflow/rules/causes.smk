@@ -34,9 +34,6 @@ rule sample_causes:
         source="|".join(SOURCES),
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=60,
     params:
         step="gpca.steps.causes",
         settings=as_json(config["causes"] | ICP),
@@ -58,9 +55,6 @@ rule describe:
         "<benchmarks>/descriptors/{source}/seed{seed}.tsv"
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         step="gpca.steps.describe",
         settings=as_json(DIAGNOSIS["descriptors"] | ICP),
@@ -87,9 +81,6 @@ rule train_on_causes:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.steps.train_on_causes",
         settings=as_json(DIAGNOSIS["encoder"]),
@@ -127,9 +118,6 @@ rule diagnose:
         "<benchmarks>/diagnoses/{source}/{cause_explainer}.tsv"
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         step="gpca.experiments.diagnosis.step",
         explainer=lambda wildcards: wildcards.cause_explainer,
@@ -139,56 +127,3 @@ rule diagnose:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
-
-
-rule cause_metrics:
-    input:
-        prediction_files=collect(
-            "<results>/diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
-            source=SOURCES,
-            cause_explainer=DIAGNOSIS["explainers"],
-            seed=SEEDS,
-        ),
-        causes_files=collect(
-            "<results>/causes/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS
-        ),
-        code=collector_code("gpca.experiments.diagnosis.metrics:collect"),
-    output:
-        "<results>/causes.csv",
-    log:
-        "<logs>/causes.log",
-    benchmark:
-        "<benchmarks>/causes.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.diagnosis.metrics:collect",
-    script:
-        "../scripts/collect.py"
-
-
-rule cause_intervals:
-    input:
-        prediction_files=rules.cause_metrics.input.prediction_files,
-        causes_files=rules.cause_metrics.input.causes_files,
-        code=collector_code("gpca.experiments.diagnosis.intervals:collect"),
-    output:
-        "<results>/cause_intervals.csv",
-    log:
-        "<logs>/cause_intervals.log",
-    benchmark:
-        "<benchmarks>/cause_intervals.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.diagnosis.intervals:collect",
-    script:
-        "../scripts/collect.py"

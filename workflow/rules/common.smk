@@ -102,3 +102,15 @@ def encoders_of_others(wildcards):
 
 def following_one(names, name):
     return names[(names.index(name) + 1) % len(names)]
+
+
+def below_results(files):
+    """Return the files of each input below the folder of the run."""
+    return {
+        name: (
+            f"<results>/{paths}"
+            if isinstance(paths, str)
+            else [f"<results>/{path}" for path in paths]
+        )
+        for name, paths in files.items()
+    }

@@ -75,9 +75,6 @@ rule comparison:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         objects={**SHOWN["sources"], FRAMES: SHOWN["frames"], "model": SHOWN["model"]},
         tolerances=config["comparison"]["tolerances"],
@@ -114,9 +111,6 @@ rule page:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         run=config["run"],
         shown=[

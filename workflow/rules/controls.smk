@@ -37,9 +37,6 @@ rule train_control:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.experiments.controls.train_step",
         settings=lambda wildcards: control_settings(wildcards),
@@ -77,9 +74,6 @@ rule explain_controls:
     priority: 5
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.experiments.controls.step",
         settings=lambda wildcards: control_settings(
@@ -92,61 +86,3 @@ rule explain_controls:
         others=other_sources,
     script:
         "../scripts/step.py"
-
-
-rule control_metrics:
-    input:
-        prediction_files=rules.controls.input,
-        code=collector_code("gpca.experiments.controls.metrics:collect"),
-    output:
-        "<results>/controls.csv",
-    log:
-        "<logs>/controls.log",
-    benchmark:
-        "<benchmarks>/controls.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.controls.metrics:collect",
-    script:
-        "../scripts/collect.py"
-
-
-use rule control_metrics as control_intervals with:
-    input:
-        prediction_files=rules.controls.input,
-        code=collector_code("gpca.experiments.controls.intervals:collect"),
-    output:
-        "<results>/control_intervals.csv",
-    log:
-        "<logs>/control_intervals.log",
-    benchmark:
-        "<benchmarks>/control_intervals.tsv"
-    params:
-        collector="gpca.experiments.controls.intervals:collect",
-
-
-use rule control_metrics as control_severities with:
-    input:
-        prediction_files=rules.controls.input,
-        sample_files=collect(
-            "<results>/control_samples/{source}/seed{seed}.csv",
-            source=SOURCES,
-            seed=CONTROL_SEEDS,
-        ),
-        code=collector_code("gpca.experiments.controls.severity:collect"),
-    output:
-        "<results>/control_severities.csv",
-    log:
-        "<logs>/control_severities.log",
-    benchmark:
-        "<benchmarks>/control_severities.tsv"
-    params:
-        collector="gpca.experiments.controls.severity:collect",
-        severities=config["registrations"]["severities"],
-        bins=CONTROLS["bins"],
-        success=CONTROLS["success"],

@@ -46,9 +46,6 @@ rule train_encoder:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.steps.train",
         settings=encoder_settings,
@@ -107,9 +104,6 @@ rule train_on_frames:
     priority: 10
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.steps.train",
         settings=lambda wildcards: encoder_settings(
@@ -136,9 +130,6 @@ rule embed:
     priority: 11  # the longest reading waits for those of the frames
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.steps.embed",
         settings=encoder_settings,
@@ -178,9 +169,6 @@ rule reduce_embeddings:
         "<benchmarks>/embeddings/{source}/{backbone}/{reduction}.tsv"
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=30,
     params:
         step="gpca.steps.reduce",
         settings=settings("reductions", "{reduction}"),

@@ -47,9 +47,6 @@ rule estimate:
     priority: 2
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=60,
     params:
         step="gpca.experiments.estimators.step",
         settings=as_json(
@@ -59,25 +56,3 @@ rule estimate:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
-
-
-rule estimator_metrics:
-    input:
-        files=rules.estimates.input,
-        code=collector_code("gpca.experiments.estimators.calibration:collect_estimates"),
-    output:
-        "<results>/estimators.csv",
-    log:
-        "<logs>/estimators.log",
-    benchmark:
-        "<benchmarks>/estimators.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.estimators.calibration:collect_estimates",
-    script:
-        "../scripts/collect.py"

@@ -44,9 +44,6 @@ rule attribute:
     priority: 11  # as `embed`
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.steps.attribute",
         explainer=lambda wildcards: explainer_of(wildcards.explainer, NAMES),
@@ -77,62 +74,3 @@ use rule attribute as attribute_one_encoder with:
     params:
         files_of=FRAMES,
         files_seed=SEEDS[0],
-
-
-rule metrics:
-    input:
-        prediction_files=collect(
-            "<results>/predictions/{source}/{explainer}/seed{seed}.csv",
-            source=SOURCES,
-            explainer=config["explainers"],
-            seed=SEEDS,
-        ),
-        causal_files=collect(
-            "<results>/uncertainty/{source}/causal/seed{seed}.csv",
-            source=SOURCES,
-            seed=SEEDS,
-        ),
-        code=collector_code("gpca.attribution.metrics:collect"),
-    output:
-        "<results>/metrics.csv",
-    log:
-        "<logs>/metrics.log",
-    benchmark:
-        "<benchmarks>/metrics.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.attribution.metrics:collect",
-    script:
-        "../scripts/collect.py"
-
-
-rule timings:
-    input:
-        timing_files=collect(
-            "<results>/timings/{source}/{explainer}/seed{seed}.csv",
-            source=SOURCES,
-            explainer=config["explainers"],
-            seed=SEEDS,
-        ),
-        code=collector_code("gpca.attribution.metrics:collect_timings"),
-    output:
-        "<results>/timings.csv",
-    log:
-        "<logs>/timings.log",
-    benchmark:
-        "<benchmarks>/timings.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.attribution.metrics:collect_timings",
-    script:
-        "../scripts/collect.py"

@@ -34,9 +34,6 @@ rule measure_frame_causes:
         "<benchmarks>/frame_causes/seed{seed}.tsv"
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.experiments.frame_causes.step",
         settings=as_json(
@@ -52,33 +49,3 @@ rule measure_frame_causes:
         folders=DATA_FOLDERS,
     script:
         "../scripts/step.py"
-
-
-rule frame_causes:
-    input:
-        causes_files=collect(
-            "<results>/frame_causes/seed{seed}.npz", seed=NAMES["frame_cause_seed"]
-        ),
-        sample_files=collect(
-            "<results>/frame_causes/seed{seed}.csv", seed=NAMES["frame_cause_seed"]
-        ),
-        prediction_files=collect(
-            "<results>/frame_diagnoses/seed{seed}.csv", seed=NAMES["frame_cause_seed"]
-        ),
-        code=collector_code("gpca.experiments.frame_causes.metrics:collect"),
-    output:
-        "<results>/frame_causes.csv",
-    log:
-        "<logs>/frame_causes.log",
-    benchmark:
-        "<benchmarks>/frame_causes.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.frame_causes.metrics:collect",
-    script:
-        "../scripts/collect.py"

@@ -50,9 +50,6 @@ rule render_scenes:
     priority: 12
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         step="gpca.steps.scenes",
         settings=settings("real_world", "scenes"),
@@ -75,9 +72,6 @@ rule instances:
     priority: 12
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.steps.instances",
         settings=lambda wildcards: as_json(
@@ -110,9 +104,6 @@ rule register_frames:
     priority: 11
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         step="gpca.steps.frame_registrations",
         settings=as_json(
@@ -159,9 +150,6 @@ rule real_world:
     localrule: True
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
     params:
         collector="gpca.experiments.frame_labels.metrics:collect",
         targets=config["frame_labels"]["targets"],

@@ -37,9 +37,6 @@ rule follow_gradients:
         "<benchmarks>/saliency/{source}.tsv"
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.experiments.gradients.step",
         settings=as_json(
@@ -52,30 +49,3 @@ rule follow_gradients:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
-
-
-rule gradient_metrics:
-    input:
-        deletion_files=rules.gradients.input,
-        tcav_files=collect(
-            "<results>/tcav/{source}/seed{seed}.csv",
-            source=NAMES["gradient_source"],
-            seed=SEEDS,
-        ),
-        code=collector_code("gpca.experiments.gradients.metrics:collect"),
-    output:
-        "<results>/gradients.csv",
-    log:
-        "<logs>/gradients.log",
-    benchmark:
-        "<benchmarks>/gradients.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.gradients.metrics:collect",
-    script:
-        "../scripts/collect.py"

@@ -1,4 +1,4 @@
-# One file with all that an explanation needs, and the seconds of its stages.
+# One file with all that an explanation needs.
 MODEL_SOURCE, MODEL_ENCODER = config["model"]["source"], config["model"]["encoder"]
 MODEL_INPUTS = {
     "registrations": f"<results>/registrations/{MODEL_SOURCE}/seed{SEEDS[0]}.npz",
@@ -73,9 +73,6 @@ rule model:
         "<benchmarks>/model.tsv"
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=10,
     params:
         step="gpca.steps.model",
         source=MODEL_SOURCE,
@@ -83,35 +80,5 @@ rule model:
         title=SHOWN["model"]["title"],
         stand_in=SHOWN["model"]["stand_in"],
         settings=as_json(MODEL_SETTINGS),
-    script:
-        "../scripts/step.py"
-
-
-rule time_stages:
-    input:
-        **MODEL_INPUTS,
-        model="<results>/model.pt",
-        code=code_files("gpca.experiments.runtime.step", encoder_module(MODEL_ENCODER)),
-    output:
-        out="<results>/runtime.csv",
-    log:
-        "<logs>/runtime.log",
-    benchmark:
-        "<benchmarks>/runtime.tsv"
-    conda:
-        "../envs/gpca.yaml"
-    # It works on one thread but reserves the whole machine, since it measures times; on a cluster the profile does that.
-    threads: workflow.resource_settings.cores or 1
-    resources:
-        mem_mb=2000,
-        runtime=10,
-    params:
-        step="gpca.experiments.runtime.step",
-        threads=1,
-        source=MODEL_SOURCE,
-        seed=SEEDS[0],
-        settings=as_json(
-            {name: config[name] for name in ("runtime", "active_learning")}
-        ),
     script:
         "../scripts/step.py"

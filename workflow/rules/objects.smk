@@ -24,9 +24,6 @@ rule sample_objects:
     priority: 20  # everything waits for it
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         step="gpca.steps.objects",
         settings=settings("sources", "{source}"),

@@ -46,37 +46,9 @@ rule recover:
     priority: 6
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=30,
     params:
         step="gpca.experiments.recovery.step",
         settings=as_json(RECOVERY_SETTINGS),
         folders=data_folders(STANDING, config["data_dir"], config["downloads"]),
     script:
         "../scripts/step.py"
-
-
-rule recovery:
-    input:
-        files=collect("<results>/recovery/seed{seed}.csv", seed=SEEDS),
-        code=collector_code("gpca.experiments.recovery.metrics:collect_recovery"),
-    output:
-        "<results>/recovery.csv",
-    log:
-        "<logs>/recovery.log",
-    benchmark:
-        "<benchmarks>/recovery.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.recovery.metrics:collect_recovery",
-        treatments=RECOVERY["treatments"],
-        costs=RECOVERY["costs"],
-        budget=RECOVERY["loop"]["budget"],
-    script:
-        "../scripts/collect.py"

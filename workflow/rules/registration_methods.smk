@@ -49,9 +49,6 @@ rule register_methods:
     priority: 2
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=60,
     params:
         step="gpca.experiments.registration_methods.step",
         settings=as_json(
@@ -64,28 +61,3 @@ rule register_methods:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
-
-
-rule registration_methods:
-    input:
-        files=rules.methods.input,
-        code=collector_code(
-            "gpca.experiments.registration_methods.metrics:collect_trials"
-        ),
-    output:
-        "<results>/registration_methods.csv",
-    log:
-        "<logs>/registration_methods.log",
-    benchmark:
-        "<benchmarks>/registration_methods.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.registration_methods.metrics:collect_trials",
-        severities=config["registrations"]["severities"],
-    script:
-        "../scripts/collect.py"

@@ -24,9 +24,6 @@ rule register:
     priority: 15  # more than any training: with many cores, the longest ones would start late
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=30,
     params:
         step="gpca.steps.registrations",
         settings=settings("registrations"),

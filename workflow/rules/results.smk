@@ -5,18 +5,6 @@ from gpca.reporting.registry import SUFFIXES
 RESULTS = results_of(NAMES)
 
 
-def below_results(files):
-    """Return the files of each input below the folder of the run."""
-    return {
-        name: (
-            f"<results>/{paths}"
-            if isinstance(paths, str)
-            else [f"<results>/{path}" for path in paths]
-        )
-        for name, paths in files.items()
-    }
-
-
 def outputs(result):
     """Return the files of a result by suffix; Snakemake's report shows one of them, by the paper's section."""
     paths = {
@@ -50,9 +38,6 @@ for result in RESULTS:
         localrule: True
         conda:
             "../envs/gpca.yaml"
-        resources:
-            mem_mb=2000,
-            runtime=10,
         params:
             kind=result.kind,
             builder=result.builder,

@@ -45,9 +45,6 @@ rule explain_exchanged:
     priority: 2
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.experiments.substitution.step",
         settings=as_json(
@@ -72,17 +69,3 @@ rule explain_exchanged:
         seeds=EXCHANGE_SEEDS,
     script:
         "../scripts/step.py"
-
-
-use rule control_metrics as exchange_metrics with:
-    input:
-        prediction_files=rules.exchanges.input,
-        code=collector_code("gpca.experiments.substitution.metrics:collect"),
-    output:
-        "<results>/exchange.csv",
-    log:
-        "<logs>/exchange.log",
-    benchmark:
-        "<benchmarks>/exchange.tsv"
-    params:
-        collector="gpca.experiments.substitution.metrics:collect",

@@ -33,9 +33,6 @@ rule run_icp:
     priority: 3
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=2000,
-        runtime=60,
     params:
         step="gpca.steps.uncertainty",
         settings=lambda wildcards: as_json(

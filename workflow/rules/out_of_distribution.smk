@@ -1,66 +1,10 @@
-# The classifier's kernels and schedules (Table IV); learners on samples unlike those of the training (Table V).
+# Registrations and encoders -> samples unlike those of the training -> predictions of every learner (Table V).
 ENCODER = config["embedding"]["encoder"]
 # A learner that is an explainer of the config too has its settings, and those of its own besides.
 LEARNER_SETTINGS = {
     name: (config["explainers"].get(name) or {}) | (own or {})
     for name, own in config["learners"].items()
 }
-
-
-rule fit_kernel_grid:
-    input:
-        registrations=collect(
-            "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
-        ),
-        embeddings=collect(
-            f"<results>/embeddings/{{{{source}}}}/{EMBEDDING}/seed{{seed}}.npz",
-            seed=SEEDS,
-        ),
-        code=code_files("gpca.experiments.kernel_grid.step"),
-    output:
-        out=collect("<results>/kernels/{{source}}/seed{seed}.csv", seed=SEEDS),
-    log:
-        "<logs>/kernels/{source}.log",
-    benchmark:
-        "<benchmarks>/kernels/{source}.tsv"
-    priority: 4
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
-    params:
-        step="gpca.experiments.kernel_grid.step",
-        settings=settings("kernel_grid"),
-        seeds=SEEDS,
-    script:
-        "../scripts/step.py"
-
-
-rule kernels:
-    input:
-        files=collect(
-            "<results>/kernels/{source}/seed{seed}.csv",
-            source=NAMES["kernel_source"],
-            seed=SEEDS,
-        ),
-        code=collector_code("gpca.experiments.kernel_grid.grid:collect_grids"),
-    output:
-        "<results>/kernels.csv",
-    log:
-        "<logs>/kernels.log",
-    benchmark:
-        "<benchmarks>/kernels.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.kernel_grid.grid:collect_grids",
-    script:
-        "../scripts/collect.py"
 
 
 rule shifted:
@@ -109,9 +53,6 @@ rule shift:
     priority: 6
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.experiments.out_of_distribution.shift_step",
         settings=as_json(
@@ -146,9 +87,6 @@ rule fit_learners:
     priority: 4
     conda:
         "../envs/gpca.yaml"
-    resources:
-        mem_mb=3000,
-        runtime=60,
     params:
         step="gpca.experiments.out_of_distribution.learners_step",
         settings=as_json(LEARNER_SETTINGS),
@@ -156,28 +94,3 @@ rule fit_learners:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
-
-
-rule diagnostics:
-    input:
-        prediction_files=rules.learners.input,
-        set_files=rules.shifted.input,
-        code=collector_code(
-            "gpca.experiments.out_of_distribution.metrics:collect_diagnostics"
-        ),
-    output:
-        "<results>/diagnostics.csv",
-    log:
-        "<logs>/diagnostics.log",
-    benchmark:
-        "<benchmarks>/diagnostics.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.experiments.out_of_distribution.metrics:collect_diagnostics",
-    script:
-        "../scripts/collect.py"

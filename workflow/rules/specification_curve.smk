@@ -1,4 +1,4 @@
-# Files of a run -> the printed numbers under every reading of what the paper leaves unstated -> readings.csv.
+# Files of a run -> the printed numbers under every reading of what the paper leaves unstated.
 from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
 
 READINGS = config["readings"]
@@ -56,28 +56,3 @@ rule reading:
         ),
     script:
         "../scripts/step.py"
-
-
-rule reading_values:
-    input:
-        paths=collect(
-            "<results>/readings/{reading_group}.csv",
-            reading_group=NAMES["reading_group"],
-        ),
-        code=collector_code("gpca.attribution.metrics:read_all_metrics"),
-    output:
-        "<results>/readings.csv",
-    log:
-        "<logs>/reading_values.log",
-    benchmark:
-        "<benchmarks>/reading_values.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    resources:
-        mem_mb=1000,
-        runtime=10,
-    params:
-        collector="gpca.attribution.metrics:read_all_metrics",
-    script:
-        "../scripts/collect.py"

@@ -1,0 +1,26 @@
+# The model -> the seconds of every stage of an explanation (Table VII).
+rule time_stages:
+    input:
+        **MODEL_INPUTS,
+        model="<results>/model.pt",
+        code=code_files("gpca.experiments.runtime.step", encoder_module(MODEL_ENCODER)),
+    output:
+        out="<results>/runtime.csv",
+    log:
+        "<logs>/runtime.log",
+    benchmark:
+        "<benchmarks>/runtime.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    # It works on one thread but reserves the whole machine, since it measures times; on a cluster the profile does that.
+    threads: workflow.resource_settings.cores or 1
+    params:
+        step="gpca.experiments.runtime.step",
+        threads=1,
+        source=MODEL_SOURCE,
+        seed=SEEDS[0],
+        settings=as_json(
+            {name: config[name] for name in ("runtime", "active_learning")}
+        ),
+    script:
+        "../scripts/step.py"
