@@ -1,4 +1,4 @@
-"""The steps from datasets to registrations as commands, and what they say of a faulty call."""
+"""The steps from datasets to registrations, and what they say of faulty datasets."""
 
 import json
 import shutil
@@ -24,19 +24,9 @@ def settings(**given):
 def read(scenes, tmp_path):
     def run(*more, given=None):
         given = given or {"initial_pose": {"form": "true_pose"}, "datasets": {"tiny": {"location": str(scenes)}}}
-        files = ("--instances", str(tmp_path / "instances.npz"), "--objects", str(tmp_path / "objects.npz"))
-        arguments = (
-            "instances",
-            "--source",
-            "tiny",
-            "--settings",
-            json.dumps(given),
-            "--surface-points",
-            "1024",
-            *files,
-            *more,
-        )
-        return main(list(arguments)), tmp_path
+        files = ["--instances", str(tmp_path / "instances.npz"), "--objects", str(tmp_path / "objects.npz")]
+        names = ["--source", "tiny", "--surface-points", "1024"]
+        return main(["instances", *names, "--settings", json.dumps(given), *files, *more]), tmp_path
 
     return run
 

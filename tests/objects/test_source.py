@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.objects.source import data_files, data_options, folder_options, resolve, surfaces
+from gpca.objects.source import data_files, data_folders, resolve, surfaces
 from tests.objects.test_pcd import ascii_pcd
 
 BOP = {"title": "Toy", "kind": "bop", "location": "bop/toy", "url": "https://example.org/toy_models.zip"}
@@ -161,8 +161,7 @@ def test_data_files_are_those_that_are_read(tmp_path):
 
 
 def test_a_step_is_told_the_one_folder_that_the_data_of_a_source_comes_from():
-    assert data_options({"origin": "local"}, "/data", "kept") == ["--data-dir", "/data"]
-    assert data_options({"origin": "local"}, None, "kept") == []
-    assert data_options({"origin": "download"}, "/data", "kept") == ["--downloads", "kept"]
-    assert data_options({"origin": "procedural"}, "/data", "kept") == []
-    assert folder_options("/data", "kept") == ["--data-dir", "/data", "--downloads", "kept"]
+    assert data_folders({"origin": "local"}, "/data", "kept") == {"data_dir": "/data"}
+    assert data_folders({"origin": "local"}, None, "kept") == {}
+    assert data_folders({"origin": "download"}, "/data", "kept") == {"downloads": "kept"}
+    assert data_folders({"origin": "procedural"}, "/data", "kept") == {}

@@ -12,6 +12,7 @@ from gpca.__main__ import COMMANDS
 from gpca.__main__ import main as command
 from gpca.code_files import ROOT
 from gpca.process.job import Job, as_process, call
+from gpca.process.processor import THREAD_VARIABLES
 
 IN = "gpca.experiments."
 MODULES = {  # of steps whose module is not gpca.steps.<name>
@@ -74,9 +75,9 @@ def main(words: list[str]) -> int:
     return as_process(f"gpca {step}", lambda: call(module_of(step), job_of(step, words[1:])))
 
 
-def run_apart(words: list[str], folder: Path, code: str = CODE) -> subprocess.CompletedProcess:
+def run_apart(words: list[str], folder: Path, code: str = CODE, threads: int = 1) -> subprocess.CompletedProcess:
     """Run a step or a command in a process of its own, or code that runs it."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"PYTHONPATH": str(ROOT)} | dict.fromkeys(THREAD_VARIABLES, str(threads))
     return subprocess.run(
         [sys.executable, "-c", code, *words], cwd=folder, env=environment, capture_output=True, text=True
     )

@@ -1,4 +1,4 @@
-"""The command line of every step by hand, one after the other on tiny data, and ways to spoil what it reads."""
+"""The words of every step, one after the other on tiny data, and ways to spoil what it reads."""
 
 import json
 import os
@@ -207,7 +207,7 @@ OF_ANOTHER_SOURCE = {
 
 
 def arguments(step, changes=()):
-    """The command line of a step, with some options changed and those that are None left out."""
+    """The words of a step, with some options changed and those that are None left out."""
     words = [step]
     for name, value in (STEP_OPTIONS[step] | dict(changes)).items():
         if value is not None:

@@ -1,4 +1,4 @@
-"""The step ``readings`` by hand: a file with its provenance, and what it says of faults."""
+"""The step ``readings``: a file with its provenance, and what it says of a file that is not there or not named."""
 
 import json
 

@@ -1,29 +1,14 @@
-"""The step ``train`` by hand, and what it says of faulty files and settings."""
+"""The step ``train`` stopped in the middle, which then continues."""
 
-import numpy as np
 import pytest
 
-from tests.steps.by_words import main, run_apart
-
-from .command_lines import arguments, arrays_changed, refused, removed, settings, truncated, untouched
-
-FAULTS = [
-    (removed("registrations.npz"), {}, r"registrations.npz: no such file; make it with Snakemake"),
-    (truncated("registrations.npz"), {}, r"registrations.npz: is not a readable npz archive"),
-    (arrays_changed("registrations.npz", concept=lambda c: np.full_like(c, "x")), {}, r"unknown concept 'x'"),
-    (untouched, settings("train", draw_points=129), r"the largest cloud has \d+ points, fewer than draw_points, 129"),
-]
-
-
-@pytest.mark.parametrize("fault", range(len(FAULTS)))
-def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, fault):
-    refused(folder, capsys, "train", *FAULTS[fault])
-
+from .by_words import main, run_apart
+from .command_lines import arguments, settings
 
 # Where the tests run in the background of a shell, SIGINT is ignored, and children inherit that.
 STOPPED_IN_EPOCH_3 = """
 import os, signal, sys
-from tests.steps.by_words import main, run_apart
+from tests.steps.by_words import main
 from gpca.encoders import training
 
 class Deleted:

@@ -63,7 +63,7 @@ def run_files(embedded, tmp_path_factory):
         sets={("tiny", 0): paths["sets"]},
         predictions={("tiny", "gpca_paper", 0): paths["predictions"]},
         embeddings={("tiny", "dgcnn-none", 0): paths["embeddings"]},
-        sections=SECTIONS,
+        settings=SECTIONS,
     )
 
 

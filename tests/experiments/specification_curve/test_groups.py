@@ -48,10 +48,10 @@ def test_the_protocols_start_is_the_classifiers_own_and_others_are_not(halves):
 
 
 def test_starts_touch_the_small_rate_and_table_v(run_files):
-    sections = SECTIONS | {"gpca_paper": SECTIONS["gpca_paper"] | {"inducing": 4}}
+    settings = SECTIONS | {"gpca_paper": SECTIONS["gpca_paper"] | {"inducing": 4}}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gpc_start, "FITTED", (("polynomial", 0.001, 2), ("rbf", 0.01, 2)))
-        found = rows_of(gpc_start.run, replace(run_files, sections=sections), {k: [v] for k, v in PROTOCOL.items()})
+        found = rows_of(gpc_start.run, replace(run_files, settings=settings), {k: [v] for k, v in PROTOCOL.items()})
     methods = {(method, metric) for _, method, metric, concept in found if concept == "all"}
     assert {("polynomial-0.001-2", "accuracy"), ("gpca_paper", "ece")} <= methods
 
@@ -131,7 +131,7 @@ def test_epochs_fall_with_the_rate(run_files, monkeypatch):
     monkeypatch.setattr(labels, "EVERY", 5)
     monkeypatch.setattr(labels, "MOST", 50)
     within_reach = SECTIONS["active_learning"] | {"target": 0.5}
-    run_files = replace(run_files, sections=SECTIONS | {"active_learning": within_reach})
+    run_files = replace(run_files, settings=SECTIONS | {"active_learning": within_reach})
     found = rows_of(labels.epochs, run_files, {"learning_rate": [0.001, 0.3], "labels": ["at_target", "all"]})
     slow, fast = (found[(rate, "all"), "bald_kmeans", "epochs_to_target", "overlap"] for rate in (0.001, 0.3))
     assert fast < slow <= labels.MOST
@@ -184,7 +184,7 @@ def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(run_file
         run_files,
         registrations=run_files.registrations | {("other", 0): saved_as(embedded, ("other", 0), tmp_path)},
         poses={("tiny", 0): poses},
-        sections=SECTIONS | {"pretraining": {"epochs": 1}, "training": {"validation_share": 0.2}},
+        settings=SECTIONS | {"pretraining": {"epochs": 1}, "training": {"validation_share": 0.2}},
     )
     choices = {"input": ["aligned", "observed", "reversed"], "objects": ["all", "unseen"]}
     found = rows_of(frame_input.run, shown, choices)
@@ -201,7 +201,7 @@ def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(run_file
 
 def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(run_files, tmp_path, capsys):
     choices = {"new_share": [0.33], "batch": [1], "initial": [400]}
-    settings = {"choices": choices, "active_learning": run_files.sections["active_learning"]}
+    settings = {"choices": choices, "active_learning": run_files.settings["active_learning"]}
     [path] = run_files.sets.values()
     command = ["readings", "--group", "pool", "--settings", json.dumps(settings), "--sets", str(path)]
     assert main([*command, "--out", str(tmp_path / "pool.csv")]) == 2

@@ -1,0 +1,210 @@
+"""Faults of what each step reads, and of the rare settings that only the data prove wrong: one line, no harm done."""
+
+import numpy as np
+import pytest
+
+from .command_lines import (
+    STEP_OPTIONS,
+    arrays_changed,
+    lines_kept,
+    pickled,
+    refused,
+    removed,
+    settings,
+    truncated,
+    untouched,
+    written,
+)
+
+
+def one_object(folder):
+    with np.load(folder / "objects.npz") as archive:
+        arrays = dict(archive)
+    rows = slice(0, arrays["offsets"][1])
+    chosen = {name: arrays[name][:1] for name in ("names", "diameters_m")}
+    chosen |= {name: arrays[name][rows] for name in ("points_m", "normals")} | {"offsets": arrays["offsets"][:2]}
+    np.savez(folder / "objects.npz", **chosen)
+
+
+def nan(array):
+    return array * np.nan
+
+
+def later(sample):
+    return sample + 50
+
+
+def reversed_order(array):
+    return array[::-1]
+
+
+def section(step, name, **changed):
+    return settings(step, **{name: STEP_OPTIONS[step]["--settings"][name] | changed})
+
+
+ANOTHER_NAME = r"object(s of tiny: object)? \d is not '\w+'"
+NO_ARCHIVE = "is not a readable npz archive"
+NOT_THE_WEIGHTS = "weights.pt: not the weights of backbone 'dgcnn'"
+OTHER_SAMPLES = "its samples differ from those of the"
+OTHER_TIMES = "causes_timings.csv: does not contain the times of these samples"
+SHAP = {
+    "--explainer": "shap_removal", "--settings": {}, "--embeddings": None, "--uncertainty": "uncertainty.npz",
+    "--uncertainty-timings": "uncertainty_timings.csv", "--input-timings": "icp.csv",
+}  # fmt: skip
+FAULTS = {
+    "objects": [
+        (untouched, settings("objects", location="nowhere"), "'mesh_folder': nowhere does not exist; correct"),
+        (lambda folder: (folder / "empty").mkdir(), settings("objects", location="empty"), "the folder has none of"),
+        (truncated("meshes/cone.ply"), {}, "cone.ply: is truncated or not a readable .ply file"),
+        (untouched, settings("objects", unit="m"), "object 'brick': its diameter is 128.5 m, so the declared unit"),
+        (untouched, {"--out": "meshes/brick.stl/objects.npz"}, "meshes/brick.stl"),
+    ],
+    "registrations": [
+        (pickled("objects.npz"), {}, "objects.npz: contains pickled objects, which are never loaded"),
+        (truncated("objects.npz"), {}, f"objects.npz: {NO_ARCHIVE}"),
+        (arrays_changed("objects.npz", normals=lambda n: n[1:]), {}, "array 'normals' is 1199×3, not 1200×3"),
+        (arrays_changed("objects.npz", points_m=nan), {}, "array 'points_m' contains NaN"),
+    ],
+    "causes": [
+        (untouched, {"--objects": "nowhere.npz"}, "nowhere.npz: no such file"),
+        (one_object, {}, r"causes of tiny: 1 object\(s\) cannot be split"),
+        (untouched, settings("causes", icp={"method": "generalized"}), "the target has no normals; use point_to_point"),
+        (untouched, {"--candidates": "causes.npz"}, "causes.npz"),
+    ],
+    "describe": [
+        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
+        (truncated("causes.npz"), {}, f"causes.npz: {NO_ARCHIVE}"),
+        (lines_kept("causes_timings.csv", 3), {}, OTHER_TIMES),
+        (untouched, {"--descriptors": "causes.npz"}, "causes.npz"),
+    ],
+    "estimate": [
+        (removed("causes.npz"), {}, "causes.npz: no such file"),
+        (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),
+        (
+            untouched,
+            section("estimate", "estimator_pairs", methods={"fgr": 3}),
+            "registration method 'fgr': is global, so its results have no spread",
+        ),
+        (untouched, {"--samples": ["causes.npz"]}, "causes.npz"),
+    ],
+    "train_on_causes": [
+        (untouched, {"--causes": "registrations.npz"}, "registrations.npz: array"),
+        (lines_kept("causes_timings.csv", 3), {}, OTHER_TIMES),
+    ],
+    "diagnose": [
+        (untouched, {"--read": "registrations.npz"}, "registrations.npz: array"),
+        (arrays_changed("descriptors.npz", sample=reversed_order), {}, "descriptors.npz: its samples differ"),
+        (arrays_changed("descriptors.npz", motion=nan), {}, "array 'motion' contains NaN"),
+        (untouched, {"--explainer": "gpca", "--read": "descriptors.npz"}, "descriptors.npz: array 'h' is missing"),
+    ],
+    "register_methods": [
+        (removed("registrations.npz"), {}, "registrations.npz: no such file"),
+        (arrays_changed("registrations.npz", points=nan), {}, "array 'points' contains NaN"),
+        (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),
+        (
+            untouched,
+            section("register_methods", "method_pairs", global_start="teaser"),
+            "global_start: 'teaser' is not among the methods",
+        ),
+        (
+            untouched,
+            section("register_methods", "method_pairs", global_start="point_to_point"),
+            "'point_to_point': needs an initial pose",
+        ),
+        (untouched, {"--rows": ["a.csv", "registrations.npz"]}, "registrations.npz"),
+    ],
+    "train": [
+        (removed("registrations.npz"), {}, "registrations.npz: no such file"),
+        (truncated("registrations.npz"), {}, f"registrations.npz: {NO_ARCHIVE}"),
+        (arrays_changed("registrations.npz", concept=lambda c: np.full_like(c, "x")), {}, "unknown concept 'x'"),
+        (untouched, settings("train", draw_points=129), r"the largest cloud has \d+ points, fewer than draw_points"),
+    ],
+    "embed": [
+        (removed("weights.pt"), {}, "weights.pt: no such weights"),
+        (truncated("weights.pt"), {}, NOT_THE_WEIGHTS),
+        (written("weights.pt", "no weights"), {}, NOT_THE_WEIGHTS),
+        (untouched, settings("embed", options={"k": 8}), NOT_THE_WEIGHTS),
+        (removed("icp.csv"), {}, "icp.csv: no such file"),
+        (written("icp.csv", ""), {}, "icp.csv: is empty"),
+        (written("icp.csv", 'sample,"split\n1'), {}, "icp.csv: is not a readable CSV file"),
+        (written("icp.csv", "sample,split,seconds,icp_seconds\n0,train,1,1\n"), {}, "icp.csv: does not contain the t"),
+    ],
+    "controls": [
+        (arrays_changed("control.npz", sample=later), {}, "control.npz: its samples differ"),
+        (arrays_changed("registrations.npz", fitness=lambda f: f - 2), {}, "'fitness' contains impossible values"),
+    ],
+    "exchange": [
+        (removed("weights.pt"), {}, "weights.pt: no such weights"),
+        (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),
+        (untouched, settings("exchange", explainers={"shap_removal": {}}), "'shap_removal': reads design 'removal'"),
+    ],
+    "reduce": [
+        (removed("embeddings.npz"), {}, "embeddings.npz: no such file"),
+        (arrays_changed("embeddings.npz", h=nan), {}, "array 'h' contains NaN"),
+        (arrays_changed("embeddings.npz", h=np.ones_like), {}, "training embeddings: are all identical"),
+        (arrays_changed("embeddings.npz", split=lambda s: np.full_like(s, "test")), {}, "has no training samples"),
+        (untouched, settings("reduce", components=19), "19 components are too many for 18 training embeddings of 32"),
+    ],
+    "uncertainty": [(removed("registrations.npz"), {}, "registrations.npz: no such file")],
+    "attribute": [
+        (removed("uncertainty.npz"), SHAP, "uncertainty.npz: no such file"),
+        (arrays_changed("uncertainty.npz", sample=later), SHAP, "its samples differ"),
+        (arrays_changed("uncertainty.npz", residual=nan), SHAP, "array 'residual' contains NaN"),
+        (removed("uncertainty_timings.csv"), SHAP, "uncertainty_timings.csv: no such file"),
+        (lines_kept("uncertainty_timings.csv", 20), SHAP, "its samples differ"),
+        (untouched, {"--embeddings": None}, "explainer 'gpca': reads embeddings"),
+        (arrays_changed("embeddings.npz", sample=later), {}, OTHER_SAMPLES),
+        (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, "array 'h' is 24, not S×d"),
+        (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, "array 'head_logits' is 24×3, not 23"),
+        (written("dgcnn.csv", "sample,seconds\n"), {}, "dgcnn.csv: column 'split' is missing"),
+        (untouched, {"--predictions": "meshes"}, "meshes"),
+    ],
+    "without": [(removed("registrations.npz"), {}, "registrations.npz: no such file")],
+    "active_learning": [
+        (removed("without.npz"), {}, "without.npz: no such file"),
+        (arrays_changed("without.npz", sample=later), {}, f"without.npz: {OTHER_SAMPLES}"),
+        (arrays_changed("embeddings.npz", sample=later), {}, f"embeddings.npz: {OTHER_SAMPLES}"),
+        (untouched, settings("active_learning", held_out=["noise", "pose"]), "array 'h_pose' is missing"),
+        (untouched, settings("active_learning", initial=18), "leaves none of 18 training samples for the pool; lower"),
+        (untouched, settings("active_learning", stream={"arrivals": 60, "quiet": 2}), "stream of 60 arrivals: needs"),
+    ],
+    "new_concepts": [
+        (removed("other.pt"), {}, "other.pt: no such weights"),
+        (truncated("cause_weights.pt"), {}, f"cause_{NOT_THE_WEIGHTS}, or damaged"),
+        (removed("causes.npz"), {}, "causes.npz: no such file"),
+        (arrays_changed("cause_embeddings.npz", sample=later), {}, f"cause_embeddings.npz: {OTHER_SAMPLES}"),
+        (arrays_changed("descriptors.npz", sample=later), {}, f"descriptors.npz: {OTHER_SAMPLES}"),
+    ],
+    "frame_labels": [
+        (arrays_changed("embeddings.npz", sample=later), {}, f"embeddings.npz: {OTHER_SAMPLES}"),
+        (untouched, settings("frame_labels", frame_labels={"initial": 18}), "leaves none of 18 training samples"),
+    ],
+    "kernel_grid": [(arrays_changed("embeddings.npz", h=nan), {}, "embeddings.npz: array 'h' contains NaN")],
+    "shift": [
+        (removed("weights.pt"), {}, "weights.pt: no such weights"),
+        (arrays_changed("embeddings.npz", sample=later), {}, f"embeddings.npz: {OTHER_SAMPLES}"),
+    ],
+    "learners": [
+        (removed("shifted.npz"), {}, "shifted.npz: no such file"),
+        (arrays_changed("shifted.npz", h=nan), {}, "shifted.npz: array 'h' contains NaN"),
+        (
+            arrays_changed("shifted.npz", concept=lambda c: np.full_like(c, "pose")),
+            {"--learners": ["learner_nearest", "gpca"]},
+            "fewer than two concepts",
+        ),
+        (untouched, {"--learners": ["gpca", "residuals_forest"]}, "'residuals_forest': does not read embeddings"),
+    ],
+    "model": [
+        (removed("weights.pt"), {}, "weights.pt: no such weights"),
+        (removed("embeddings.npz"), {}, "embeddings.npz: no such file"),
+        (removed("causes.npz"), {}, "causes.npz: no such file"),
+    ],
+    "runtime": [(removed("model.pt"), {}, "model.pt: no such model; make one with 'make results'")],
+}
+
+
+@pytest.mark.parametrize(
+    ("step", "fault"), [pytest.param(step, fault, id=step) for step, faults in FAULTS.items() for fault in faults]
+)
+def test_a_fault_is_one_line_and_harms_nothing(folder, capsys, step, fault):
+    refused(folder, capsys, step, *fault)

@@ -1,0 +1,96 @@
+"""The files of single steps: what is in them, and that it is what the settings ask for."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from baselines import analytical
+from gpca.attribution.predictions import read_predictions, write_timings
+from gpca.causes.labels import LABELS
+from gpca.io.arrays import save_arrays
+from gpca.model.file import Model
+from gpca.recovery.policy import RecoveryPolicy, Thresholds
+
+from .by_words import main
+from .command_lines import POLICY, STEP_OPTIONS, arguments
+
+
+@pytest.mark.parametrize(
+    ("rows", "seconds", "columns", "count"),
+    [
+        ("brossard_said.csv", "brossard_seconds.csv", "sample,method,seconds", 2),
+        ("point_trials.csv", "point_seconds.csv", "sample,start,seconds", 2 * 3),
+    ],
+)
+def test_seconds_are_in_a_file_of_their_own(made, rows, seconds, columns, count):
+    rows, seconds = ((made / name).read_text().splitlines() for name in (rows, seconds))
+    assert "seconds" not in rows[0]
+    assert seconds[0] == columns
+    assert len(rows) == len(seconds) == 1 + count
+
+
+def test_a_global_method_has_one_trial_without_a_start(made):
+    assert (made / "fgr_trials.csv").read_text().count(",none,") == 3
+
+
+def test_a_diagnosis_scores_nominal_and_the_causes_of_every_sample(made):
+    rows = read_predictions(made / STEP_OPTIONS["diagnose"]["--predictions"])
+    assert [name for name in rows.columns if name.startswith("score_")] == [f"score_{label}" for label in LABELS]
+    assert set(rows["split"]) == {"train", "test"}
+
+
+def test_what_is_exchanged_follows_from_what_an_explainer_reads(made):
+    rows = pd.read_csv(made / "exchange.csv")
+    kinds = rows.groupby("explainer")["exchanged"].agg(set).to_dict()
+    assert kinds == {"gpca": {"method"}, "shap_additive": {"estimator"}, "residuals_logistic": {"estimator"}}
+    assert set(rows["split"]) == {"test"}
+
+
+def test_curves_of_frame_labels_are_of_every_backbone_and_of_the_pair(made):
+    rows = [line.split(",") for line in (made / "frame_all_labels.csv").read_text().splitlines()[1:]]
+    assert {(row[0], row[1]) for row in rows} == {("dgcnn", "overlap"), ("pair", "overlap")}
+    assert [row[2] for row in rows] == ["0", "12", "0", "12"]  # none, and the whole pool of 18 samples less 6
+
+
+def test_an_explainer_measures_each_registration_once(registrations, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    registrations.save("registrations.npz")
+    write_timings("icp.csv", registrations, *np.zeros((2, len(registrations))))
+    measured, measure = [], analytical.analytical_features
+
+    def counted(samples, *axes, **options):
+        measured.extend(zip(samples.split, samples.sample, strict=True))
+        return measure(samples, *axes, **options)
+
+    monkeypatch.setattr(analytical, "analytical_features", counted)
+    changes = {"--explainer": "analytical_gpc", "--embeddings": None, "--input-timings": "icp.csv"}
+    assert main(arguments("attribute", changes)) == 0
+    assert measured == list(zip(registrations.split, registrations.sample, strict=True))
+
+
+def test_reduced_embeddings_are_of_the_same_samples_and_each_seed_has_its_own(folder):
+    with np.load(folder / "embeddings.npz") as archive:
+        save_arrays(folder / "seed1.npz", dict(archive) | {"seed": np.array(1)})
+    files = {"--embeddings": ["embeddings.npz", "seed1.npz"], "--out": ["reduced.npz", "other.npz"]}
+    assert main(arguments("reduce", files | {"--seeds": [0, 1]})) == 0
+    whole, reduced, other = (np.load(folder / name) for name in ("embeddings.npz", "reduced.npz", "other.npz"))
+    assert reduced["h"].shape == (24, 4)
+    assert reduced["h"].dtype == np.float32
+    for name in ("head_logits", "sample", "split"):
+        assert np.array_equal(reduced[name], whole[name])
+    assert not np.array_equal(other["h"], reduced["h"])
+
+
+def test_unreduced_embeddings_are_those_that_were_given(folder):
+    assert main(arguments("reduce", {"--reduction": "none", "--settings": {}})) == 0
+    assert np.array_equal(np.load(folder / "reduced.npz")["h"], np.load(folder / "embeddings.npz")["h"])
+
+
+def test_the_model_holds_the_policy_of_the_config_with_a_threshold_of_its_own(folder, made):
+    assert Model.load(made / "model.pt").policy.thresholds.uncertain > 0
+    declared = STEP_OPTIONS["model"]["--settings"] | {
+        "recovery": POLICY | {"thresholds": POLICY["thresholds"] | {"uncertain": 0.125}}
+    }
+    assert main(arguments("model", {"--settings": declared, "--out": "declared.pt"})) == 0
+    policy = Model.load(folder / "declared.pt").policy
+    assert policy == RecoveryPolicy(Thresholds(0.125, 0.4, 0.1, 3), POLICY["treatments"])
