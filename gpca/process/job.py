@@ -66,23 +66,19 @@ def run_step(snakemake: Any) -> None:
     Args:
         snakemake: the object that Snakemake gives a script; the input ``code`` is no data.
     """
-    threads = snakemake.params.get("threads", snakemake.threads)
-    prepare(threads)  # before NumPy, torch and numba are loaded
+    names = {"threads": snakemake.threads} | dict(snakemake.wildcards.items()) | dict(snakemake.params.items())
+    prepare(names["threads"])  # before NumPy, torch and numba are loaded
     keep_freed_memory()
     if snakemake.log:
         log = os.open(snakemake.log[0], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
         os.dup2(log, sys.stderr.fileno())
-    names = dict(snakemake.wildcards.items()) | dict(snakemake.params.items())
     module = names.pop("step")
     names |= {"seed": int(names["seed"])} if "seed" in names else {}
     names["settings"] = json.loads(names.get("settings", "{}"))
-    files = _paths(snakemake.input) | _paths(snakemake.output)
     folders = names.pop("folders", {})
-    job = Job(
-        **{"threads": threads, "data_dir": folders.get("data_dir"), "downloads": Path(folders.get("downloads") or "")},
-        **names | files,
-    )
-    sys.exit(as_process(f"gpca {module}", lambda: call(module, job)))
+    names |= {"data_dir": folders.get("data_dir"), "downloads": Path(folders.get("downloads") or "")}
+    job = Job(**names, **_paths(snakemake.input), **_paths(snakemake.output))
+    sys.exit(as_process(module, lambda: call(module, job)))
 
 
 def call(step: str, job: Job) -> None:

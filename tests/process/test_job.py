@@ -1,0 +1,90 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gpca.code_files import ROOT
+from gpca.errors import InputError
+from gpca.process.job import Job, as_process
+
+JOB = Job(
+    source="ycb",
+    seeds=[0, 1],
+    registrations=[Path("a"), Path("b")],
+    poses=[],
+    settings={"icp": None, "gpc": {"inducing": 6}},
+)
+SNAKEMAKE = """
+import sys
+from types import SimpleNamespace
+from gpca.process.job import run_step
+run_step(SimpleNamespace(
+    threads=2, log=["log.txt"], wildcards={"seed": "7", "source": "tiny"},
+    params={"step": "own_step", "settings": '{"b": 1, "a": 2}', "folders": {"data_dir": "data"}, "threads": 1},
+    input={"code": ["x.py"], "one": "in.csv", "some": ["a", "b"]}, output={"out": "out.json"},
+))
+"""
+STEP = """
+import json, os, sys
+from gpca.errors import InputError
+def run(job):
+    print("working", file=sys.stderr)
+    if job.seed != 7:
+        raise InputError("seed", "is another", "give 7")
+    names = {name: value for name, value in vars(job).items()}
+    job.out.write_text(json.dumps(names | {"omp": os.environ["OMP_NUM_THREADS"]}, default=str))
+"""
+
+
+def test_what_a_rule_gives_is_an_attribute_and_what_it_lacks_is_named():
+    assert JOB.source == "ycb"
+    assert JOB.get("poses") is None
+    assert JOB.get("start", "none") == "none"
+    assert JOB.files("registrations") == [Path("a"), Path("b")]
+    assert JOB.section("icp") == JOB.section("encoder") == {}
+    assert JOB.by_name("gpc", ["inducing", "draws"]) == {"inducing": 6, "draws": {}}
+    assert list(JOB.per_seed("registrations")) == [(0, Path("a")), (1, Path("b"))]
+    with pytest.raises(ValueError, match="shorter"):
+        list(JOB.per_seed("poses"))
+    with pytest.raises(AttributeError, match="gives no 'encoder'"):
+        JOB.encoder  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("fault", "status", "line"),
+    [
+        (InputError("a.csv", "is empty", "fill it"), 2, "step: a.csv: is empty; fill it\n"),
+        (FileNotFoundError(2, "No such file", "a.csv"), 2, "step: [Errno 2] No such file: 'a.csv'\n"),
+        (MemoryError(), 2, "step: this machine ran out of memory; use smaller settings or another machine\n"),
+        (KeyboardInterrupt(), 130, "step: stopped; repeat the command to continue\n"),
+    ],
+)
+def test_a_fault_ends_in_one_line_and_a_status(capsys, fault, status, line):
+    def step():
+        raise fault
+
+    assert as_process("step", step) == status
+    assert capsys.readouterr().err == line
+
+
+@pytest.mark.parametrize("seed", ["7", "8"])
+def test_a_script_of_the_workflow_runs_a_step_with_what_its_rule_gives(tmp_path, seed):
+    (tmp_path / "own_step.py").write_text(STEP)
+    code = SNAKEMAKE.replace('"7"', f'"{seed}"')
+    environment = {"PYTHONPATH": f"{ROOT}:{tmp_path}", "PATH": ""}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True)
+    log = (tmp_path / "log.txt").read_text()
+    assert (done.stdout, done.stderr) == ("", "")
+    if seed == "8":
+        assert done.returncode == 2
+        assert log == "working\nown_step: seed: is another; give 7\n"
+        return
+    assert done.returncode == 0
+    given = json.loads((tmp_path / "out.json").read_text())
+    assert given == {
+        "source": "tiny", "seed": 7, "settings": {"b": 1, "a": 2}, "threads": 1, "omp": "1", "one": "in.csv",
+        "some": ["a", "b"],
+        "out": "out.json", "data_dir": "data", "downloads": ".",
+    }  # fmt: skip
