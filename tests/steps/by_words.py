@@ -84,10 +84,12 @@ def run_apart(words: list[str], folder: Path, code: str = CODE, threads: int = 1
 
 
 def module_of(step: str) -> str:
+    """Return the module of the step that has this name in tests."""
     return MODULES.get(step, f"gpca.steps.{step}")
 
 
 def job_of(step: str, words: list[str]) -> Job:
+    """Read the words as the files, names and settings that a rule would give the step."""
     values: dict[str, list[str]] = {}
     for word in words:
         if word.startswith("--"):
