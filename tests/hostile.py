@@ -25,10 +25,10 @@ _SERVER.set_forkserver_preload(["tests.hostile", "tests.preloaded"])
 
 
 def refusal(arguments: Sequence[str | Path], folder: Path, *words: str) -> str:
-    """Run ``gpca <arguments>`` in `folder`, assert that it refuses as promised, and return its line.
+    """Run a command or a step in `folder`, assert that it refuses as promised, and return its line.
 
     Args:
-        arguments: what follows ``gpca``; paths may be relative to `folder`.
+        arguments: the words for `tests.steps.by_words.main`; paths may be relative to `folder`.
         folder: the working directory; nothing may be written anywhere below it.
         words: what the line has to name, such as the file, the fault and the remedy.
     """

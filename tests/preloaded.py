@@ -5,7 +5,7 @@ It is what the steps load before they look at their input, and what each of hund
 
 from importlib import import_module
 
-from gpca.__main__ import STEPS
+from gpca.code_files import ROOT
 from gpca.explainers.registry import explainers
 
 OURS = ("gpca.config.check", "gpca.encoders.dgcnn", "gpca.objects.uw_rgbd", "gpca.objects.shapes.linemod")
@@ -15,6 +15,12 @@ LIBRARIES = (
     *("torch.fx.experimental.symbolic_shapes", "torch.utils.serialization"),
 )
 
-for module in (*(f"gpca.steps.{name.replace('-', '_')}" for name in STEPS), *OURS, *LIBRARIES):
+STEPS = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for pattern in ("steps/[!_]*.py", "experiments/*/*step.py", "commands/[!_]*.py")
+    for path in sorted((ROOT / "gpca").glob(pattern))
+]
+
+for module in (*STEPS, *OURS, *LIBRARIES):
     import_module(module)
 explainers()

@@ -73,50 +73,56 @@ def test_paths_are_sorted_and_there(monkeypatch):
         assert file.startswith(("gpca/", "baselines/"))
 
 
-STEPS = {
-    "objects": (
+STEPS = {  # module -> files that it depends on, and some that it does not
+    "gpca.steps.objects": (
         {"gpca/seeds.py", "gpca/objects/source.py"},
         {"gpca/alignment/rigid.py", "gpca/classifier/gpc.py", "gpca/explainers/interface.py"},
     ),
-    "registrations": (
+    "gpca.steps.registrations": (
         {"gpca/alignment/rigid.py", "gpca/pairs/perturbation.py"},
         {"gpca/classifier/gpc.py", "gpca/explainers/interface.py"},
     ),
-    "train": (
+    "gpca.steps.train": (
         {"gpca/encoders/training.py", "gpca/pairs/dataset.py"},
         {"gpca/classifier/gpc.py", "gpca/explainers/interface.py"},
     ),
-    "embed": (
+    "gpca.steps.embed": (
         {"gpca/encoders/training.py", "gpca/attribution/predictions.py"},
         {"gpca/classifier/gpc.py", "gpca/attribution/scores.py"},
     ),
-    "reduce": (
+    "gpca.steps.reduce": (
         {"gpca/encoders/reduction.py", "gpca/seeds.py"},
         {"gpca/encoders/training.py", "gpca/pairs/dataset.py", "gpca/classifier/gpc.py"},
     ),
-    "without": ({"gpca/encoders/training.py"}, {"gpca/classifier/gpc.py", "gpca/active_learning/acquisition.py"}),
-    "active_learning": (
+    "gpca.experiments.active_learning.without_step": (
+        {"gpca/encoders/training.py"},
+        {"gpca/classifier/gpc.py", "gpca/active_learning/acquisition.py"},
+    ),
+    "gpca.experiments.active_learning.step": (
         {"gpca/classifier/latents.py", "gpca/active_learning/stream.py"},
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
-    "new_concepts": (
+    "gpca.experiments.new_concepts.step": (
         {"gpca/causes/drawing.py", "gpca/features/dataset.py", "gpca/active_learning/new_concepts.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
-    "frame_labels": (
+    "gpca.experiments.frame_labels.step": (
         {"gpca/active_learning/new_concepts.py", "gpca/features/registered.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
     ),
-    "uncertainty": (
+    "gpca.steps.uncertainty": (
         {"gpca/alignment/icp_kernels.py", "gpca/uncertainty/designs.py"},
         {"gpca/classifier/gpc.py", "gpca/explainers/interface.py"},
     ),
-    "model": (
+    "gpca.steps.model": (
         {"gpca/classifier/gpc.py", "gpca/encoders/training.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/acquisition.py"},
     ),
-    "runtime": ({"gpca/model/explainer.py", "gpca/active_learning/acquisition.py"}, {"gpca/explainers/interface.py"}),
-    "attribute": (
+    "gpca.experiments.runtime.step": (
+        {"gpca/model/explainer.py", "gpca/active_learning/acquisition.py"},
+        {"gpca/explainers/interface.py"},
+    ),
+    "gpca.steps.attribute": (
         {"gpca/explainers/interface.py", "gpca/attribution/scores.py"},
         {"gpca/classifier/gpc.py", "gpca/uncertainty/designs.py", "gpca/encoders/training.py"},
     ),
@@ -126,7 +132,7 @@ STEPS = {
 @pytest.mark.parametrize("step", STEPS)
 def test_a_step_depends_on_what_it_uses_and_not_on_later_steps(step):
     used, later = STEPS[step]
-    files = set(code_files(f"gpca.steps.{step}"))
+    files = set(code_files(step))
     assert used <= files
     assert not later & files
     assert not [file for file in files if file.startswith("gpca/reporting/") or file == "gpca/attribution/metrics.py"]
@@ -148,7 +154,7 @@ for step in {sorted(STEPS)}:
     if os.fork():
         assert os.wait()[1] == 0, step
     else:
-        import_module("gpca.steps." + step)
+        import_module(step)
         print(step, *(name for name in sys.modules if name.split(".")[0] == "gpca"), flush=True)
         os._exit(0)
 """
@@ -156,7 +162,7 @@ for step in {sorted(STEPS)}:
     lines = [line.split() for line in loaded.stdout.splitlines()]
     assert [step for step, *_ in lines] == sorted(STEPS)
     for step, *modules in lines:
-        files = set(code_files(f"gpca.steps.{step}"))
+        files = set(code_files(step))
         for module in modules:
             if importlib.util.find_spec(module).submodule_search_locations is None:
                 assert module.replace(".", "/") + ".py" in files, step

@@ -1,4 +1,4 @@
-"""``python -m gpca`` itself: its help, its version, wrong usage. Its steps are in tests/steps/."""
+"""``python -m gpca`` itself: its help, its version, wrong usage. Its commands are in tests/steps/ and tests/config/."""
 
 import re
 import subprocess
@@ -7,9 +7,8 @@ import sys
 import pytest
 
 import gpca
-from gpca.__main__ import COMMANDS
+from gpca.__main__ import COMMANDS, main
 from gpca.code_files import ROOT
-from tests.steps.by_words import main
 
 
 def test_help_and_wrong_usage_need_no_heavy_library():
@@ -21,17 +20,17 @@ def test_help_and_wrong_usage_need_no_heavy_library():
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0
     assert done.stdout.endswith("set()\n")
-    for step in COMMANDS:
-        assert step in done.stdout
+    for command in COMMANDS:
+        assert command in done.stdout
 
 
-@pytest.mark.parametrize("step", [None, *COMMANDS])
-def test_help_is_plain_text(capsys, step):
+@pytest.mark.parametrize("command", [None, *COMMANDS])
+def test_help_is_plain_text(capsys, command):
     with pytest.raises(SystemExit) as caught:
-        main([step, "--help"] if step else ["--help"])
+        main([command, "--help"] if command else ["--help"])
     assert caught.value.code == 0
     out = capsys.readouterr().out
-    assert out.startswith(f"usage: python -m gpca {step or ''}")
+    assert out.startswith(f"usage: python -m gpca {command or ''}")
     assert not re.search(r"`|:\w+:|None", out), out
 
 
@@ -39,7 +38,7 @@ def test_the_command_goes_by_the_name_that_it_was_called_by(capsys, monkeypatch)
     monkeypatch.setattr(sys, "argv", ["/somewhere/bin/gpca"])
     with pytest.raises(SystemExit):
         main(["--help"])
-    assert capsys.readouterr().out.startswith("usage: gpca [-h] [--version] step")
+    assert capsys.readouterr().out.startswith("usage: gpca [-h] [--version] command")
 
 
 def test_the_version(capsys):
@@ -49,7 +48,7 @@ def test_the_version(capsys):
     assert capsys.readouterr().out == f"gpca {gpca.__version__}\n"
 
 
-@pytest.mark.parametrize("words", [[], ["nosuchstep"], ["train", "--seed", "one"], ["objects"]])
+@pytest.mark.parametrize("words", [[], ["train"], ["explain", "--threads", "one"], ["explain"]])
 def test_wrong_usage_is_argparses_status_2(words, capsys):
     with pytest.raises(SystemExit) as caught:
         main(words)

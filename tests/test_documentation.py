@@ -13,7 +13,7 @@ from importlib.util import find_spec
 import pytest
 import yaml
 
-from gpca.__main__ import STEPS, module_of
+from gpca.__main__ import COMMANDS
 from gpca.experiments.controls.settings import CONTROLS
 from gpca.experiments.results import registered
 from gpca.objects.entry import Source
@@ -61,10 +61,10 @@ def test_every_make_target_and_variable_exists(command):
 
 @cache
 def options_of(program):
-    """The options that a step of `python -m gpca`, or a script, has."""
-    if program in STEPS:
+    """The options that a command of `python -m gpca`, or a script, has."""
+    if program in COMMANDS:
         parser = ArgumentParser()
-        import_module(module_of(program)).add_arguments(parser)
+        import_module(f"gpca.commands.{program.replace('-', '_')}").add_arguments(parser)
         return {"--threads", "--settings", *parser._option_string_actions}
     shown = subprocess.run([sys.executable, program, "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
     return set(re.findall(r"--[\w-]+", shown.stdout))
@@ -78,9 +78,9 @@ def test_every_python_command_names_something_that_is_there(command):
         assert (ROOT / words[0]).is_file()
         assert not flags or flags <= options_of(words[0])
     elif words[1] == "gpca":
-        step = (*words[2:], "--help")[0]
-        assert step in STEPS or step in ("<step>", "--help", "--version")
-        assert step not in STEPS or flags <= options_of(step)
+        name = (*words[2:], "--help")[0]
+        assert name in (*COMMANDS, "--help", "--version")
+        assert name not in COMMANDS or flags <= options_of(name)
     else:
         assert find_spec(words[1]) is not None
 
@@ -188,16 +188,18 @@ def test_every_key_of_a_source_is_described():
     assert sorted(names) == sorted(keys)
 
 
-def test_the_resources_of_the_cluster_page_are_those_of_the_rules():
+def test_the_resources_of_the_cluster_page_are_those_of_the_rules_and_the_profile():
     files = set((ROOT / "workflow/rules").rglob("*.smk")) - {ROOT / "workflow/rules/targets.smk"}
     rules = "".join(path.read_text() for path in files)
+    profile = yaml.safe_load((ROOT / "profiles/default/config.yaml").read_text())
     page = (ROOT / "docs/cluster.md").read_text()
+    usual = {"threads": 1} | profile["default-resources"]
     for declared, pattern in {
         "threads": r"threads: (\d+)$",
         "mem_mb": r"mem_mb=(\d+)",
         "runtime": r"runtime=(\d+)",
     }.items():
-        values = sorted(set(map(int, re.findall(pattern, rules, re.MULTILINE))))
+        values = sorted({usual[declared], *map(int, re.findall(pattern, rules, re.MULTILINE))})
         [shown] = re.findall(rf"^\| `{declared}`.*\| (\d+(?: to \d+)?)\b[^|]*\|$", page, re.MULTILINE)
         assert shown == (f"{values[0]} to {values[-1]}" if len(values) > 1 else str(values[0]))
 

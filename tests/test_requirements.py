@@ -5,6 +5,7 @@ import importlib.metadata
 import re
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 import yaml
@@ -12,12 +13,12 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from gpca.alignment.methods.registry import methods
+from gpca.code_files import code_files
 
 from .documents import ROOT
 
-ROOMS = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "gpca").iterdir() if path.is_dir())
-LIBRARY = ("baselines", *(room for room in ROOMS if room != "gpca/reporting"))  # what steps import, and `gpca explain`
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+RUNS, CHECKS = ("gpca", "baselines", "workflow"), ("benchmarks", "tests")
 EXTRAS = ("workflow", "methods", "dev")
 # Imported by their names, and only where they are installed; nothing else is missing without them.
 OPTIONAL = {canonicalize_name(entry.package) for entry in methods().values() if entry.package}
@@ -92,34 +93,41 @@ def test_the_lock_holds_nothing_that_nothing_needs():
     assert set(pinned()) == {name for name, *_ in needed}
 
 
-def imported(*folders):
-    """Packages of others that the files of the folders import, anywhere in their text."""
+def files_of(*folders):
+    return [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+
+
+def library():
+    """The files of the steps and of `gpca explain`."""
+    steps = [*(ROOT / "gpca/steps").glob("[!_]*.py"), *(ROOT / "gpca/experiments").rglob("*step.py")]
+    modules = (".".join(path.relative_to(ROOT).with_suffix("").parts) for path in steps)
+    return [*map(Path, code_files(*modules, "gpca.commands.explain")), *files_of("baselines")]
+
+
+def imported(files):
+    """Packages of others that the files import, anywhere in their text."""
     modules = set()
-    for file in (file for folder in folders for file in (ROOT / folder).rglob("*.py")):
+    for file in files:
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.Import):
                 modules |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 modules.add(node.module.split(".")[0])
-    others = modules - sys.stdlib_module_names - {"gpca", "baselines", "benchmarks", "tests"}
+    others = modules - sys.stdlib_module_names - {"gpca", "baselines", "benchmarks", "docs", "tests"}
     return {canonicalize_name(CALLED.get(module, module)) for module in others}
 
 
 @pytest.mark.parametrize(
-    ("folders", "lists"),
-    [
-        (LIBRARY, ()),
-        (("gpca", "baselines", "workflow"), ("workflow",)),
-        (("gpca", "baselines", "workflow", "benchmarks", "tests"), ("workflow", "dev")),
-    ],
+    ("files", "lists"),
+    [(library(), ()), (files_of(*RUNS), ("workflow",)), (files_of(*RUNS, *CHECKS), ("workflow", "dev"))],
 )
-def test_what_is_imported_is_named_where_it_is_needed(folders, lists):
-    assert imported(*folders) <= {canonicalize_name(requirement.name) for requirement in requirements(*lists)}
+def test_what_is_imported_is_named_where_it_is_needed(files, lists):
+    assert imported(files) <= {canonicalize_name(requirement.name) for requirement in requirements(*lists)}
 
 
 def test_what_is_named_is_imported_or_run():
     named = {canonicalize_name(requirement.name) for requirement in requirements(*EXTRAS)}
-    assert named == imported("gpca", "baselines", "workflow", "benchmarks", "tests") | RUN | OPTIONAL
+    assert named == imported(files_of(*RUNS, *CHECKS)) | RUN | OPTIONAL
 
 
 def test_what_is_optional_is_an_extra_of_its_own():

@@ -14,8 +14,6 @@ from gpca.io.names import Axes
 from gpca.pairs.dataset import CLOUDS, REGISTRATION_COLUMNS, Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
-MADE_BY = "python -m gpca causes"
-
 
 @dataclass(frozen=True)
 class Causes:
@@ -82,7 +80,7 @@ class Causes:
         Raises:
             InputError: the file is missing, damaged, of another source or seed, or holds wrong shapes or NaN.
         """
-        registrations = Registrations.load(path, axes, MADE_BY)
+        registrations = Registrations.load(path, axes)
         n, subsets = len(registrations), len(SUBSETS)
         tested = int((registrations.split == "test").sum())
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(COLUMNS, (n,)) | dict.fromkeys(LIMITS, ())
@@ -90,7 +88,7 @@ class Causes:
         shapes |= {"T_target_source_runs": (n, "n", 4, 4)} | dict.fromkeys(MEASURED, (n, subsets))
         shapes |= {f"{name}_again": (tested, subsets) for name in MEASURED}
         kinds = dict.fromkeys(shapes, REAL) | {"applied": "b", "symmetric": "b", "candidate": "iu"}
-        arrays = load_arrays(path, shapes, MADE_BY, kinds)
+        arrays = load_arrays(path, shapes, kinds)
         limits = {name: float(arrays[name]) for name in LIMITS}
         truth, truth_again = (
             Truth(arrays[f"error{again}"], arrays[f"uncertainty{again}"], **limits) for again in ("", "_again")

@@ -35,7 +35,7 @@ COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` are those of the classifier, as of the explainer ``gpca``."""
     parser.add_argument("registrations", type=Path)
-    parser.add_argument("--embeddings", required=True, type=Path, help="embeddings as written by the step embed")
+    parser.add_argument("--embeddings", required=True, type=Path, help="its embeddings")
     parser.add_argument("--labels", required=True, type=Path, help="CSV to which the answers are appended")
     parser.add_argument(
         "--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labeled at the start"

@@ -131,7 +131,7 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
         if not np.isfinite(h).all():
-            raise InputError(role, "contain NaN or infinity", "regenerate them with 'python -m gpca embed'")
+            raise InputError(role, "contain NaN or infinity", "regenerate them with Snakemake")
     if reduction is None:
         return np.asarray(h_S_d, np.float32)
     require_room(name, reduction, *h_train_N_d.shape)

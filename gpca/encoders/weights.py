@@ -25,7 +25,6 @@ def load_model(
     classes: tuple[str, ...] = CONCEPTS,
     axes: Axes | None = None,
     unlike: Axes | None = None,
-    step: str = "train",
 ) -> Classifier:
     """Load encoder and head as the steps that train wrote them, ready for inference.
 
@@ -35,14 +34,12 @@ def load_model(
         classes: those of its head.
         axes: the source and the seed that it has to be of; it may be of any where this is None.
         unlike: the source and the seed that it must not be of.
-        step: that writes it.
 
     Raises:
         InputError: missing, damaged, pickled or another encoder's weights, or those of another source or seed.
     """
     model = make_model(settings, classes)
-    made_by = f"python -m gpca {step}"
-    remedy = f"regenerate them with '{made_by}'"
+    remedy = "regenerate them with Snakemake"
     require_file(path, "no such weights", remedy)
     try:
         content = read_tensors(path)
@@ -50,7 +47,7 @@ def load_model(
         model.load_state_dict(content["weights"])
     except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
         raise InputError(path, f"not the weights of backbone '{settings.backbone}', or damaged", remedy) from fault
-    require_axes(path, own_axes, axes, made_by)
+    require_axes(path, own_axes, axes)
     if own_axes == unlike:
         raise InputError(path, "was trained on the same samples", "give weights of another source or seed")
     return model.eval()

@@ -19,12 +19,11 @@ from gpca.features.motion import STARTS, describe_motion, describe_starts
 from gpca.features.pair import ObservedPair, observed_pair
 from gpca.features.remedied import REMEDIED, describe_remedied
 from gpca.features.settings import DescriptorSettings
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
 
-MADE_BY = "python -m gpca describe"
 WIDTHS = {  # of the groups
     "distances": 4 * QUANTILES,
     "planes": 3 * QUANTILES + len(DENSITIES),
@@ -64,11 +63,9 @@ class Descriptors:
         """
         shapes: dict[str, tuple[int | str, ...]] = {name: ("S", WIDTHS[name]) for name in GROUPS}
         kinds = dict.fromkeys(GROUPS, REAL) | {"sample": WHOLE, "split": TEXT}
-        arrays = load_arrays(path, shapes | {"sample": ("S",), "split": ("S",)}, MADE_BY, kinds, registrations.axes)
+        arrays = load_arrays(path, shapes | {"sample": ("S",), "split": ("S",)}, kinds, registrations.axes)
         if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-            raise InputError(
-                path, "its samples differ from those of the registrations", f"regenerate it with '{MADE_BY}'"
-            )
+            raise InputError(path, "its samples differ from those of the registrations", REGENERATE)
         return cls(arrays["sample"], arrays["split"], {name: arrays[name] for name in GROUPS}, registrations.axes)
 
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.arrays import TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.seeds import generator
-
-MADE_BY = "python -m gpca instances"
 
 
 @dataclass(frozen=True)
@@ -87,10 +85,9 @@ class Instances:
         kinds = dict.fromkeys(shapes, WHOLE) | dict.fromkeys(("camera_3_3", "points_m"), "f")
         kinds |= {name: "f" for name in shapes if name.startswith("T_")}
         kinds |= dict.fromkeys(("dataset", "colour", "init_from"), TEXT) | {"symmetric": "b"}
-        arrays = load_arrays(path, shapes, MADE_BY, kinds, None if source is None else (source, None))
-        remedy = f"regenerate it with '{MADE_BY}'"
+        arrays = load_arrays(path, shapes, kinds, None if source is None else (source, None))
         offsets = arrays["offsets"]
         whole = len(offsets) == len(arrays["scene"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays["points_m"])
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
-            raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", remedy)
+            raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", REGENERATE)
         return cls(**{name: arrays[name] for name in shapes})

@@ -16,6 +16,7 @@ from gpca.io.files import whole_file
 from gpca.io.limits import LARGEST_NUMBER, is_bounded, require_file, require_memory
 from gpca.io.names import SPLITS, Axes, is_name, require_axes
 
+REGENERATE = "regenerate it with Snakemake"
 TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy
 _KNOWN = f"b{REAL}{TEXT}"
 _FLOAT_BYTES = (4, 8)
@@ -39,7 +40,6 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray], axes: Axes |
 def load_arrays(
     path: str | Path,
     shapes: Mapping[str, tuple[int | str, ...]],
-    made_by: str,
     kinds: Mapping[str, str] | None = None,
     axes: Axes | None = None,
     optional: Collection[str] = (),
@@ -52,7 +52,6 @@ def load_arrays(
         path: the file.
         shapes: for each needed array its shape; a number must match, a letter (``"S"``) must be the
             same size wherever it occurs.
-        made_by: the command that writes such a file; named in the message.
         kinds: for some of them what they may hold: `TEXT`, `WHOLE` or `REAL`. Any other may hold each of these.
         axes: the source and seed that the file has to be of; it may be of any where this is None.
         optional: arrays that may be missing, as ``source`` in a file that a user's own program wrote.
@@ -63,22 +62,21 @@ def load_arrays(
             file of another source or seed, or one that does not say.
     """
     path = Path(path)
-    require_file(path, "no such file", f"make it with '{made_by}'", math.inf)
-    remedy = f"regenerate it with '{made_by}'"
+    require_file(path, "no such file", "make it with Snakemake", math.inf)
     shapes, kinds = _with_axes(shapes, kinds or {}, axes)
     try:
         with zipfile.ZipFile(path) as archive:
-            members = _checked_members(archive, path, shapes, kinds, optional, remedy)
+            members = _checked_members(archive, path, shapes, kinds, optional)
             arrays = {name: _read_array(archive, info) for name, info in members.items()}
     except InputError:
         raise
     except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
-        raise InputError(path, "is not a readable npz archive", remedy) from fault
+        raise InputError(path, "is not a readable npz archive", REGENERATE) from fault
     for name, array in arrays.items():
         if (found := _fault_of(name, array)) is not None:
-            raise InputError(path, f"array '{name}' contains {found}", remedy)
+            raise InputError(path, f"array '{name}' contains {found}", REGENERATE)
     if axes is not None and "source" in arrays:
-        require_axes(path, axes_in(arrays), axes, made_by)
+        require_axes(path, axes_in(arrays), axes)
     return arrays
 
 
@@ -108,7 +106,7 @@ def _fault_of(name: str, array: np.ndarray) -> str | None:
     return None
 
 
-def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str, zipfile.ZipInfo]:
+def _checked_members(archive, path, shapes, kinds, optional) -> dict[str, zipfile.ZipInfo]:
     """Return the member of each array, once its header is found to be right."""
     listed = archive.namelist()
     sizes: dict[str, int] = {}
@@ -117,23 +115,23 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
         if (count := listed.count(f"{name}.npy")) == 0 and name in optional:
             continue
         if count != 1:
-            raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
+            raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", REGENERATE)
         members[name] = info = archive.getinfo(f"{name}.npy")
         if not is_bounded(info):
-            raise InputError(path, f"array '{name}' uses a compression that npz does not support", remedy)
+            raise InputError(path, f"array '{name}' uses a compression that npz does not support", REGENERATE)
         with archive.open(info) as stream:
             actual, dtype, start = _npy_header(stream)
         if dtype.hasobject:
-            raise InputError(path, "contains pickled objects, which are never loaded", remedy)
-        _check_shape(path, name, actual, shape, sizes, remedy)
+            raise InputError(path, "contains pickled objects, which are never loaded", REGENERATE)
+        _check_shape(path, name, actual, shape, sizes)
         if math.prod(actual) and dtype.kind not in kinds.get(name, _KNOWN):
-            raise InputError(path, f"array '{name}' has type {dtype}", remedy)
+            raise InputError(path, f"array '{name}' has type {dtype}", REGENERATE)
         if (dtype.kind == "f" and dtype.itemsize not in _FLOAT_BYTES) or not dtype.isnative:
             # Half precision has lost digits, and neither torch nor LAPACK calculates with more than double.
-            raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", remedy)
+            raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", REGENERATE)
         if start + math.prod(actual) * dtype.itemsize != info.file_size:
             raise ValueError(f"array '{name}' is not as long as its header says")
-    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
+    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, REGENERATE)
     return members
 
 
@@ -151,11 +149,13 @@ def _read_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
         return np.lib.format.read_array(stream, allow_pickle=False)
 
 
-def _check_shape(path, name, actual, shape, sizes, remedy) -> None:
+def _check_shape(path, name, actual, shape, sizes) -> None:
     matches = len(actual) == len(shape) and all(
         sizes.setdefault(size, found) == found if isinstance(size, str) else size == found
         for size, found in zip(shape, actual, strict=True)
     )
     if not matches:
         expected = "×".join(str(sizes.get(size, size)) for size in shape) or "scalar"
-        raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {expected}", remedy)
+        raise InputError(
+            path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {expected}", REGENERATE
+        )

@@ -27,8 +27,8 @@ def _in_words(axes: Axes) -> str:
     return f"source '{source}'" + ("" if seed is None else f", seed {seed}")
 
 
-def require_axes(path: str | Path, found: Axes, expected: Axes | None, made_by: str) -> None:
+def require_axes(path: str | Path, found: Axes, expected: Axes | None) -> None:
     """Raise an InputError unless a file is of the source and seed that are expected; of any where that is None."""
     if expected is not None and found != expected:
-        remedy = f"give the file of {_in_words(expected)}, or make it with '{made_by}'"
-        raise InputError(path, f"is of {_in_words(found)}, not of {_in_words(expected)}", remedy)
+        wanted = _in_words(expected)
+        raise InputError(path, f"is of {_in_words(found)}, not of {wanted}", f"give the file of {wanted}")

@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca import seeds
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import is_name
 from gpca.objects.surface import Surface
 from gpca.process.environment import open3d_cloud, require_open3d
@@ -217,36 +217,34 @@ class ObjectClouds:
 
         A file that does not say of which source it is may be of any: rules of users' own write such files.
         """
-        made_by = f"snakemake -j2 {path}"
-        remedy = f"regenerate it with '{made_by}'"
         shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
         kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE}
         axes = None if source is None else (source, None)
-        arrays = load_arrays(path, shapes, made_by, kinds, axes, optional=("source",))
+        arrays = load_arrays(path, shapes, kinds, axes, optional=("source",))
         points_m, offsets, names = arrays["points_m"], arrays["offsets"], arrays["names"].tolist()
         whole = len(offsets) == len(names) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
         if not whole or not names or not (np.diff(offsets) > 0).all():
-            raise InputError(path, "names, offsets and points do not match", remedy)
+            raise InputError(path, "names, offsets and points do not match", REGENERATE)
         if len(set(names)) < len(names):
-            raise InputError(path, "contains two objects with the same name", remedy)
+            raise InputError(path, "contains two objects with the same name", REGENERATE)
         parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
         objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)))
         for i, name in enumerate(names):
-            objects._require_object(i, f"{path}, object '{name}'", remedy)
+            objects._require_object(i, f"{path}, object '{name}'")
         return objects
 
-    def _require_object(self, i: int, subject: str, remedy: str) -> None:
+    def _require_object(self, i: int, subject: str) -> None:
         points_m, diameter_m = self.points(i), self.diameters_m[i]
         if not SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
-            raise InputError(subject, f"its diameter is {diameter_m:.4g} m", remedy)
+            raise InputError(subject, f"its diameter is {diameter_m:.4g} m", REGENERATE)
         # From the center of its box, no point of an object is farther away than its diameter.
         extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
         if np.abs(points_m).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
             found = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
-            raise InputError(subject, f"{found}, or they are not centered", remedy)
+            raise InputError(subject, f"{found}, or they are not centered", REGENERATE)
         lengths = np.linalg.norm(self.normals(i), axis=1)
         if np.abs(lengths - 1).max() > UNIT_TOLERANCE:
-            raise InputError(subject, "a normal is not of unit length", remedy)
+            raise InputError(subject, "a normal is not of unit length", REGENERATE)
 
     def __len__(self) -> int:
         return len(self.names)

@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, TEXT, WHOLE, axes_in, load_arrays, save_arrays
+from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, axes_in, load_arrays, save_arrays
 from gpca.io.names import SPLITS, Axes
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
@@ -110,15 +110,12 @@ class Registrations:
         save_arrays(path, {name: getattr(self, name) for name in (*REGISTRATION_COLUMNS, *CLOUDS)}, self.axes)
 
     @classmethod
-    def load(
-        cls, path: str | Path, axes: Axes | None = None, made_by: str = "python -m gpca registrations"
-    ) -> Registrations:
+    def load(cls, path: str | Path, axes: Axes | None = None) -> Registrations:
         """Read the npz.
 
         Args:
             path: the file.
             axes: the source and the seed that it has to be of; it may be of any where this is None.
-            made_by: the command that writes it, where that is another.
 
         Raises:
             InputError: the file is missing, damaged, of another source or seed, holds pickled objects, wrong shapes,
@@ -130,19 +127,18 @@ class Registrations:
         kinds = dict.fromkeys(shapes, REAL) | dict.fromkeys(("split", "concept", "object_name"), TEXT)
         kinds |= dict.fromkeys(("sample", "object_index", "offsets", "target_offsets"), WHOLE)
         of = {"source": TEXT, "seed": WHOLE}
-        arrays = load_arrays(path, shapes | dict.fromkeys(of, ()), made_by, kinds | of, axes)
-        remedy = f"regenerate it with '{made_by}'"
+        arrays = load_arrays(path, shapes | dict.fromkeys(of, ()), kinds | of, axes)
         for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):
             offsets = arrays[ends]
             if len(offsets) != len(arrays["sample"]) + 1 or offsets[0] != 0 or offsets[-1] != len(arrays[points]):
-                raise InputError(path, f"'{ends}' do not match '{points}' and 'sample'", remedy)
+                raise InputError(path, f"'{ends}' do not match '{points}' and 'sample'", REGENERATE)
             if len(offsets) == 1 or (np.diff(offsets) < 3).any():
-                raise InputError(path, "has no samples, or a cloud of fewer than 3 points", remedy)
+                raise InputError(path, "has no samples, or a cloud of fewer than 3 points", REGENERATE)
         if unknown := set(arrays["concept"].tolist()) - set(CONCEPTS):
             raise InputError(path, f"unknown concept {sorted(unknown)[0]!r}", f"expected one of {', '.join(CONCEPTS)}")
         for name, within in _possible(arrays).items():
             if not within.all():
-                raise InputError(path, f"'{name}' contains impossible values", remedy)
+                raise InputError(path, f"'{name}' contains impossible values", REGENERATE)
         columns: dict[str, Any] = {name: arrays[name] for name in shapes}
         return cls(**columns, axes=axes_in(arrays))
 
@@ -184,7 +180,7 @@ def joined(parts: Sequence[Registrations]) -> Registrations:
 
 
 def load_embeddings(
-    path: str | Path, registrations: Registrations, shapes: Mapping[str, tuple[int | str, ...]], made_by: str
+    path: str | Path, registrations: Registrations, shapes: Mapping[str, tuple[int | str, ...]]
 ) -> dict[str, np.ndarray]:
     """Read arrays of the registrations from a file of embeddings; see :func:`gpca.io.arrays.load_arrays`.
 
@@ -192,25 +188,20 @@ def load_embeddings(
         InputError: also where the file is of other samples, or of another source or seed.
     """
     kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT}
-    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, made_by, kinds, registrations.axes)
+    arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, kinds, registrations.axes)
     if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-        raise InputError(path, "its samples differ from those of the registrations", f"regenerate it with '{made_by}'")
+        raise InputError(path, "its samples differ from those of the registrations", REGENERATE)
     return arrays
 
 
-def read_embedding(
-    path: str | Path, registrations: Registrations, step: str = "embed", logits: bool = False
-) -> dict[str, np.ndarray]:
+def read_embedding(path: str | Path, registrations: Registrations, logits: bool = False) -> dict[str, np.ndarray]:
     """Read what is attached to the registrations of an encoder: ``embedding`` (S, d), if asked ``head_logits`` (S, C).
-
-    Args:
-        step: that makes the file.
 
     Raises:
         InputError: as :func:`load_embeddings`.
     """
     shapes = {"h": ("S", "d")} | ({"head_logits": ("S", "C")} if logits else {})
-    arrays = load_embeddings(path, registrations, shapes, f"python -m gpca {step}")
+    arrays = load_embeddings(path, registrations, shapes)
     return {"embedding": arrays["h"]} | ({"head_logits": arrays["head_logits"]} if logits else {})
 
 

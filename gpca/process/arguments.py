@@ -1,9 +1,9 @@
-"""Options of a command line: a parser that refuses in one line, types for numbers, and files one per seed."""
+"""Options of a command line: a parser that refuses in one line, and types for numbers."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NoReturn
 
 from gpca.errors import InputError
@@ -44,24 +44,4 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
 # More threads than any machine of today has cores; OpenMP and numba crash where they cannot start as many as they are
 # told to, which is at some thousands.
 THREADS = whole_number(1, 256)
-SEED = whole_number(0, 2**32 - 1)  # what the config takes: UMAP's generator is seeded with 32 bits
-SURFACE_POINTS = whole_number(256, 2**20)  # of the config's objects.surface_points
 COUNT = whole_number(1, 10**6)  # of what is small; a million of anything that is asked for by hand is a slip
-
-
-def per_seed(options: argparse.Namespace, *names: str) -> Iterator[tuple]:
-    """Yield for each of ``options.seeds`` the seed and the file that each of the named options gives for it.
-
-    Raises:
-        InputError: at the call, when an option gives fewer or more files than there are seeds.
-    """
-    for name in names:
-        require_files(options, name, len(options.seeds), "seed(s)")
-    return zip(options.seeds, *(getattr(options, name) for name in names), strict=True)
-
-
-def require_files(options: argparse.Namespace, name: str, wanted: int, things: str) -> None:
-    """Raise an InputError unless the option gives as many files as there are things."""
-    if (given := len(getattr(options, name))) != wanted:
-        fault = f"{given} file(s) for {wanted} {things}"
-        raise InputError(f"--{name.replace('_', '-')}", fault, "give one for each, in the same order")

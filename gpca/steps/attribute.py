@@ -10,6 +10,7 @@ from gpca.attribution.predictions import read_timings, write_predictions, write_
 from gpca.errors import InputError
 from gpca.explainers.interface import Describing, ExplainerEntry
 from gpca.explainers.registry import explainer_entry
+from gpca.io.arrays import REGENERATE
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
@@ -28,7 +29,7 @@ def run(job: Job) -> None:
         explainer = entry.make(job.source, seed, **job.settings)
         with record_provenance([predictions, timings], [path for path in inputs if path], job.settings, seed=seed):
             axes = (job.get("files_of", job.source), job.get("files_seed", seed))
-            registrations = _load(job.explainer, entry, axes, *inputs)
+            registrations = _load(entry, axes, *inputs)
             observed = registrations if entry.oracle else registrations.without_labels()
             started = perf_counter()
             if isinstance(explainer, Describing):  # once, for what it learns from and what it is asked about
@@ -48,40 +49,25 @@ def run(job: Job) -> None:
 
 
 def _load(
-    name: str,
     entry: ExplainerEntry,
     axes: Axes,
     registrations: Path,
-    embeddings: Path | None,
-    uncertainty: Path | None,
-    uncertainty_timings: Path | None,
+    embeddings: Path,
+    uncertainty: Path,
+    uncertainty_timings: Path,
     timings: Path,
-):
+) -> Registrations:
     """Return the registrations that the explainer gets, with what it reads and the seconds spent before attached."""
     loaded = Registrations.load(registrations, axes)
     seconds_S, icp_seconds_S = read_timings(timings, loaded)
-    earlier = {"earlier_seconds": seconds_S, "earlier_icp_seconds": icp_seconds_S}
-    loaded = replace(loaded, attached=earlier)
+    attached = {"earlier_seconds": seconds_S, "earlier_icp_seconds": icp_seconds_S}
     if entry.design:
-        if uncertainty is None or uncertainty_timings is None:
-            raise InputError(
-                f"explainer '{name}'",
-                f"reads the uncertainty of design '{entry.design}'",
-                "give it with --uncertainty and --uncertainty-timings",
-            )
         outcomes = Outcomes.load(uncertainty, axes)
-        found = outcomes.uncertainty.shape[1]
-        if entry.design in CONDITIONS and found != len(CONDITIONS[entry.design]):
-            remedy = f"make it with 'python -m gpca uncertainty --design {entry.design}'"
-            raise InputError(uncertainty, f"{found} conditions are not those of design '{entry.design}'", remedy)
-        return outcomes.attach_to(loaded, *read_seconds(uncertainty_timings, outcomes))
+        conditions = outcomes.uncertainty.shape[1]
+        if entry.design in CONDITIONS and conditions != len(CONDITIONS[entry.design]):
+            fault = f"{conditions} conditions are not those of design '{entry.design}'"
+            raise InputError(uncertainty, fault, REGENERATE)
+        return outcomes.attach_to(replace(loaded, attached=attached), *read_seconds(uncertainty_timings, outcomes))
     if entry.reads == "embeddings":
-        return _with_embedding(loaded, embeddings, name)
-    return loaded
-
-
-def _with_embedding(registrations: Registrations, path: Path | None, explainer: str) -> Registrations:
-    if path is None:
-        raise InputError(f"explainer '{explainer}'", "reads embeddings", "give them with --embeddings")
-    own = read_embedding(path, registrations, logits=True)
-    return replace(registrations, attached={**registrations.attached, **own})
+        attached |= read_embedding(embeddings, loaded, logits=True)
+    return replace(loaded, attached=attached)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gpca.encoders.reduction import make_reduction, reduce
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 
@@ -17,11 +17,11 @@ def run(job: Job) -> None:
     make_reduction(job.reduction, job.settings)
     for seed, embeddings, out in job.per_seed("embeddings", "out"):
         with record_provenance([out], [embeddings], job.settings, seed=seed):
-            arrays = load_arrays(embeddings, SHAPES, "python -m gpca embed", KINDS, (job.source, seed))
+            arrays = load_arrays(embeddings, SHAPES, KINDS, (job.source, seed))
             h_S_d = arrays["h"]
             train_S = arrays["split"] == "train"
             if not train_S.any():
-                raise InputError(embeddings, "has no training samples", "regenerate it with 'python -m gpca embed'")
+                raise InputError(embeddings, "has no training samples", REGENERATE)
             axes = (job.source, seed, "reduction")
             reduced_S_c = reduce(job.reduction, h_S_d[train_S], h_S_d, job.settings, *axes)
             save_arrays(out, {name: arrays[name] for name in SHAPES} | {"h": reduced_S_c}, (job.source, seed))

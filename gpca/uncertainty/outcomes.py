@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import read_numbers, write_csv
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations
@@ -72,7 +72,7 @@ class Outcomes:
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys((field.name for field in fields(cls)), ("S", "K"))
         shapes |= {"sample": ("S",), "split": ("S",), "covariance": ("S", "K", 6, 6)}
         kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT, "icp_calls": WHOLE, "degenerate": "b"}
-        arrays = load_arrays(path, shapes, "python -m gpca uncertainty", kinds, axes)
+        arrays = load_arrays(path, shapes, kinds, axes)
         return cls(**{name: arrays[name] for name in shapes})
 
 
@@ -98,6 +98,5 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
     shape = outcomes.uncertainty.shape
     of = {name: np.repeat(getattr(outcomes, name).astype(str), shape[1]) for name in ("sample", "split")}
     if not all(np.array_equal(rows[name], values) for name, values in of.items()):
-        remedy = "regenerate it with 'python -m gpca uncertainty'"
-        raise InputError(path, "its samples differ from those of the outcomes", remedy)
+        raise InputError(path, "its samples differ from those of the outcomes", REGENERATE)
     return rows["seconds"].to_numpy().reshape(shape), rows["icp_seconds"].to_numpy().reshape(shape)

@@ -55,4 +55,4 @@ def test_faulty_files_are_refused_with_their_name(file, name, damage, message):
     with pytest.raises(InputError, match=message) as caught:
         Causes.load(file)
     assert str(caught.value).startswith(f"{file}: ")
-    assert "python -m gpca causes" in str(caught.value) or "expected one of" in str(caught.value)
+    assert "with Snakemake" in str(caught.value) or "expected one of" in str(caught.value)

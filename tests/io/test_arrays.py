@@ -13,7 +13,7 @@ GOOD = {"points": np.arange(12.0).reshape(4, 3), "labels": np.array(["a", "b", "
 def test_arrays_survive_the_file_and_give_the_same_bytes_twice(tmp_path):
     first, second = tmp_path / "a.npz", tmp_path / "b.npz"
     save_arrays(first, GOOD)
-    loaded = load_arrays(first, SHAPES, "python -m gpca objects")
+    loaded = load_arrays(first, SHAPES)
     for name, array in GOOD.items():
         assert loaded[name].dtype == array.dtype
         assert np.array_equal(loaded[name], array)
@@ -80,8 +80,8 @@ def test_faulty_files_are_refused_in_one_line(tmp_path, write, expected):
     path = tmp_path / "arrays.npz"
     write(path)
     with pytest.raises(InputError, match=expected) as caught:
-        load_arrays(path, SHAPES, "python -m gpca objects")
+        load_arrays(path, SHAPES)
     line = str(caught.value)
     assert line.startswith(f"{path}: ")
-    assert line.endswith("with 'python -m gpca objects'")
+    assert line.endswith("with Snakemake")
     assert "\n" not in line

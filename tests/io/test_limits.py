@@ -24,7 +24,7 @@ from gpca.objects.mesh_folder import files_in, surfaces
 
 NOBODY = 65534
 READERS = {
-    "arrays.npz": lambda path: load_arrays(path, {"x": ("N",)}, "step"),
+    "arrays.npz": lambda path: load_arrays(path, {"x": ("N",)}),
     "rows.csv": lambda path: read_csv(path, ["x"]),
     "weights.pt": lambda path: load_model(path, EncoderSettings()),
     "model.pt": Model.load,

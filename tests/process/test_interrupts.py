@@ -6,11 +6,10 @@ import weakref
 
 import pytest
 
-from gpca import __main__ as command_line
 from gpca.errors import InputError
 from gpca.process.interrupts import certain_interrupts
+from gpca.process.job import as_process
 from gpca.process.progress import progress
-from tests.steps.by_words import main
 
 
 @pytest.fixture(autouse=True)
@@ -102,20 +101,18 @@ def taken_for_nothing():
 
 
 @pytest.mark.parametrize("stopped", [unchanged, as_numba_does, taken_for_a_damaged_file, taken_for_nothing])
-def test_the_command_line_knows_ctrl_c_in_whatever_it_is_changed_to(stopped, monkeypatch, capsys):
-    monkeypatch.setattr(command_line, "_run", lambda arguments, chosen: stopped())
-    assert main(["train"]) == 130
+def test_ctrl_c_is_known_in_whatever_it_is_changed_to(stopped, capsys):
+    assert as_process("gpca train", stopped) == 130
     assert capsys.readouterr().err == "gpca train: stopped; repeat the command to continue\n"
 
 
 @pytest.mark.parametrize("fault", [SystemError, ValueError, KeyError])
-def test_any_other_fault_is_not_taken_for_ctrl_c(fault, monkeypatch):
-    def faulty(arguments, chosen):
+def test_any_other_fault_is_not_taken_for_ctrl_c(fault):
+    def faulty():
         raise fault
 
-    monkeypatch.setattr(command_line, "_run", faulty)
     with pytest.raises(fault):
-        main(["train"])
+        as_process("gpca train", faulty)
 
 
 def test_an_interrupt_is_forgotten_with_its_block():

@@ -47,13 +47,11 @@ LEARNERS = {
     "learner_laplace_gpc": {},
     "learner_rbf_svm": {},
 }
+PREPARED = "from gpca.process.processor import prepare; prepare(); import json, sys; "
 CHAIN = (
-    "import json, sys; from gpca.__main__ import main; sys.exit(any([main(words) for words in json.load(sys.stdin)]))"
+    PREPARED + "from tests.steps.by_words import main; sys.exit(any([main(words) for words in json.load(sys.stdin)]))"
 )
-GUARDED = (
-    "from gpca.process.processor import prepare; prepare(); "
-    "import sys; from tests.vendor_guard import main; sys.exit(main())"
-)
+GUARDED = PREPARED + "from tests.vendor_guard import main; sys.exit(main())"
 LEFT_OUT = {"label", "runtime", "explain"}  # they give seconds, or text
 # Files of seconds; and a model's and an explanation's provenance.
 SECONDS = {"icp.csv", "dgcnn.csv", "gpca.csv", "uncertainty_timings.csv", "other_icp.csv", "frame_icp.csv"}
@@ -73,7 +71,7 @@ def words(step: str, **options) -> list[str]:
 
 
 def chain() -> list[list[str]]:
-    """Command lines from meshes, shapes of our own and virtual frames to predictions of every kind of explainer."""
+    """Words of steps from meshes, shapes of our own and virtual frames to predictions of every kind of explainer."""
     frames = {
         "count": 2, "views": 2, "objects": [3, 3], "camera": {"width": 160, "height": 120, "focal_px": 150},
         "families": ["ycb"],
@@ -81,17 +79,17 @@ def chain() -> list[list[str]]:
     tiny = {"source": "tiny", "seed": 0}
     lines = [
         words("scenes", source="frames", settings=frames, out="scenes"),
-        words("instances", source="frames", settings={}, scenes="scenes", surface_points=1024, out="instances.npz",
-              objects="seen.npz"),
+        words("instances", source="frames", settings={}, scenes="scenes", surface_points=1024,
+              instances="instances.npz", objects="seen.npz"),
         words("frame_registrations", source="frames", seed=0, settings={"train": 9, "test": 6, "cloud_points": 128,
-              "test_share": 0.4}, instances="instances.npz", objects="seen.npz", out="frames.npz", poses="poses.csv",
-              timings="frame_icp.csv"),
+              "test_share": 0.4}, instances="instances.npz", objects="seen.npz", registrations="frames.npz",
+              poses="poses.csv", timings="frame_icp.csv"),
         words("objects", source="linemod", settings={"kind": "procedural", "family": "linemod"}, surface_points=400,
               out="procedural.npz"),
         *every_step(LEFT_OUT),
     ]  # fmt: skip
     settings = {"backbone": "pointnext", "draw_points": 64, "draws": 1, "epochs": 1, "batch_size": 6}
-    lines.append(words("train", **tiny, settings=settings, registrations="registrations.npz", out="pointnext.pt",
+    lines.append(words("train", **tiny, settings=settings, registrations="registrations.npz", weights="pointnext.pt",
                        curve="pointnext.csv"))  # fmt: skip
     # Not UMAP: it compiles for a quarter of a minute in every process, by numba and NumPy, which the others show.
     reduced = {"--reduction": "pca", "--settings": {"components": 2}, "--out": "pca.npz"}

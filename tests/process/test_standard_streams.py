@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from gpca.__main__ import STEPS
+from gpca.__main__ import COMMANDS
 from tests.documents import ROOT
 
 ASCII = {"PYTHONIOENCODING": "ascii"}
@@ -28,15 +28,15 @@ def gpca(arguments, redirection="", **variables):
 
 def test_every_help_can_be_printed_in_ascii():
     code = (
-        "import sys; from gpca.__main__ import main, STEPS\n"
-        "for step in STEPS:\n"
-        "    try: main([step, '--help'])\n"
+        "import sys; from gpca.__main__ import main, COMMANDS\n"
+        "for command in COMMANDS:\n"
+        "    try: main([command, '--help'])\n"
         "    except SystemExit as end: assert end.code == 0\n"
     )
     done = gpca([sys.executable, "-c", code], **ASCII, **C_LOCALE)
     assert (done.returncode, done.stderr) == (0, b"")
     assert done.stdout.isascii()
-    assert done.stdout.count(b"usage:") == len(STEPS)
+    assert done.stdout.count(b"usage:") == len(COMMANDS)
     assert rb"\xd7" in done.stdout  # 4×4
 
 

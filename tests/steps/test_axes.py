@@ -68,7 +68,7 @@ def test_a_file_of_another_source_or_seed_is_refused(folder, capsys, step, optio
     ("step", "name", "fault"),
     [
         ("train", "registrations.npz", "array 'source' is missing; regenerate it with"),
-        ("reduce", "embeddings.npz", "array 'source' is missing; regenerate it with 'python -m gpca embed'"),
+        ("reduce", "embeddings.npz", "array 'source' is missing; regenerate it with Snakemake"),
         ("describe", "causes.npz", "array 'source' is missing"),
         ("embed", "weights.pt", "or damaged; regenerate them with"),
     ],

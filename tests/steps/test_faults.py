@@ -147,13 +147,11 @@ FAULTS = {
     ],
     "uncertainty": [(removed("registrations.npz"), {}, "registrations.npz: no such file")],
     "attribute": [
-        (untouched, SHAP | {"--uncertainty": None}, "'shap_removal': reads the uncertainty of design 'removal'"),
         (removed("uncertainty.npz"), SHAP, "uncertainty.npz: no such file"),
         (arrays_changed("uncertainty.npz", sample=later), SHAP, "its samples differ"),
         (arrays_changed("uncertainty.npz", residual=nan), SHAP, "array 'residual' contains NaN"),
         (removed("uncertainty_timings.csv"), SHAP, "uncertainty_timings.csv: no such file"),
         (lines_kept("uncertainty_timings.csv", 20), SHAP, "its samples differ"),
-        (untouched, {"--embeddings": None}, "explainer 'gpca': reads embeddings"),
         (arrays_changed("embeddings.npz", sample=later), {}, OTHER_SAMPLES),
         (arrays_changed("embeddings.npz", h=lambda h: h[:, 0]), {}, "array 'h' is 24, not S×d"),
         (arrays_changed("embeddings.npz", h=lambda h: h[1:]), {}, "array 'head_logits' is 24×3, not 23"),

@@ -69,7 +69,7 @@ def test_a_mistyped_name_is_asked_for_again_on_a_terminal_and_stops_a_file(label
 
 
 FAULTS = [
-    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with 'python -m gpca embed'"),
+    (removed("embeddings.npz"), {}, r"embeddings.npz: no such file; make it with Snakemake"),
     (removed("answers.txt"), {}, r"answers.txt: no such file; give a text file with one answer per line"),
     (untouched, {"--known": ["noise"]}, r"starts with fewer than two labeled concepts; name two with --known"),
     (untouched, {"--strategy": "best"}, r"strategy 'best': unknown; choose one of random"),

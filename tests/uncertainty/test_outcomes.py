@@ -64,7 +64,7 @@ def test_faulty_files_are_refused_in_one_line_with_their_name(tmp_path, name, da
     with pytest.raises(InputError, match=expected) as caught:
         Outcomes.load(path)
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
-    assert "python -m gpca uncertainty" in str(caught.value)
+    assert "with Snakemake" in str(caught.value)
 
 
 def test_the_table_has_a_column_for_every_condition(tmp_path):

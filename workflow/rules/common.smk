@@ -37,7 +37,7 @@ wildcard_constraints:
 
 
 def settings(*keys):
-    """Return the config's section at the wildcard-named keys as JSON, for --settings."""
+    """Return the config's section at the wildcard-named keys as JSON."""
 
     def section(wildcards):
         found = config

@@ -52,7 +52,7 @@ def _tasks(job: Job, settings: ActiveLearningSettings) -> Iterator[tuple[str, La
     held_out = job.settings.get("held_out", CONCEPTS)
     seen_S_d = read_embedding(job.embeddings, registrations)["embedding"]
     shapes = {f"h_{c}": ("S", "d") for c in held_out}
-    unseen = load_embeddings(job.embeddings_without, registrations, shapes, "python -m gpca without")
+    unseen = load_embeddings(job.embeddings_without, registrations, shapes)
     rare_share = job.settings.get("rare_share")
     chosen = [("pretrained", c, seen_S_d, None) for c in held_out]
     chosen += [("unseen", c, unseen[f"h_{c}"], None) for c in held_out]

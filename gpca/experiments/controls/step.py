@@ -37,7 +37,7 @@ def run(job: Job) -> None:
         for control, path in retrained.items():
             if not left_out(control, registrations, settings, encoder.backbone):
                 changed = variant(control, registrations, job.source, job.seed, settings, icp)
-                embeddings[control] = read_embedding(path, changed, "train_control", logits=True)
+                embeddings[control] = read_embedding(path, changed, logits=True)
         experiment = ControlRun(
             source=job.source,
             seed=job.seed,

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 REFERENCE = "reference"  # Monte-Carlo from many starts, which has rows of its own among the estimators
-MADE_BY = "python -m gpca estimate"
 SIXTH = np.triu_indices(6)
 # Upper triangle of Σ, row by row, in squared milliradians and thousandths of the diameter.
 COVARIANCE = tuple(f"covariance_{i + 1}{j + 1}" for i, j in zip(*SIXTH, strict=True))
@@ -91,4 +90,4 @@ class ReferenceSamples:
             **{"sample": ("S",), "method": ("S",), "twists": ("N", 6), "offsets": ("O",), "true_twist": ("S", 6)}
         }
         kinds = {"sample": WHOLE, "method": TEXT, "twists": REAL, "offsets": WHOLE, "true_twist": REAL}
-        return cls(**load_arrays(path, shapes, MADE_BY, kinds))
+        return cls(**load_arrays(path, shapes, kinds))

@@ -119,7 +119,7 @@ class _Asked:
             entry = explainer_entry("gpca", CAUSES)
             for causes, _, weights, embeddings in self._lessons:
                 registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, embeddings)
-                model = load_model(weights, self._encoder, LABELS, registrations.axes, step="train_on_causes")
+                model = load_model(weights, self._encoder, LABELS, registrations.axes)
                 h_S_d, logits_S_C = embed(model, self._registrations, *self._axes, self._encoder)
                 lessons = registrations.subset(training_rows(registrations, causes))
                 self._embedded.append((lessons, self._with({"embedding": h_S_d, "head_logits": logits_S_C})))

@@ -45,9 +45,7 @@ def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:
     def samples(h_S_d: np.ndarray) -> Embedded:
         return Embedded(h_S_d, registrations.concept, registrations.split)
 
-    of_backbones = [
-        load_embeddings(path, registrations, {"h": ("S", "d")}, "python -m gpca embed")["h"] for path in job.embeddings
-    ]
+    of_backbones = [load_embeddings(path, registrations, {"h": ("S", "d")})["h"] for path in job.embeddings]
     yield from zip(job.backbones, map(samples, of_backbones), strict=True)
     axes = (job.source, job.seed)
     measured_S_F = describe_registrations(registrations, *axes, points=points)["relations"]

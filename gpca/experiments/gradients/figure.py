@@ -33,7 +33,7 @@ def draw_saliency(registrations_npz: str | Path, maps_npz: str | Path, deletions
     registrations = Registrations.load(registrations_npz)
     shapes: dict[str, tuple[int | str, ...]] = {"sample": ("S",), "points": ("S", "N", 3), "saliency": ("S", "N")}
     kinds = {"sample": WHOLE, "points": REAL, "saliency": REAL}
-    maps = load_arrays(maps_npz, shapes, "python -m gpca gradients", kinds)
+    maps = load_arrays(maps_npz, shapes, kinds)
     rows = read_csv(deletions_csv, DELETION_COLUMNS).drop_duplicates("sample")
     rows["before"] = numbers(deletions_csv, rows, "before")
     chosen = {concept: _chosen(rows[rows["concept"] == concept]) for concept in CONCEPTS}

@@ -70,11 +70,9 @@ class _Work:
             name: load_model(path, self._encoder, unlike=self._axes)
             for name, path in zip(job.encoders_of, job.encoders, strict=True)
         }
-        self._cause_model = load_model(
-            job.cause_encoder, self._cause_encoder, LABELS, self._axes, step="train_on_causes"
-        )
+        self._cause_model = load_model(job.cause_encoder, self._cause_encoder, LABELS, self._axes)
         causes = Causes.load(job.causes, self._axes)
-        h_S_d = read_embedding(job.cause_embeddings, causes.registrations, "train_on_causes")["embedding"]
+        h_S_d = read_embedding(job.cause_embeddings, causes.registrations)["embedding"]
         self._seen = _seen(causes, h_S_d, Descriptors.load(job.descriptors, causes.registrations))
         self._objects = ObjectClouds.load(job.objects, job.source)
 

@@ -76,7 +76,7 @@ class ShiftedSets:
         shapes: dict[str, tuple[int | str, ...]] = {field.name: ("S",) for field in fields(cls)}
         shapes |= {"h": ("S", "d"), "distance": ("S", len(DISTANCES))}
         kinds = dict.fromkeys(shapes, TEXT) | {"sample": WHOLE, "h": REAL, "distance": REAL}
-        arrays = load_arrays(path, shapes, "python -m gpca shift", kinds, axes)
+        arrays = load_arrays(path, shapes, kinds, axes)
         return cls(**{name: arrays[name] for name in shapes})
 
     @classmethod

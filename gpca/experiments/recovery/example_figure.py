@@ -51,7 +51,7 @@ def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = ""
     Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
     object's name in words follows from its `dataset` of the BOP benchmark.
     """
-    found = load_arrays(example_npz, SHAPES, "python -m gpca recover")
+    found = load_arrays(example_npz, SHAPES)
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 2.0), layout="constrained")
     polar = {"c": {"projection": "polar"}}
     axes = figure.subplot_mosaic("abcd", width_ratios=(2.2, 1.3, 1.6, 2.2), per_subplot_kw=polar)
