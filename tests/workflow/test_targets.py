@@ -110,7 +110,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions causes/ recovery methods/",
     ),
     "gpca/uncertainty/estimators/censi.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
-    "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "diagnoses/ycb/gpca predictions"),
+    "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "predictions"),
     "gpca/experiments/controls/variants.py": (
         "controls/ control_embeddings/ transfer",
         "predictions embeddings encoders",
