@@ -15,7 +15,7 @@ PYTEST_ARGS ?=
 # Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
 RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
-PROCESSES := tests/test_processor.py tests/test_emulation.py tests/test_benchmarks.py tests/encoders/test_reduction.py
+PROCESSES := tests/process/test_processor.py tests/test_emulation.py tests/test_benchmarks.py tests/encoders/test_reduction.py
 PYTEST := $(RUN) OMP_NUM_THREADS=1 python -m pytest
 
 results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
