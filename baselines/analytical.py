@@ -1,4 +1,4 @@
-"""Analytical features and the same GPC as GP-CA: what the learned embedding adds (the paper's feature ablation).
+"""Analytical features and the same GPC as GP-CA: the measure of what the learned embedding adds (the paper's ablation).
 
 In this dataset a cropped cloud has fewer points than the others, so the point-count ratio alone gives the concept
 overlap away, which no sensor does. Hence two rows: `analytical_gpc` with the paper's list, and

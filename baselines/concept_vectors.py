@@ -1,6 +1,6 @@
 """Concept activation vectors (Kim et al. 2018, TCAV), read per sample.
 
-TCAV's score tells how often a whole dataset moves along a concept; it says nothing of one sample. What it rests on
+TCAV's score tells how often a whole dataset moves along a concept; it says nothing of one sample. Its basis
 does: the concept activation vector (CAV), the normal of a linear probe that parts one concept from the others
 (TCAV's relative CAV) in the encoder's embedding. A sample is scored by how far it lies along each.
 """

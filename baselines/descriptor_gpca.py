@@ -1,4 +1,4 @@
-"""GP-CA on the pair: the paper's classifier with other eyes, which see both clouds and what ICP did.
+"""GP-CA on the pair: the paper's classifier on descriptors of both clouds and of the motion of ICP.
 
 ``gpca_pair`` is the multi-class classifier. ``gpca_multilabel`` has a Gaussian process for each cause, and one for
 whether anything is wrong, so that several causes may have high scores at once. ``pair_committee`` is the mean of the

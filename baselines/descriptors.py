@@ -37,13 +37,13 @@ class DescriptorClassifier(ClassifierExplainer):
         self._columns = columns
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the columns that it reads."""
+        """Return the columns that the classifier reads."""
         joined_N_F = joined(registrations, self._groups)
         return joined_N_F if self._columns is None else joined_N_F[:, list(self._columns)]
 
 
 def joined(registrations: Registrations, groups: Sequence[str]) -> np.ndarray:
-    """Return these groups of descriptors side by side (N, F), of registrations that they are attached to."""
+    """Return these groups of descriptors, attached to the registrations, side by side (N, F)."""
     return np.hstack([attached(registrations, group) for group in groups])
 
 
@@ -62,7 +62,7 @@ def density(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> D
 
 
 def entropies(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
-    """Make the one that reads the entropies of the joint cloud and of the two apart (CorAl, Adolfsson et al. 2021)."""
+    """Make the rival that reads the entropies of the clouds, joint and apart (CorAl, Adolfsson et al. 2021)."""
     return DescriptorClassifier(standardized_regression(inverse_regularisation), ("entropy",))
 
 

@@ -117,7 +117,7 @@ HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # of a function that hands t
 
 
 class HeadLearner(DrawingExplainer):
-    """What such learners share: heads, and draws of the logits from them. Training takes `training`'s settings."""
+    """The base of learners with heads, from which logits are drawn; `training` holds the settings of the heads."""
 
     def __init__(self, source: str, seed: int, **training: HeadArguments) -> None:
         self._axes = (source, seed, type(self).__name__)

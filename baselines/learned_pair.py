@@ -1,4 +1,4 @@
-"""GP-CA on the pair with embeddings that are learned: what a network gains over measured relations, at what cost."""
+"""GP-CA on the pair with embeddings that are learned: the gain of a network over measured relations, and its cost."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from gpca.settings import Count, PositiveShare
 
 
 class LearnedPairGPCA(PairDescription, GPCA):
-    """GP-CA's classifier on the embedding of an encoder that sees both clouds after ICP, and the motion that ICP made.
+    """GP-CA's classifier on the embedding of an encoder that sees both clouds after ICP and the motion of ICP.
 
     Args:
         encoder: one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
         source, seed: name what is random.
-        points: of each cloud, on which every point is told how it lies to the other cloud.
+        points: of each cloud, each described by how it lies to the other cloud.
         draw_points, epochs, encoder_learning_rate: of the encoder's training, each epoch on other ones of the points.
         settings: those of the GPC, as for GP-CA.
     """
@@ -47,7 +47,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         self._embed: Callable[[Registrations], Registrations] | None = None
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
-        """Train the encoder on the labeled pairs, and return what attaches its embeddings."""
+        """Train the encoder on the labeled pairs, and return a function that attaches its embeddings."""
         from gpca.encoders.settings import EncoderSettings
         from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
         from gpca.features.registered import MOTION

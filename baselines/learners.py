@@ -1,4 +1,4 @@
-"""Other learners on the embeddings that GP-CA reads: what its Gaussian process is worth (paper, Table V).
+"""Other learners on the embeddings that GP-CA reads: the comparison for its Gaussian process (paper, Table V).
 
 All learn from the same labeled embeddings, standardized on them, and give probabilities of every concept. The forest
 and the linear SVM are the paper's: scikit-learn's defaults, 50 trees, random_state 42.

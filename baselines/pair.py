@@ -1,8 +1,8 @@
-"""Explainers that see the pair, both clouds and what ICP did, and not the aligned source alone.
+"""Explainers that see the pair, both clouds and the motion of ICP, and not the aligned source alone.
 
 `gpca_pair` is the paper's classifier with other eyes: a row of its own, never "GP-CA (paper)". What it reads does not
 depend on which object is registered (:func:`gpca.features.registered.relations`). Beside it stand the plainest form
-of the same idea, a forest on distances, and a rival that knows the density of the cloud and nothing else.
+of the same idea, a forest on distances, and a rival that knows only the density of the cloud.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gpca.settings import Count, Positive
 
 
 class PairDescription:
-    """What these explainers share: one group of descriptors of each pair.
+    """The base of these explainers: each reads one group of descriptors of every pair.
 
     Args:
         source, seed: name the draws from the clouds.

@@ -58,12 +58,12 @@ def _alarm(errors_N_8: np.ndarray) -> np.ndarray:
 
 
 def shap_removal(source: str, seed: int) -> RemovalValues:
-    """Make the one with exact Shapley values."""
+    """Make the explainer with exact Shapley values."""
     return RemovalValues(shapley_values)
 
 
 def sa_removal(source: str, seed: int) -> RemovalValues:
-    """Make the one that applies one remedy at a time."""
+    """Make the explainer that applies one remedy at a time."""
     return RemovalValues(lambda errors_N_8: single_drops(-errors_N_8[:, ::-1]))
 
 

@@ -1,6 +1,6 @@
 """Rules that a person can read: a shallow decision tree on the three numbers of the residuals.
 
-The paper names rule-based systems and decision trees as what needs no explanation (Sec. II). This is the floor: an
+The paper says that rule-based systems and decision trees need no explanation (Sec. II). This is the floor: an
 explainer that does no better than a few thresholds has found nothing that a person could not have written down.
 """
 

@@ -67,17 +67,17 @@ def total_indices(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray
 
 
 def sa_local_additive(source: str, seed: int) -> KnobValues:
-    """Make the paper's: local derivatives at the observed pair."""
+    """Make the paper's explainer: local derivatives at the observed pair."""
     return KnobValues(local_derivatives, STEPS)
 
 
 def sa_prcc_additive(source: str, seed: int) -> KnobValues:
-    """Make the one with rank correlations over a Latin hypercube."""
+    """Make the explainer with rank correlations over a Latin hypercube."""
     return KnobValues(partial(_over_settings, partial_rank_correlations, "latin"))
 
 
 def sa_sobol_additive(source: str, seed: int) -> KnobValues:
-    """Make the one with total indices."""
+    """Make the explainer with total indices."""
     return KnobValues(partial(_over_settings, total_indices, "saltelli"))
 
 
@@ -89,7 +89,7 @@ def _over_settings(sensitivities: Callable, kind: str, uncertainty_N_K: np.ndarr
 
 
 def single_drops(worth_N_8: np.ndarray) -> np.ndarray:
-    """Return what each feature alone changes (N, 3)."""
+    """Return the change that each feature makes alone (N, 3)."""
     return worth_N_8[:, ONE_AT_A_TIME[1:]] - worth_N_8[:, :1]
 
 

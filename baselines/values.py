@@ -1,4 +1,4 @@
-"""What SHAP and sensitivity analysis share: from a value per concept and registration to an attribution.
+"""The part common to SHAP and sensitivity analysis: it turns values per concept and registration into an attribution.
 
 Values of knobs are taken as they are. A remedy may lower the uncertainty of every pair a little, so without labels its
 values are counted from their mean over the training split, in standard deviations; with labels a classifier reads them.
@@ -24,7 +24,7 @@ WORTHS: tuple[str, ...] = get_args(Worth)
 
 
 class ChargedValues(ScoringExplainer):
-    """What these explainers share: the conditions that they need are charged. None stands for all."""
+    """The base of these explainers, which charges the conditions that they need; None stands for all."""
 
     def __init__(self, conditions: list[int] | None) -> None:
         self._conditions = conditions
@@ -99,16 +99,16 @@ class LearnedValues(ChargedValues, ClassifierExplainer):
 
 
 def corners(registrations: Registrations, worth: str) -> np.ndarray:
-    """Return that worth of the 8 corners (S, 8): corner b has feature i present where bit i of b is set."""
+    """Return one worth of the 8 corners (S, 8): corner b has feature i present where bit i of b is set."""
     return attached(registrations, worth)[:, :8]
 
 
 def charged(
     registrations: Registrations, scores_N_3: np.ndarray, conditions: list[int] | None, started: float
 ) -> Attribution:
-    """Make an attribution that cost these conditions, None for all, and the time since `started`.
+    """Make an attribution charged with these conditions, None for all, and with the time since `started`.
 
-    Where all three scores are equal, nothing sets a concept apart, and none is named.
+    Where all three scores are equal, no concept is named.
     """
     own_seconds = (perf_counter() - started) / len(registrations)
     cost = {

@@ -11,7 +11,7 @@ __all__ = ["__version__", *_EXPORTS]
 
 
 def __getattr__(name: str):
-    """Load what is used by itself only when it is asked for: it brings torch, and every step imports this package."""
+    """Load an exported name only when it is used: it brings torch, and every step imports this package."""
     if name not in _EXPORTS:
         raise AttributeError(f"module 'gpca' has no attribute '{name}'")
     from importlib import import_module

@@ -1,4 +1,4 @@
-"""The command ``gpca <command> …``, or ``python -m gpca <command> …``: what people ask of the suite by hand."""
+"""The command ``gpca <command> …``, or ``python -m gpca <command> …``: the commands that people run by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers in text that somebody wrote: plain decimals in ASCII, finite, and nothing else.
+"""Numbers in users' text: plain decimals in ASCII, finite, and nothing else.
 
 Python's int() and float() read more, each of which is a slip or damage in a file: digits of other scripts, underlines
 between digits, NaN and infinity, and whole numbers so long that they take minutes.

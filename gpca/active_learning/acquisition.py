@@ -18,7 +18,7 @@ EXPANSION = 4  # K: BALD with k-means clusters the K·B most uncertain samples
 
 @dataclass(frozen=True)
 class Pool:
-    """N samples without a label, and what the classifier makes of them.
+    """N samples without a label, and the classifier's scores for them.
 
     Attributes:
         h_N_d: embeddings, standardized.
@@ -41,8 +41,8 @@ class Strategy:
     Attributes:
         title: what tables and figures call it.
         choose: called with pool, batch size and generator; may return fewer rows, or one twice.
-        oracle: it is told the truth about the pool.
-        needs_scores: it reads what the classifier makes of the pool.
+        oracle: whether it is told the truth about the pool.
+        needs_scores: whether it reads the classifier's scores of the pool.
     """
 
     title: str
@@ -77,7 +77,7 @@ def top(values_N: np.ndarray, n: int) -> np.ndarray:
 
 
 def random_rows(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Draw without looking."""
+    """Draw at random."""
     return random.permutation(len(pool.h_N_d))[:batch]
 
 
@@ -157,7 +157,7 @@ def badge(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
 
 
 def coreset(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Take what is farthest from everything labeled, one after the other (Sener & Savarese 2018)."""
+    """Take the samples farthest from everything labeled, one after the other (Sener & Savarese 2018)."""
     from skactiveml.pool import CoreSet
 
     return _with_labeled(CoreSet(random_state=int(random.integers(2**31))), pool, batch)
@@ -176,7 +176,7 @@ def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray
 
 
 def _with_labeled(strategy, pool: Pool, batch: int) -> np.ndarray:
-    """Query a strategy that looks at where the labeled samples lie, not at what their labels are."""
+    """Query a strategy that reads the positions of the labeled samples, not their labels."""
     labels = np.concatenate([np.full(len(pool.h_N_d), np.nan), np.zeros(len(pool.h_labeled_L_d))])
     return strategy.query(np.concatenate([pool.h_N_d, pool.h_labeled_L_d]), labels, batch_size=batch)
 

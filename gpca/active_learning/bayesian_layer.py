@@ -1,4 +1,4 @@
-"""A Bayesian last layer that learns label by label: what it believed before is the prior of what it believes after.
+"""A Bayesian last layer that learns label by label: the posterior after one label is the prior of the next.
 
 Softmax regression on fixed features, with Laplace's approximation of the posterior and its generalized Gauss-Newton
 curvature (Daxberger et al. 2021). A label changes the curvature by a matrix of rank C, so that the logits of its sample

@@ -93,7 +93,7 @@ class Session:
     Args:
         h_S_d: embeddings of all samples.
         keys: split and number of each.
-        start: labels that were known before anybody was asked.
+        start: labels that were known before the first question.
         labels: the file of answers; those that it holds are learned at once.
         settings: how the classifier is fitted.
         strategy: which one of :mod:`gpca.active_learning.acquisition` asks.
@@ -131,11 +131,11 @@ class Session:
 
     @property
     def answered(self) -> dict[Key, str]:
-        """What was answered by naming a concept."""
+        """The answers that name a concept."""
         return {key: concept for key, concept in self.labels.labels.items() if concept != SKIPPED}
 
     def retrain(self) -> int:
-        """Learn the answers since the last time, new concepts included; return how many they were."""
+        """Learn the answers given since the last call, new concepts included, and return their number."""
         fresh = {key: concept for key, concept in self.answered.items() if key not in self._learned}
         for concept in dict.fromkeys(fresh.values()):
             if concept not in self.gpc.classes:

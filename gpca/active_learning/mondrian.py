@@ -1,4 +1,4 @@
-"""Mondrian forests (Lakshminarayanan et al. 2014): random trees that grow with a stream, and know what they never saw.
+"""Mondrian forests (Lakshminarayanan et al. 2014): random trees that grow with a stream and recognize unseen regions.
 
 A Mondrian tree splits a box by a clock: the next split comes after a time drawn from an exponential distribution whose
 rate is the sum of the box's sides. A sample outside of a box may split off above it, at the time and place at which a
@@ -117,7 +117,7 @@ class MondrianForest:
 
 
 def _tables(node: Node) -> np.ndarray:
-    """Return which classes a node has: one table each in the hierarchy of its posterior."""
+    """Return the classes that a node has: one table each in the hierarchy of its posterior."""
     return np.minimum(node.counts_C, 1)
 
 
@@ -130,10 +130,10 @@ def _descend(
     rows_N: np.ndarray,
     total_R_C: np.ndarray,
 ) -> None:
-    """Add to `total_R_C[rows_N]` what the samples get from a node and all below it.
+    """Add to `total_R_C[rows_N]` the probabilities that the samples get from a node and all below it.
 
-    At every box a sample may split off, the surer the farther outside it is, and then gets the box's classes mixed with
-    those of the parent; its share at the end is its leaf's.
+    At every box a sample may split off, with a probability that grows with its distance outside, and then gets the
+    box's classes mixed with those of the parent; the share that is left at the end gets the classes of its leaf.
 
     Args:
         earlier: time of the node's parent.

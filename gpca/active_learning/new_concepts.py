@@ -14,7 +14,7 @@ from gpca.seeds import generator
 
 
 def answers(concept_N: np.ndarray, classes: tuple[str, ...], share: float, *axes: object) -> np.ndarray:
-    """Return what an oracle says of N samples, of which some answers are wrong.
+    """Return an oracle's answers for N samples, some of them wrong.
 
     Which samples it errs about, and what it says of them, is drawn once for all shares: an oracle that errs more often
     repeats the errors of a better one, so that the two differ in nothing else.
@@ -36,14 +36,14 @@ def answers(concept_N: np.ndarray, classes: tuple[str, ...], share: float, *axes
 
 @dataclass(frozen=True)
 class NewConceptTrial:
-    """What is tried.
+    """One trial: a new concept, seen through one embedding.
 
     Attributes:
-        embedding: name of what the samples are seen by.
-        samples: by it.
+        embedding: its name.
+        samples: the samples, embedded by it.
         held_out: the new concept.
         classes: all concepts.
-        errors: shares of wrong answers, besides none, of the oracles that are asked.
+        errors: shares of wrong answers of the oracles that are asked besides the one that never errs.
     """
 
     embedding: str
@@ -54,14 +54,14 @@ class NewConceptTrial:
 
 
 def setting_of(embedding: str, errors: float) -> str:
-    """Return what a file of curves calls an embedding and an oracle that errs in a share of its answers."""
+    """Return the name, in a file of curves, of an embedding and an oracle that errs in a share of its answers."""
     return f"{embedding}_errors_{round(100 * errors)}" if errors else embedding
 
 
 def run_trial(
     trial: NewConceptTrial, strategies: Iterable[str], settings: ActiveLearningSettings, *axes: object
 ) -> Iterator[tuple[str, str, list[dict[str, float]]]]:
-    """Yield setting, strategy and learning curve (:func:`gpca.active_learning.rounds.run_rounds`).
+    """Yield setting, strategy and learning curve of each run (:func:`gpca.active_learning.rounds.run_rounds`).
 
     Start, pool and the strategies' draws are the same for all oracles. All labels are those of the one that never errs.
     """

@@ -65,7 +65,7 @@ class Samples(Generic[Inputs]):
 
 @dataclass(frozen=True)
 class LabelingTask(Generic[Inputs]):
-    """What one experiment starts from: the concept held out, labeled samples of the others, pool and test samples."""
+    """The start of one experiment: the concept held out, labeled samples of the others, pool and test samples."""
 
     held_out: str
     initial: Samples
@@ -149,7 +149,7 @@ def run_rounds(
         task: projected by `gpc`.
         gpc: what :func:`initial_gpc` returns; it is not changed.
         axes: the names of the draws (source, seed, …).
-        answers_N: what the oracle says of each sample of the pool; the truth by default.
+        answers_N: the oracle's answer for each sample of the pool; the truth by default.
 
     Returns:
         a step per round, the first before any label: ``labels`` spent, ``new_labels`` of the concept held out,
@@ -186,7 +186,7 @@ def rounds(
 def pool_of(
     task: LabelingTask[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True
 ) -> Pool:
-    """Return what a strategy chooses from: the rows `left` of the pool, and what the GPC makes of them."""
+    """Return the pool of a strategy: the rows `left`, and the scores and BALD that the GPC gives them."""
     h = task.pool.h[left]
     if needs_scores:
         scores_N_C, _, bald_N = gpc.attribute(h)
@@ -210,9 +210,9 @@ def step_of(task: LabelingTask[Projection], gpc: GPC, queried: list[int], epochs
 
 
 def accuracies(task: LabelingTask[Projection], classifier) -> tuple[float, float]:
-    """Return the accuracy over all test samples and over those of the concept held out; NaN of none.
+    """Return the accuracy over all test samples and over those of the concept held out; NaN where there are none.
 
-    The classifier is a GPC, or what has its ``classes`` and ``scores``.
+    The classifier is a GPC, or another object with its ``classes`` and ``scores``.
     """
     scores_N_C = classifier.scores(task.test.h)
     right_N = np.array(classifier.classes)[scores_N_C.argmax(axis=1)] == task.test.concept_N

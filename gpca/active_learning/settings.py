@@ -1,4 +1,4 @@
-"""Settings of active learning, in rounds and on a stream, apart from its code: nothing here needs torch."""
+"""Settings of active learning, in rounds and on a stream, kept apart from its code: nothing here needs torch."""
 
 from __future__ import annotations
 
@@ -67,12 +67,12 @@ NewCause = Literal["nominal", "geometry"]
 
 @dataclass(frozen=True)
 class NewConceptSettings:
-    """What a concept is learned from where no encoder has seen the samples, or the concept, before.
+    """Settings for learning a concept where no encoder has seen the samples, or the concept, before.
 
     Attributes:
         seeds: the first so many of the run's.
         embeddings: of the samples: by an encoder that learned from other samples of the same source, or from another
-            source; what one predicts that learned without labels; or what was measured of the pair.
+            source; the predictions of one that learned without labels; or the descriptors of the pair.
         errors: shares of the oracle's answers that are wrong.
         erring: embeddings with which such an oracle is asked.
         points: drawn from each cloud to describe a pair.

@@ -1,4 +1,4 @@
-"""The online form of active learning: samples arrive one at a time, and a label is asked for where it is worth it.
+"""The online form of active learning: samples arrive one at a time, and labels are requested where they pay off.
 
 The paper's loop (Sec. III-C and Fig. 4): the classifier names a concept as a sample arrives; where its uncertainty
 passes a threshold, and the budget allows, it asks for the label and learns. The learners of Narr et al. (2016) and

@@ -1,7 +1,7 @@
-"""Who learns from a stream besides GP-CA: the two stream learners that the paper names, on the same embeddings.
+"""The two stream learners that the paper names beside GP-CA, on the same embeddings.
 
-Each has the part of a GPC's interface that a stream asks for. All start from the same labeled samples, ask by the same
-budget manager and get the same labels, one at a time; they differ in what learns, and in what they call uncertain.
+Each has the part of a GPC's interface that a stream uses. All start from the same labeled samples, ask by the same
+budget manager and get the same labels, one at a time; they differ in the learner and in its measure of uncertainty.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DRAWS = 30  # of the weights, CLEVER's number
 
 
 class StreamLearner(Protocol):
-    """What a stream calls."""
+    """The interface of the learners of a stream."""
 
     classes: tuple[str, ...]
 

@@ -1,4 +1,4 @@
-"""ICP of one source to one target from many initial poses, with everything that the runs share worked out once.
+"""ICP of one source to one target from many initial poses, with everything that the runs share computed once.
 
 Point-to-point runs are our own compiled loop with Open3D's steps and stopping rule, and end at Open3D's poses wherever
 the correspondences determine one (tests/alignment/test_batched_icp.py). Open3D builds a tree of the target for every

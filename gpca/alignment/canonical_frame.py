@@ -46,7 +46,7 @@ class CanonicalFrame:
 
 
 def require_cloud_points(points: np.ndarray, subject: object) -> None:
-    """Raise an InputError unless the points are (N, 3), finite, and as many as the encoders have seen at least."""
+    """Raise an InputError unless the points are (N, 3), finite, and no fewer than the encoders have seen."""
     require_points(points, subject)
     if len(points) < FEWEST_CLOUD_POINTS:
         raise InputError(subject, f"has {len(points)} points", f"give {FEWEST_CLOUD_POINTS} or more")

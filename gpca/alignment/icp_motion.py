@@ -42,7 +42,7 @@ def move(pose, moments, room):
 
 @njit(**INNER_LOOP)
 def _largest_eigenvector(matrix, vectors):
-    """Diagonalise a symmetric 4×4 matrix (upper half) by Jacobi rotations; return the largest eigenvalue's column."""
+    """Diagonalize a symmetric 4×4 matrix (upper half) by Jacobi rotations; return the largest eigenvalue's column."""
     for i in range(4):
         for j in range(4):
             vectors[i, j] = 1.0 if i == j else 0.0

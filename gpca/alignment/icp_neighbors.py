@@ -164,7 +164,7 @@ def _cells_around(x, low, cell, cells, window):
 
 @njit(forceinline=True, **INNER_LOOP)
 def _points_of(starts, cells, i, j, k_low, k_high):
-    """Cells along the last axis follow each other, so their points are one piece."""
+    """Return where the points of a row of cells start and end; cells along the last axis follow each other."""
     if k_low >= k_high:
         return 0, 0
     row = (i * cells[1] + j) * cells[2]
@@ -173,7 +173,7 @@ def _points_of(starts, cells, i, j, k_low, k_high):
 
 @njit(**INNER_LOOP)
 def _reached(low, cell, x, y, z, window):
-    """Return how far away everything outside the window is at least: its cells, and the way to the own nearest wall."""
+    """Return the least distance to anything outside the window: its cells, and the way to the nearest wall."""
     a, b, c = (x - low[0]) % cell, (y - low[1]) % cell, (z - low[2]) % cell
     wall = min(min(min(a, cell - a), min(b, cell - b)), min(c, cell - c))
     return window * cell + wall

@@ -31,8 +31,8 @@ def pose_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarr
 class PoseErrors:
     """Errors of many estimates of one object's pose, where the truth is the identity.
 
-    ADD-S is the mean distance to the nearest point, so it is not below the spacing of the points: judged is by some of
-    them, but the nearest is sought among all.
+    ADD-S is the mean distance to the nearest point, so it is not below the spacing of the points: the mean is over some
+    of them, but the nearest is sought among all.
 
     Args:
         points_N_3: of the object, in any unit; errors come in the same.

@@ -1,1 +1,1 @@
-"""What explainers say of registrations: scores, the prediction file, metrics, diagnostics."""
+"""Attributions of registrations to concepts: scores, the prediction file, metrics and diagnostics."""

@@ -1,4 +1,4 @@
-"""Intervals of what is measured: by the bootstrap on samples of objects in seeds, and of a share of counted samples.
+"""Confidence intervals: by the bootstrap on samples of objects in seeds, and of a share of counted samples.
 
 Objects and seeds are crossed: an object is tested in several seeds, a seed tests several objects. The pigeonhole
 bootstrap (Owen 2007) draws both with replacement and weighs a sample by the product of how often its own were drawn.

@@ -1,4 +1,4 @@
-"""What an explainer's uncertainty is worth: does it sort right from wrong, and do its probabilities mean what they say.
+"""The worth of an explainer's uncertainty: whether it separates right from wrong, and whether it is calibrated.
 
 Functions of S test samples: ``wrong_S`` whether each was named wrongly, ``confidence_S`` any score that is higher where
 the explainer is surer, ``p_S_C`` class probabilities and ``target_S`` the numbers of the true classes. All are finite

@@ -73,7 +73,7 @@ def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
 def mean_interval(values_R: Iterable[float], level: float = 0.95) -> tuple[float, float, float]:
     """Return the mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R.
 
-    The bounds are symmetric about the mean and not clipped, as the function does not know what the values are.
+    The bounds are symmetric about the mean and not clipped, as the function does not know the range of the values.
     One repeat has NaN bounds; none raises ValueError. No repeat is ever dropped: a NaN makes all three NaN.
     """
     from scipy.stats import t as student_t
@@ -107,7 +107,7 @@ def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
 def read_causal(path: str | Path) -> pd.Series:
     """Return whether each sample is causal, indexed by (split, sample) as text: something made it uncertain.
 
-    Causal is what is more uncertain than 95 % of the clean pairs.
+    A sample is causal if it is more uncertain than 95 % of the clean pairs.
 
     Raises:
         InputError: see :func:`read_uncertainties`.

@@ -1,6 +1,6 @@
-"""The files that hold one row per sample: what an explainer said of it, and the seconds that it took.
+"""The files with one row per sample: an explainer's prediction, and the seconds that it took.
 
-Written with six decimals, read as text first, so that nothing which is not a number passes for one.
+They are written with six decimals and read as text first, so that only numbers pass for numbers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an explainer says of registrations: a score and a variance per concept, and what follows from them."""
+"""An explainer's attribution of registrations: a score and a variance per concept, and what follows from them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Attribution:
         scores_N_C: score ŝ_c of each concept (Eq. 4).
         variances_N_C: epistemic variance v_c (Eq. 5); NaN where an explainer has none.
         bald_N: BALD in nats (Eq. 7); NaN where an explainer has none.
-        abstained_N: the explainer declines to name a concept.
+        abstained_N: whether the explainer declines to name a concept.
         icp_calls_N: ICP runs beyond the observed registration.
         seconds_N, icp_seconds_N: time of the explanation, and the part of it inside ICP.
     """

@@ -1,4 +1,4 @@
-"""Candidates: a model and what was observed of it, with any subset of the causes.
+"""Candidates: a model and an observed cloud, with any subset of the causes.
 
 All lengths are relative to the object's diameter. The observed cloud is kept in the model's frame, in which the true
 pose is the identity; a pose error is where the registration starts.
@@ -22,7 +22,7 @@ def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.nda
 
 @dataclass(frozen=True)
 class Candidate:
-    """A pair and everything that may be done to it.
+    """A pair and all causes that may be applied to it.
 
     Attributes:
         applied: (3,) which of noise, pose and overlap are.

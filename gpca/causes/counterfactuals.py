@@ -1,6 +1,6 @@
 """Counterfactuals of one candidate: it is registered again with every subset of its causes, from the same starts.
 
-ICP aligns the model to what was observed, so that missing surface hurts: every point of the model looks for a partner.
+ICP aligns the model to the observed cloud, so that missing surface hurts: every point of the model looks for a partner.
 It may be asked to run the other way (:attr:`gpca.causes.settings.CauseSettings.moved`).
 """
 
@@ -28,7 +28,7 @@ class Unmeasurable(Exception):
 
 
 class Registrar:
-    """Registers one candidate from any starts; what several calls share is worked out once."""
+    """Registers one candidate from any starts; what several calls share is computed once."""
 
     def __init__(self, candidate: Candidate, settings: CauseSettings) -> None:
         self.candidate = candidate

@@ -28,7 +28,7 @@ def draw_causes(
 ) -> tuple[Causes, Tally, np.ndarray]:
     """Draw candidates, measure their causes and keep those that are wanted.
 
-    What is random in a candidate comes from generators named by source, seed, split and its number. Which candidates
+    The random numbers of a candidate come from generators named by source, seed, split and its number. Which candidates
     are kept depends on how many samples are wanted.
 
     Returns:
@@ -50,7 +50,7 @@ def draw_causes(
 def draw_geometry(
     objects: ObjectClouds, source: str, seed: int, settings: CauseSettings, wanted: Mapping[str, int], most: int
 ) -> Causes | None:
-    """Draw what fails without any cause: candidates that :func:`draw_causes` refuses, of the same objects per split.
+    """Draw failures without a cause: candidates refused by :func:`draw_causes`, of the same objects per split.
 
     Args:
         settings: those of the other causes.

@@ -61,7 +61,7 @@ def measure_frames(
 ) -> tuple[Causes, pd.DataFrame]:
     """Measure the causes of these instances.
 
-    What cannot be measured is left out and named on stderr.
+    Instances that cannot be measured are left out and named on stderr.
 
     Args:
         meshes: of the objects that they show, see :func:`gpca.frames.meshes.meshes_of`.

@@ -1,4 +1,4 @@
-"""What an explainer of causes has to name: nothing, where nothing is wrong, or what adds most to the error."""
+"""The labels for explainers of causes: nominal where nothing is wrong, or the cause that adds most to the error."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LABELS = (NOMINAL, *CONCEPTS)
 
 
 def labels_of(truth: Truth) -> np.ndarray:
-    """Return (S,) one of `LABELS`: nominal, or the dominant cause of the failed; ``borderline`` is between them.
+    """Return (S,) labels: nominal, the dominant cause of a failed registration, or ``borderline`` between the two.
 
     A failure of the geometry has no label either, since none of `LABELS` is right: it counts as borderline.
     """
@@ -34,6 +34,6 @@ def labeled(causes: Causes) -> Registrations:
 
 
 def with_label(causes: Causes) -> Registrations:
-    """Return those registrations that have a label, as :func:`labelled` does."""
+    """Return those registrations that have a label, as :func:`labeled` returns them."""
     registrations = labeled(causes)
     return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))

@@ -1,4 +1,4 @@
-"""Measures a candidate: its counterfactuals, the truth that follows from them, and what an explainer may see of it."""
+"""Measures a candidate: its counterfactuals, the truth that follows from them, and the explainer's view of it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Measuring:
         )
 
     def observed(self, registrar: Registrar, subject: Subject, axes: tuple) -> dict[str, Any]:
-        """Return what an explainer may see of a candidate, and what was done to it."""
+        """Return the explainer's view of a candidate, and the perturbations applied to it."""
         candidate = registrar.candidate
         xi_n_6 = self._twists(axes, "observed starts")
         xi_n_6[0] = 0

@@ -38,7 +38,7 @@ def apportion(total: int, shares: dict[str, float]) -> dict[str, int]:
 
 
 class Quotas:
-    """What is wanted yet of one split.
+    """The samples that are still wanted for one split.
 
     Args:
         total: samples of the split.
@@ -84,7 +84,7 @@ class Quotas:
         self._taken[group] += 1
 
     def refuse_to_go_on(self, source: str, seed: int, split: str, candidates: int) -> InputError:
-        """Return what to raise: which group is the rarest, and what to widen."""
+        """Return the error to raise, which names the rarest group and what to widen."""
         unfilled = [name for name, wanted in self._wanted.items() if self._count(name) < wanted]
         # The least filled one; of several that are empty, the largest.
         name = min(unfilled, key=lambda name: (self._count(name) / self._wanted[name], -self._wanted[name]))
@@ -110,7 +110,7 @@ class Quotas:
 
 
 def state_of(truth: Truth) -> str:
-    """Return the state of the one sample of a truth; what is off when clean is one of its own."""
+    """Return the state of the one sample of a truth; a clean pair that is off is a state of its own."""
     return GEOMETRY if truth.geometry[0] else str(truth.state[0])
 
 

@@ -1,4 +1,4 @@
-"""A sample's counterfactuals once more, to be looked at: the candidate is drawn again and registered without starts."""
+"""A sample's counterfactuals once more, for pictures: the candidate is drawn again and registered without starts."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Replay:
 
 
 def replay(objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings) -> Replay:
-    """Return what ICP made of each subset from the initial pose itself.
+    """Return the results of ICP under each subset from the initial pose itself.
 
     Raises:
         InputError: the objects or the settings are not those that the sample was drawn with.

@@ -51,7 +51,7 @@ class CauseSeverities(Severities):
 
 @dataclass(frozen=True)
 class Limits:
-    """What the states are told apart by. Errors are relative to the diameter.
+    """The limits that tell the states apart. Errors are relative to the diameter.
 
     Attributes:
         nominal: mean error below which nothing is wrong.

@@ -1,4 +1,4 @@
-"""Exact Shapley values of the three concepts: what each has to do with what happened.
+"""Exact Shapley values of the three concepts: the share that each has in the outcome.
 
 A worth is given for all eight subsets of the concepts; subset b has concept i where bit i of b is set.
 """

@@ -1,4 +1,4 @@
-"""The objects of a source as the candidates need them, their clean pairs, and which of them are for testing."""
+"""The objects of a source as the candidates need them, their clean pairs, and their splits."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Subject:
 
 
 def read_subjects(objects: ObjectClouds) -> list[Subject]:
-    """Return the objects, with what their symmetries mean for errors."""
+    """Return the objects, with errors that respect their symmetries."""
     symmetries = (find_symmetries(objects.points(i), float(objects.diameters_m[i])) for i in range(len(objects)))
     return [Subject.of(objects, i, bool(found)) for i, found in enumerate(symmetries)]
 
@@ -86,7 +86,7 @@ def split_by_object(
 def measure_clean_pairs(
     subjects: list[Subject], source: str, seed: int, settings: CauseSettings
 ) -> tuple[list[Subject], float]:
-    """Measure pairs to which nothing was done.
+    """Measure clean pairs, to which nothing was done.
 
     An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind.
 

@@ -1,4 +1,4 @@
-"""The truth about S registrations: errors and uncertainties under every subset of the causes, and what follows."""
+"""The truth about S registrations: errors and uncertainties under every subset of the causes, and states."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GEOMETRY = "geometry"  # the clean pair is off already: too little shape to hold
 
 @dataclass(frozen=True)
 class Truth:
-    """What was measured, and the limits that states are told apart by.
+    """The measurements of S registrations, and the limits that tell their states apart.
 
     Subset b of the eight has cause i of noise, pose and overlap where bit i of b is set.
 

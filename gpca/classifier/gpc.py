@@ -137,7 +137,7 @@ class GPC:
         self.refine()
 
     def project(self, h_N_d: np.ndarray | Projection) -> Projection:
-        """Return what the covariance says of the embeddings, to be computed once where they are asked about often."""
+        """Return the embeddings as the covariance sees them, to be computed once where they are used often."""
         return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
 
     @property

@@ -62,7 +62,7 @@ class Latents:
 
 @dataclass(frozen=True)
 class Sites:
-    """One Gaussian factor per labeled input and latent, in natural parameters: what its label says of the latent.
+    """One Gaussian factor per labeled input and latent, in natural parameters: its label's evidence about the latent.
 
     The posterior is q(v) ∝ N(0, I) Π_n exp(linear_n f_n - precision_n f_n² / 2). A site of zeros says nothing.
     """
@@ -94,7 +94,7 @@ def refine(
 ) -> tuple[Sites, Latents, int]:
     """Ascend the ELBO of the softmax likelihood by natural gradients; each iteration passes once over all labels.
 
-    Conjugate-computation variational inference (Khan & Lin 2017): a step towards the sites with precision
+    Conjugate-computation variational inference (Khan & Lin 2017): a step toward the sites with precision
     E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c], the ELBO's natural gradient. Unlike a gradient on mean
     and covariance, it needs no learning rate to be tuned and ends after some ten steps.
 

@@ -1,4 +1,4 @@
-"""The prior of a fitted sparse GP classifier: covariances and inducing inputs, and how they see an input."""
+"""The prior of a fitted sparse GP classifier: covariances and inducing inputs, and the projection of inputs."""
 
 from __future__ import annotations
 

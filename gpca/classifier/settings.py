@@ -1,4 +1,4 @@
-"""Settings of the Gaussian process classifier, apart from its code: nothing here needs torch."""
+"""Settings of the Gaussian process classifier, kept apart from its code: nothing here needs torch."""
 
 from __future__ import annotations
 

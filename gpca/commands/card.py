@@ -41,7 +41,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
     Args:
         name: of the file that is handed on.
         content: of that file.
-        model, diagnoser: what it holds.
+        model, diagnoser: its parts.
         origin: of the model.
         scores: what :func:`gpca.experiments.diagnosis.intervals.collect` returned for its run.
 

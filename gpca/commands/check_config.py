@@ -1,4 +1,4 @@
-"""Step ``check-config``: configs -> whether a run can use them. Runs nothing, and needs no Snakemake.
+"""Step ``check-config``: configs -> whether a run can use them. It runs nothing and needs no Snakemake.
 
 Snakemake reads a file of ``--configfile`` before it comes to anything of the suite, so what it cannot read, or takes a
 minute and gigabytes for, ends in its own words there. Here every fault is one line.
@@ -20,7 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> None:
-    """Lay the configs over the default and check what comes of it."""
+    """Lay the configs over the default and check the result."""
     if options.settings:
         raise InputError("--settings", "is not used by check-config", "name a config file")
     config, sources = read(with_defaults(*map(read_file, options.configs)), {})

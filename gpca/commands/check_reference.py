@@ -1,4 +1,4 @@
-"""Step ``check-reference``: a run's folder and the reference's -> whether they agree. Reruns nothing."""
+"""Step ``check-reference``: a run's folder and the reference's -> whether they agree. It reruns nothing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print what each file came to; return 1 where one is different or missing, 0 where rounding explains all."""
+    """Print the verdict on each file; return 1 where one is different or missing, 0 where rounding explains all."""
     if not options.folder.is_dir():
         raise InputError(options.folder, "no such folder", f"make it with '{_command(options.folder, [])}'")
     reference = options.reference or options.folder.parent / "reference" / options.folder.name

@@ -36,7 +36,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Read all files, then explain and print one source after the other; all that is no result goes to stderr.
+    """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
     The clouds are read before any library is loaded that they do not need: most mistakes are found there.
 

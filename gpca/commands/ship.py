@@ -1,4 +1,4 @@
-"""Step ``ship``: a run's model -> the same one as it comes with the package, and its card. For those who release."""
+"""Step ``ship``: a run's model -> the same one as it comes with the package, and its card; for releases."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the verdicts say about rows: how many shuffled values would agree too, and how the ranks agree.
+"""How informative the verdicts are about rows: how many shuffled values would agree too, and how the ranks agree.
 
 Within each column of a table, values that stand beside the wrong printed numbers may agree with them as often as beside
 the right ones; then the counts of verdicts carry no information about the rows.
@@ -28,7 +28,7 @@ _TIME = "time"
 
 @dataclass(frozen=True)
 class Chance:
-    """Of one table.
+    """Agreement by chance in one table.
 
     Attributes:
         agree: how many numbers are reproduced or close.

@@ -1,4 +1,4 @@
-"""Verdicts on what the paper says in sentences: few kinds of tests, with margins of equivalence.
+"""Verdicts on the paper's claims in sentences: few kinds of tests, with margins of equivalence.
 
 A difference is that of two values of the same seed, its interval Student's over the seeds. "As good as" is supported
 by two one-sided tests: the whole interval lies within the margin, which an interval that holds 0 need not do.
@@ -47,10 +47,10 @@ def judge(
     has of stand-ins only is not comparable; both leave the verdict to the other comparisons.
 
     Args:
-        claims: sentences.
+        claims: those of the paper.
         results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them.
         objects: source -> ``{"title": str, "stand_in": bool}``.
-        prediction_files: named ``…/predictions/{source}/{method}/seed{seed}.csv``, for what is about calibration.
+        prediction_files: named ``…/predictions/{source}/{method}/seed{seed}.csv``, for claims about calibration.
     """
     import pandas as pd
 
@@ -193,7 +193,7 @@ def _calibration(claims: Sequence[Claim], prediction_files: Iterable[str | Path]
 
 
 def _named(value: Counterpart | float, places: Sequence[Counterpart]) -> str:
-    """Name a value by what tells it from the other: its method, or its metric where both have one method."""
+    """Name a value by what distinguishes it from the other: its method, or its metric where both have one method."""
     if not isinstance(value, Counterpart):
         return f"{value:g}"
     if len({place.methods for place in places}) < len(places):

@@ -1,4 +1,4 @@
-"""What the paper says in sentences, and which comparison of a run's values each stands for: ``claims.yaml``."""
+"""The paper's claims in sentences, and the comparison of a run's values that each stands for: ``claims.yaml``."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ class Compared:
 
     @property
     def counterparts(self) -> list[Counterpart]:
-        """Return those of the two that a run has to provide."""
+        """Return those of the two values that a run has to provide."""
         return [value for value in (self.one, self.other) if isinstance(value, Counterpart)]
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence.
+    """A claim of the paper in one sentence.
 
     Attributes:
         test: greater, less, not_worse or equivalent.
         margin: the smallest difference that counts, in `unit`; with `ratio`, a factor.
-        compared: what has to hold for all; empty where nothing was run, and then `note` says why.
+        compared: the comparisons, all of which have to hold; empty where nothing was run, and then `note` says why.
     """
 
     name: str

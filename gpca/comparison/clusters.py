@@ -24,7 +24,7 @@ Folder = tuple[str, str, str]  # e.g. ("predictions", "ycb", "gpca_paper")
 
 
 def folder_behind(counterpart: Counterpart | None) -> Folder | None:
-    """Return where the predictions lie that a counterpart is a share of; None of what is no share of samples."""
+    """Return the folder of the predictions that a counterpart is a share of; None if it is no share of samples."""
     if counterpart is None or counterpart.statistic != "mean" or counterpart.file not in FOLDERS:
         return None
     taken = len(counterpart.metrics) == 2 and counterpart.metrics[0].startswith(PREDICTED_AS)
@@ -44,7 +44,7 @@ def cluster_intervals(
     """Return counterpart -> bounds of its share by the pigeonhole bootstrap over objects and seeds.
 
     Args:
-        numbers: printed ones; those whose folder has no file are left out.
+        numbers: the printed numbers; those whose folder has no file are left out.
         prediction_files: named ``…/{predictions or learners}/{source}/{method}/seed{seed}.csv``.
 
     Raises:

@@ -16,7 +16,7 @@ from gpca.errors import InputError
 from gpca.io.csv_file import ANY, finite_number, read_csv
 
 TIMES = "*seconds*"
-# What kind a value is of, by its file and its metric or column; the first that fits.
+# The kind of a value, by its file and its metric or column; the first that fits.
 KINDS = (
     ("*", "*rho*", "correlation"),
     ("*", "rotation_deg", "degrees"),
@@ -47,7 +47,7 @@ class Mean:
         half_width: of its 95 % interval; 0 where it has none.
         quantity: its name.
         samples: of how many samples, of all seeds, it is a share or a number; 0 where that is not told.
-        unit: by how much it changes when all of them do: 1 for a share, 100 in percent, 0 for what is neither.
+        unit: by how much it changes when all of them do: 1 for a share, 100 in percent, 0 if neither.
     """
 
     value: float
@@ -80,7 +80,7 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
 
 
 def kind_of(file: str, quantity: str) -> str:
-    """Return what kind a quantity of a file is of."""
+    """Return the kind of a quantity in a file."""
     return next(
         kind for of_file, of_name, kind in KINDS if fnmatchcase(file, of_file) and fnmatchcase(quantity, of_name)
     )
@@ -126,7 +126,7 @@ def _of_table(path: Path, rows: list[dict], heads: list[str]) -> Iterator[tuple[
 
 
 def _unit(file: str, quantity: str, samples: float, seeds: int) -> float:
-    """By how much a quantity changes when all its samples do; 0 where it is no share and no number of them."""
+    """Return by how much a quantity changes when all its samples do; 0 if it is no share and no number of them."""
     if any(fnmatchcase(quantity, pattern) for pattern in PARTS):
         return samples / seeds
     return {"share": 1.0, "percent": 100.0}.get(kind_of(file, quantity), 0.0)

@@ -1,4 +1,4 @@
-"""What the paper prints: every number of its tables and text, from ``published.csv`` (docs/comparison.md)."""
+"""The numbers that the paper prints, in its tables and text, from ``published.csv`` (docs/comparison.md)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _REDUCTIONS = ("No Reduction", "PCA", "UMAP", "AE")
 
 @dataclass(frozen=True)
 class PaperTable:
-    """A table of the paper: what it shows, its rows and columns."""
+    """A table of the paper: its subject, rows and columns."""
 
     title: str
     rows: tuple[str, ...] = ()
@@ -85,15 +85,15 @@ TABLES = {
 
 @dataclass(frozen=True)
 class Counterpart:
-    """Which value of a run stands beside a printed number.
+    """The value of a run that stands beside a printed number.
 
     Attributes:
         file: its CSV file in ``results/{run}/``.
-        table: what `table` of its tidy rows reads; "components" for ``runtime.csv``.
+        table: the value of `table` in its tidy rows; "components" for ``runtime.csv``.
         sources: their mean is taken, seed by seed; of ``runtime.csv`` "model", what the model was trained on.
         methods: their sum is taken.
         metrics: one, or two of which the first is divided by the second.
-        concept: what `concept` of the tidy rows reads; the device for ``runtime.csv``.
+        concept: the value of `concept` in the tidy rows; the device for ``runtime.csv``.
         statistic: how the values over the seeds become one, mean or deviation.
     """
 
@@ -132,7 +132,7 @@ class Number:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What names it: table, row and column."""
+        """The table, row and column that name it."""
         return self.table, self.row, self.column
 
     @property

@@ -1,4 +1,4 @@
-"""The printed numbers beside what every reading of the unstated gives in their place (docs/comparison.md)."""
+"""The printed numbers beside the values that every reading gives in their place (docs/comparison.md)."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def judge_readings(
     """Return `READING_COLUMNS`, a row per printed number and reading that has a value in its place.
 
     Args:
-        numbers: printed ones.
-        comparison: what :func:`gpca.comparison.verdicts.compare` returned for them.
+        numbers: the printed numbers.
+        comparison: the rows that :func:`gpca.comparison.verdicts.compare` returned for them.
         readings: tidy rows of ``readings.csv``; `table` holds the group and the values of its choices, with / between,
             and the other columns are those of the counterpart in its own file.
         tolerances: of each unit.
@@ -87,7 +87,7 @@ def judge_readings(
 
 @dataclass(frozen=True)
 class OfGroup:
-    """What the readings of one group say of one number.
+    """A summary of the values that the readings of one group give for one number.
 
     Attributes:
         readings: how many there are. close: how many of them are close to what is printed.
@@ -110,17 +110,17 @@ class OfGroup:
 
     @property
     def where(self) -> str:
-        """Whether a reading produces it, or what is printed lies between readings, or outside of all."""
+        """Where the printed number lies: close to a reading, between readings, or outside of all."""
         return "produced" if self.close else "between" if self.inside else "outside"
 
 
 def asked_about(judged: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the numbers that are not reproduced, and of those that are not judged for their objects."""
+    """Return the rows of numbers that are not reproduced, or not judged because of their objects."""
     return judged[judged["verdict"].isin([NOT_REPRODUCED, NOT_COMPARABLE])]
 
 
 def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGroup]]:
-    """Return number -> group -> what its readings say, of the numbers of :func:`asked_about`."""
+    """Return number -> group -> summary of its readings, for the numbers of :func:`asked_about`."""
     joint = {}
     for group, rows in judged.groupby("group", sort=False):
         fitted = rows.groupby("reading", sort=False)["close"].sum()
@@ -145,7 +145,7 @@ def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGr
 
 
 def sentence(groups: Mapping[str, OfGroup]) -> str:
-    """Return what a reason says of the readings."""
+    """Return the sentence of a reason about the readings."""
     told = []
     for group, of in groups.items():
         span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.nearest}, {of.value:.3g}"
@@ -170,7 +170,7 @@ def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFram
 
 
 def read_judged(path: str | Path) -> pd.DataFrame:
-    """Read what :func:`judge_readings` returned.
+    """Read the rows that :func:`judge_readings` returned.
 
     Raises:
         InputError: missing, empty or unreadable file, missing column, something that is not a number.

@@ -1,4 +1,4 @@
-"""Why a printed number was not reached, as far as it was found out: ``reasons.csv`` (docs/comparison.md)."""
+"""The known reasons why printed numbers were not reached: ``reasons.csv`` (docs/comparison.md)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NONE_YET = "no reason found yet"
 
 @dataclass(frozen=True)
 class Reason:
-    """A reason and the numbers that it is of; `*` in row and column stands for any text."""
+    """A reason and the numbers that it applies to; `*` in row and column stands for any text."""
 
     table: str
     row: str
@@ -22,7 +22,7 @@ class Reason:
     text: str
 
     def fits(self, number: Number) -> bool:
-        """Return whether it is of this number."""
+        """Return whether it applies to this number."""
         patterns = (self.table, self.row, self.column)
         return all(fnmatchcase(name, pattern) for name, pattern in zip(number.key, patterns, strict=True))
 
@@ -33,5 +33,5 @@ def read_reasons() -> list[Reason]:
 
 
 def reason_of(number: Number, reasons: Sequence[Reason]) -> str:
-    """Return the first reason that is of the number."""
+    """Return the first reason that applies to the number."""
     return next((reason.text for reason in reasons if reason.fits(number)), NONE_YET)

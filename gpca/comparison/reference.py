@@ -1,9 +1,9 @@
-"""Whether a run's numbers are a reference run's: CSV by CSV, to the byte, within what rounding does, or not at all.
+"""Compares a run's numbers with a reference run's, CSV by CSV: equal to the byte, within rounding, or different.
 
 Other libraries, or a processor below the common level, round otherwise. A trained encoder then decides some samples
 otherwise: of n samples on which the two runs differ with probability d, the difference of two shares has the standard
-deviation √(d / n), so what is allowed follows from n (docs/comparison.md). Every value is judged by itself: one that
-differs by more makes its file different, however many agree.
+deviation √(d / n), so the allowed difference follows from n (docs/comparison.md). Every value is judged by itself: one
+that differs by more makes its file different, however many agree.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from gpca.errors import InputError
 from gpca.settings import Keys, NotNegative, Share
 
 VERDICTS = IDENTICAL, ROUNDING, DIFFERENT, MISSING = "identical", "rounding", "different", "missing"
-# What differs from run to run, and what is made of it: never compared.
+# These differ from run to run, or are made from files that do, and are never compared.
 NOT_COMPARED = (
     *("timings.csv", "runtime.csv", "tables/table7_runtime.csv", "tables/table10_costs.csv"),
     *("comparison.csv", "claims.csv", "tables/claims.csv"),
@@ -29,14 +29,14 @@ NOT_COMPARED = (
 
 @dataclass(frozen=True)
 class Allowance:
-    """By how much two means may differ: section ``reference`` of the config.
+    """The largest difference allowed between two means: section ``reference`` of the config.
 
     Attributes:
         tolerances: the largest difference, for each kind in :data:`gpca.comparison.means.KINDS`.
-        flipped: of a share of samples, or what follows from the share that another rounding may decide otherwise,
-        deviations: and so many standard deviations of their balance.
-        half_widths: of anything else, or so many half-widths of the reference's 95 % interval.
-        ratio: or so much of a number of labels or epochs, which a target reached one step later changes.
+        flipped: for shares of samples, the share of samples that another rounding may decide otherwise,
+        deviations: and the number of standard deviations of their balance that are allowed.
+        half_widths: for all else, the number of half-widths of the reference's 95 % interval that are allowed.
+        ratio: the share of a number of labels or epochs that is allowed, as a target may be reached a step later.
     """
 
     tolerances: Annotated[dict, Keys({kind: NotNegative for *_, kind in KINDS}, required=[kind for *_, kind in KINDS])]
@@ -59,7 +59,7 @@ class Allowance:
 
 @dataclass(frozen=True)
 class FileCheck:
-    """What the comparison of one file came to: one of `VERDICTS`, and what differs."""
+    """The outcome of the comparison of one file: one of `VERDICTS`, and the differences."""
 
     file: str
     verdict: str
@@ -71,7 +71,7 @@ def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[Fi
 
     Args:
         run, reference: folders.
-        allowance: what rounding may do.
+        allowance: the differences that rounding explains.
 
     Raises:
         InputError: no reference, none of its files a CSV, a file that cannot be read.

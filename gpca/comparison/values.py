@@ -1,4 +1,4 @@
-"""What a run has in place of the printed numbers, from its collected files."""
+"""The values of a run in place of the printed numbers, from its collected files."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def value_of_run(
     results: Mapping[str, pd.DataFrame],
     clusters: Mapping[Counterpart, tuple[float, float]] | None = None,
 ) -> Reproduced | None:
-    """Return what the run has in place of the number, in its unit; None where it has nothing.
+    """Return the run's value in place of the number, in its unit; None where it has none.
 
     Args:
         number: the printed one.
@@ -106,7 +106,7 @@ def deviation_interval(deviation: float, n: int) -> tuple[float, float]:
 
 
 def of_seeds(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, bool]:
-    """Return what the counterpart names in a tidy file, by seed, and whether it is a lower bound in some of them."""
+    """Return the counterpart's values in a tidy file, by seed, and whether some of them are lower bounds."""
     rows = rows[(rows["table"] == counterpart.table) & (rows["concept"] == counterpart.concept)]
 
     def of_metric(source: str, method: str, metric: str) -> pd.Series:

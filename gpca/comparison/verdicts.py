@@ -1,4 +1,4 @@
-"""What the paper prints beside what a run reproduced, with a verdict on each number (docs/comparison.md)."""
+"""The printed numbers beside those of a run, with a verdict on each (docs/comparison.md)."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ def compare(
     """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
 
     Args:
-        numbers: printed ones.
+        numbers: the printed numbers.
         results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them.
         objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
         tolerances: one for each unit.
         reasons: why printed numbers were not reached.
-        hardware: what times were measured on, where their file does not say.
+        hardware: the machine of the measured times, where their file does not say.
         clusters: counterpart -> bounds over objects and seeds (:mod:`gpca.comparison.clusters`).
 
     Raises:
@@ -178,7 +178,7 @@ def verdict_of(printed: Printed, found: Reproduced, tolerance: Tolerance) -> str
 
 
 def distance(printed: Printed, value: float, tolerance: Tolerance) -> float:
-    """Return how far a value lies from what is printed, in units of what counts as close; 0 within its rounding."""
+    """Return a value's distance from the printed number, in units of the close tolerance; 0 within its rounding."""
     scale = _log if tolerance.factor else float
     least, most = scale(printed.value - printed.rounding), scale(printed.upper + printed.rounding)
     return _apart(scale(value), min(max(scale(value), least), most)) / scale(tolerance.close)
@@ -218,7 +218,7 @@ def _sampling(printed: Printed) -> dict[str, float]:
 
 
 def _columns(number: Number, found: Reproduced | None, tolerance: Tolerance) -> dict[str, object]:
-    """Return the reproduced value, and how far it is from the nearest end of what is printed."""
+    """Return the reproduced value, and its distance from the nearest end of the printed number."""
     import pandas as pd
 
     if found is None:
@@ -243,7 +243,7 @@ def _objects(counterpart: Counterpart | None, objects: Mapping[str, Mapping]) ->
 
 
 def _hardware(number: Number, results: Mapping[str, pd.DataFrame], hardware: str) -> str:
-    """Say on what a time was measured; empty of all else."""
+    """Return the hardware that a time was measured on; empty for all else."""
     counterpart = number.counterpart
     if counterpart is None or counterpart.file not in results or number.unit not in TIMES:
         return ""
@@ -254,7 +254,7 @@ def _hardware(number: Number, results: Mapping[str, pd.DataFrame], hardware: str
 
 
 def _deviation_of(number: Number, deviations: Mapping[tuple[str, str], Number]) -> Number | None:
-    """Return what is printed beside a mean as its standard deviation: in its row, or in that of the same number."""
+    """Return the standard deviation printed beside a mean: in its row, or in that of the same number."""
     if not number.counterpart or number.counterpart.statistic != "mean":
         return None
     table, row, _ = number.same_as or number.key

@@ -18,7 +18,7 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
     """Read the config of a run as Snakemake merged it.
 
     Args:
-        command_line: what was given with ``--config``, whose numbers are text yet.
+        command_line: the values given with ``--config``, whose numbers are still text.
         of_module: it is what another workflow gives this one as a module, so that the defaults are not below it yet.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Checks of the config's shared sections that no type can make: names of what exists, sizes that fit each other."""
+"""Checks of the config's shared sections that no type can make: names that exist, sizes that fit each other."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _check_explainers(config: dict, left_out: LeftOut) -> None:
 
 
 def _check_model(config: dict, left_out: LeftOut) -> None:
-    """Check the names of what the figures of one registration, and the model, are made from."""
+    """Check the names that the figures of one registration, and the model, depend on."""
     model, sources = config["model"], config["sources"]
     require_names("figures.source", [config["figures"]["source"]], sources, "source", left_out("sources"))
     require_names("model.source", [model["source"]], (*sources, REAL_WORLD), "source", left_out("sources"))

@@ -9,7 +9,7 @@ from gpca.io.structured_text import read_scalar
 
 
 def with_types(config: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the config with what the command line gave it read as a config file is: numbers, booleans, null.
+    """Return the config with the command line's values read as in a config file: numbers, booleans, null.
 
     Args:
         config: of the run, in which values from the command line are laid over the others.

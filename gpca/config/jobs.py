@@ -1,4 +1,4 @@
-"""What the jobs of a run inherit from the process that plans them, through the environment."""
+"""The environment that the jobs of a run inherit from the process that plans them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a config leaves out with ``false``, and the rows that go with it.
+"""Entries that a config leaves out with ``false``, and the rows that go with them.
 
 A config that is laid over another can add to its mappings but take nothing away: an entry that is false does that.
 """
@@ -32,7 +32,7 @@ LISTED = {key: names for each in experiments() for key, names in each.lists.item
 
 
 def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the config without what it leaves out, and without the rows that need it; `config` stays as it is.
+    """Return the config without the entries left out and the rows that need them; `config` stays as it is.
 
     A row is an entry of a list, an explainer or a policy. What names one thing that is left out, such as
     `figures.source`, or a list of nothing else stays: :func:`gpca.config.check.check` says that it has to name another.
@@ -90,14 +90,14 @@ def _at(config: Mapping[str, Any], key: str) -> Any:
 
 
 def _without(names: list | dict, gone: Collection[str]) -> list | dict:
-    """Return what is left of a list or mapping; a list of nothing else stays."""
+    """Return a list or mapping without the names that are gone; a list of nothing else stays."""
     if isinstance(names, dict):
         return {name: entry for name, entry in names.items() if name not in gone}
     return [name for name in names if name not in gone] or names
 
 
 def _change(config: dict[str, Any], key: str, change, kind: type | tuple[type, ...] = dict) -> None:
-    """Replace what is at the key by what `change` makes of it, in copies of the sections on the way."""
+    """Replace the value at the key by `change` of it, in copies of the sections on the way."""
     *path, last = key.split(".")
     if not isinstance(_at(config, key), kind):
         return

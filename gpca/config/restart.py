@@ -1,4 +1,4 @@
-"""The same command goes on after a run that was killed: what it left is cleared away once nothing of it lives.
+"""Lets the same command resume a run that was killed: its leftovers are cleared once none of its processes lives.
 
 Snakemake locks its working directory by files that outlive it: after ``kill -9`` or a power cut every start ends with a
 LockException until ``--unlock``. So each Snakemake also holds a lock that the kernel takes back, whatever ends it.
@@ -19,9 +19,9 @@ _held: list[IO[str]] = []  # until this process ends
 def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: str | Path = ".snakemake") -> None:
     """Note that a Snakemake lives in the working directory; if it is the only one, clear what dead ones have left.
 
-    All that live share a lock of ``running`` in `folder`, so who gets it alone is alone. Only then are Snakemake's own
-    locks removed, those of another Snakemake never. On a file system without such locks nothing is known, and nothing
-    is done.
+    All that live share a lock of ``running`` in `folder`, so a process that gets it exclusively is alone. Only then
+    are Snakemake's own locks removed, never those of another Snakemake. On a file system without such locks nothing is
+    known, and nothing is done.
 
     Args:
         temporary: the folders that this Snakemake has made elsewhere, which it removes unless it is killed.

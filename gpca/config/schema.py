@@ -28,7 +28,7 @@ NOT_OF_CAUSES = ("icp", "icp_points")  # the section registrations has them
 
 @dataclass(frozen=True)
 class Objects:
-    """How many points are sampled on each mesh."""
+    """The number of points sampled on each mesh."""
 
     surface_points: SurfacePoints
 
@@ -40,7 +40,7 @@ class NoReduction:
 
 @dataclass(frozen=True)
 class Reductions:
-    """Of embeddings, by name."""
+    """The reductions of embeddings, by name."""
 
     none: NoReduction = field(default_factory=NoReduction)
     pca: PCA = field(default_factory=PCA)
@@ -50,7 +50,7 @@ class Reductions:
 
 @dataclass(frozen=True)
 class Embedding:
-    """What the explainers on embeddings read."""
+    """The encoder and the reduction of the embeddings that explainers read."""
 
     encoder: str
     reduction: Literal["none"]
@@ -68,7 +68,7 @@ Design = Annotated[dict, changes_of(UncertaintyDesign, without=("icp",))]
 
 @dataclass(frozen=True)
 class ExplainedModel:
-    """What the model of ``python -m gpca explain`` learns from."""
+    """The settings that the model of ``python -m gpca explain`` learns with."""
 
     source: str
     encoder: str

@@ -1,4 +1,4 @@
-"""Where a training continues that was stopped: its state after each epoch, and what it must have in common."""
+"""Checkpoints by which a stopped training continues: its state after each epoch, and what must agree."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gpca.pairs.dataset import Registrations
 
 
 def fingerprint(registrations: Registrations, targets_S_C: np.ndarray | None) -> str:
-    """Hash what training sees: the clouds, their labels or targets, and their splits."""
+    """Hash the data of a training: the clouds, their labels or targets, and their splits."""
     digest = hashlib.sha256(registrations.points.tobytes())
     digest.update(b"" if targets_S_C is None else targets_S_C.tobytes())
     for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
@@ -23,7 +23,7 @@ def fingerprint(registrations: Registrations, targets_S_C: np.ndarray | None) ->
 
 
 def fingerprint_of(weights: Mapping[str, torch.Tensor] | None) -> str:
-    """Hash what training starts from, where it is given."""
+    """Hash the weights that a training starts from, if any are given."""
     digest = hashlib.sha256()
     for name, tensor in (weights or {}).items():
         digest.update(name.encode() + tensor.numpy().tobytes())

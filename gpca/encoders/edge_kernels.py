@@ -39,10 +39,9 @@ def smallest_k(distances, k):
 def _bracket(row, k):
     """Return (below, above, count): fewer than k entries are <= below, count >= k are <= above.
 
-    Starts at the range of the first k entries and widens it downwards, at first a little. Squared distances to
-    points on a surface are
-    about evenly spread, so a straight line between the counts then leads closer than the middle; where it does not,
-    the middle is next.
+    Starts at the range of the first k entries and widens it downward, at first a little. Squared distances to
+    points on a surface are about evenly spread, so a straight line between the counts then leads closer than the
+    middle; where it does not, the middle is next.
     """
     half = row.dtype.type(0.5)
     above = below = row[0]

@@ -1,7 +1,7 @@
-"""Encoders of a registered pair: both clouds at once, each point told how it lies to the other cloud.
+"""Encoders of a registered pair: both clouds at once, each point described by how it lies to the other cloud.
 
-Both take what :func:`gpca.features.points.describe_points` says of the points, and the motion of ICP, which they
-hand on beside what they make of the points.
+Both take the features of :func:`gpca.features.points.describe_points`, and the motion of ICP, which they hand on
+beside their own features of the points.
 """
 
 from __future__ import annotations

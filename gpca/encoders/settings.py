@@ -1,4 +1,4 @@
-"""Settings of the encoders, apart from what trains them: nothing here needs torch."""
+"""Settings of the encoders, kept apart from their training, so that nothing here needs torch."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of unlike sizes together
 
 @dataclass(frozen=True)
 class EncoderSettings:
-    """What is trained and how.
+    """Settings of an encoder and of its training.
 
     Attributes:
         backbone: name in :mod:`gpca.encoders.registry`.

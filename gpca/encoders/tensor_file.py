@@ -1,4 +1,4 @@
-"""Files of torch.save; they are read without trust: whole to the byte, no code, and only numbers that can be.
+"""Files of torch.save, read without trust: whole to the byte, no code, and only possible numbers.
 
 torch itself takes a file in which a bit has flipped for a whole one: it reads no checksum.
 """
@@ -17,7 +17,7 @@ from gpca.io.limits import LARGEST_NUMBER
 
 
 def read_tensors(path: str | Path) -> Any:
-    """Return what torch.save wrote, on the CPU.
+    """Return the content of a file of torch.save, on the CPU.
 
     Raises:
         ValueError: a member whose checksum differs, that is compressed or shared with another; a tensor that is

@@ -59,10 +59,10 @@ def _on(device: torch.device, clouds: Any) -> Any:
 
 @dataclass(frozen=True)
 class TrainingTask:
-    """What an encoder sees of a registration, and what its head learns to say of it.
+    """The task of an encoder: its view of a registration, and the targets of its head.
 
     Attributes:
-        classes: what ``concept`` names.
+        classes: the names that ``concept`` may have.
         targets_S_C: numbers that the head learns to predict, by least squares, in the place of the concepts; `classes`
             then names its columns, and the curve has no accuracy.
         make: makes the encoder, where it is none of the registry.

@@ -1,4 +1,4 @@
-"""Files of weights: an encoder with its head, and the source and the seed that it was trained on."""
+"""Files of weights: an encoder with its head, and the source and seed that it was trained on."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What is asked of the method: a folder for each experiment, which declares itself in its ``experiment.py``."""
+"""The experiments: a folder for each, which declares itself in its ``experiment.py``."""

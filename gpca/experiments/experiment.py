@@ -1,4 +1,4 @@
-"""What an experiment says of itself, so that the config, the workflow and the page need not know it.
+"""The declaration of an experiment, so that the config, the workflow and the page need not know it.
 
 It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}/experiment.py``, which imports nothing heavy. Beside it
 are the steps that run it; ``results.yaml``, its part of the registry of tables and figures; and what makes these.
@@ -29,7 +29,7 @@ class Names:
     """The names that a mapping of the config may have.
 
     Attributes:
-        noun: for what has such a name.
+        noun: the word for a thing with such a name.
         known: returns all of them; None where any name may stand.
     """
 
@@ -42,7 +42,7 @@ EXPLAINERS = Names("explainer", explainers)
 
 @dataclass(frozen=True)
 class Tidy:
-    """A file of tidy numbers; what has a collector is collected from other files of the run by a rule of its own.
+    """A file of tidy numbers; a file with a collector is made from other files of the run by a rule of its own.
 
     Attributes:
         file: its name.
@@ -82,7 +82,7 @@ class Experiment:
         tidy: its files of numbers, which every run makes that has the experiment.
         needs: names that must not be empty, or a run does without it.
         names: what it adds to the names in the braces of paths (:func:`gpca.experiments.run.names_of`).
-        shown: what it adds to what tables and figures are told (:func:`gpca.experiments.run.settings_of`).
+        shown: what it adds to the settings that results show (:func:`gpca.experiments.run.settings_of`).
         check: refuses, with an InputError, sections that their types allow and that no run can use.
         leavable: keys of mappings of which any entry may be false -> names that they have.
         switches: keys of mappings name -> true or false, which are read as the list of the names that are true.

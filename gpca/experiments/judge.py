@@ -1,4 +1,4 @@
-"""How far an object's pose is off: ADD or ADD-S, the angle up to the symmetries, the shift of its center."""
+"""Errors of an object's pose: ADD or ADD-S, the angle up to the symmetries, the shift of its center."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gpca.pairs.dataset import Registrations
 class Judge:
     """Judges poses of one object.
 
-    All lengths are in diameters, and the target's frame is the object's canonical one, with the origin at its centre.
+    All lengths are in diameters, and the target's frame is the object's canonical one, with the origin at its center.
 
     Attributes:
         symmetries: rotations that leave the shape as it is, as :func:`gpca.objects.symmetry.find_symmetries` has them.

@@ -34,7 +34,7 @@ def results_of(names: Names) -> list[Result]:
     """Return the tables and figures that a run with these names makes, in the order of the registry.
 
     Args:
-        names: what the patterns of the registry have in braces; ``source`` lists the sources.
+        names: the values for the braces of the registry's patterns; ``source`` lists the sources.
     """
     results = []
     for entry in registered():

@@ -1,4 +1,4 @@
-"""What a run consists of, worked out from its configuration: the names in its paths, and what its results show.
+"""The names in the paths of a run, and the settings that its results show, worked out from its configuration.
 
 The registry of results (:mod:`gpca.reporting.registry`) refers to both by name, as do the rules of the workflow.
 """
@@ -17,7 +17,7 @@ from gpca.objects.title import dataset_of, title_of
 
 
 def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return what stands in the braces of paths: one value, or the list of all.
+    """Return the values for the braces of paths: one value, or the list of all.
 
     Args:
         config: that :func:`gpca.config.check.check` has checked.
@@ -36,7 +36,7 @@ def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
 
 
 def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return what tables and figures show besides numbers: titles by name, and conditions of the protocol."""
+    """Return the settings that tables and figures show: titles by name, and conditions of the protocol."""
     own = {name: value for each in experiments() for name, value in each.shown(config, sources).items()}
     frames = {REAL_WORLD: own["frames"]}
     titled = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
@@ -70,7 +70,7 @@ def explainer_of(method: str, names: Mapping[str, Any]) -> str:
 
 
 def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
-    """Return what an explainer reads besides the registrations: option of the step ``attribute`` -> pattern of files.
+    """Return the files that an explainer reads besides the registrations: option of ``attribute`` -> pattern.
 
     ``input_timings`` are the seconds that were spent before it starts.
     """

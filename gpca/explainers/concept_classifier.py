@@ -53,7 +53,7 @@ class ClassifierExplainer(ScoringExplainer):
         return self._classifier.scores(self.features(registrations))
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return what the classifier reads (N, F)."""
+        """Return the features (N, F) that the classifier reads."""
         raise NotImplementedError
 
 

@@ -33,7 +33,7 @@ class GPCA(DrawingExplainer):
         return self._gpc.attribute(self._inputs(registrations))
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
-        """Return what the GPC reads of each registration (N, d)."""
+        """Return the inputs (N, d) of the GPC."""
         return registrations.embedding
 
 

@@ -22,7 +22,7 @@ from gpca.pairs.perturbation import CONCEPTS
 
 
 class ConceptExplainer(Protocol):
-    """What the workflow calls; made as ``make(source, seed, **settings)``."""
+    """The interface that the workflow calls; an explainer is made by ``make(source, seed, **settings)``."""
 
     def fit(self, registrations: Registrations) -> None:
         """Learn from labeled registrations (the rows of split ``train``)."""
@@ -33,10 +33,10 @@ class ConceptExplainer(Protocol):
 
 @runtime_checkable
 class Describing(Protocol):
-    """An explainer that measures each registration by itself before it learns: once is enough for all that follows."""
+    """An explainer that measures each registration by itself before it learns, so that once is enough."""
 
     def describe(self, registrations: Registrations) -> Registrations:
-        """Attach what it measures, by :func:`measured`; ``fit`` and ``explain`` then measure nothing again."""
+        """Attach the measurements by :func:`measured`, so that ``fit`` and ``explain`` need not repeat them."""
 
 
 @runtime_checkable
@@ -44,14 +44,14 @@ class Encoding(Protocol):
     """An explainer with an encoder of its own, learned once for all labels on its embeddings."""
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
-        """Train the encoder on labeled registrations, and return what attaches its embeddings.
+        """Train the encoder on labeled registrations, and return a function that attaches its embeddings.
 
         Where they are attached, ``fit`` and ``explain`` read them.
         """
 
 
 class ScoringExplainer:
-    """What explainers share that give scores and nothing else: the time that they take is measured.
+    """The base of explainers that give scores alone; it measures the time that they take.
 
     Attributes:
         labels: what it names.
@@ -71,7 +71,7 @@ class ScoringExplainer:
 
 
 class DrawingExplainer:
-    """What explainers share that draw from a posterior: scores with variances and BALD, and the time that they take.
+    """The base of explainers that draw from a posterior: scores with variances and BALD, and the time that they take.
 
     Attributes:
         labels: what it names.
@@ -112,7 +112,7 @@ def attached(registrations: Registrations, name: str) -> np.ndarray:
     return np.asarray(registrations.attached[name], float)
 
 
-BARE = "registrations"  # what an explainer reads to which nothing is attached
+BARE = "registrations"  # `reads` of an explainer that needs nothing attached
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""GP-CA's classifiers on the descriptors of a pair: whether anything is wrong, and which causes there are."""
+"""GP-CA's classifiers on the descriptors of a pair: whether anything is wrong, and which causes it has."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class NormalisedDescriptors:
 
     @classmethod
     def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalisedDescriptors:
-        """Return what normalizes as the one of that state did."""
+        """Return the normalization of that state."""
         made = cls()
         made._quantiles_Q_F = quantiles_Q_F.numpy()
         return made
@@ -63,7 +63,7 @@ class NormalisedDescriptors:
 
 @dataclass(frozen=True)
 class Judgment:
-    """What the classifiers say of N pairs.
+    """The verdict of the classifiers on N pairs.
 
     Attributes:
         failure_N: probability that it failed.
@@ -106,7 +106,7 @@ class PairClassifier:
         return self
 
     def judge(self, inputs_N_F: np.ndarray) -> Judgment:
-        """Return what the classifiers say of descriptors that `normalized` has mapped."""
+        """Return the verdict of the classifiers on descriptors that `normalized` has mapped."""
         (failed, _, bald), *causes = (gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes))
         return Judgment(
             failure_N=failed[:, 1],
@@ -131,7 +131,7 @@ class PairClassifier:
 
     @property
     def samples(self) -> int:
-        """How many it learned."""
+        """The number of samples that it learned."""
         return len(self._failure.learned_N_d)
 
     def state(self) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""An encoder of registered pairs: trained like that of clouds, on what their points are told of the other cloud."""
+"""An encoder of registered pairs: trained as for clouds, on features that relate each point to the other cloud."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ class PairDraw:
 def learn_pair_encoder(
     registrations: Registrations, settings: EncoderSettings, draw: PairDraw, source: str, seed: int
 ) -> Callable[[Registrations], np.ndarray]:
-    """Train an encoder with a head over the concepts, drop the head, and return what embeds registrations, (N, d).
+    """Train an encoder with a head over the concepts, drop the head, and return a function to embeddings (N, d).
 
     Args:
         registrations: labeled, with the arrays of `draw` attached.
         settings: how it is trained; the backbone is one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
-        draw: what it sees.
+        draw: the view of the encoder.
         source, seed: name what is random.
     """
     make = PAIR_ENCODERS[settings.backbone]

@@ -1,1 +1,1 @@
-"""What can be measured of a pair of clouds after ICP, without knowing what happened to it."""
+"""Measurements of a pair of clouds after ICP, which need no knowledge of what was done to it."""

@@ -36,7 +36,7 @@ WIDTHS = {  # of the groups
 
 @dataclass(frozen=True)
 class Descriptors:
-    """What was measured of S registrations.
+    """The descriptors of S registrations.
 
     Attributes:
         sample, split: (S,) as in the registrations.

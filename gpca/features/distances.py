@@ -103,7 +103,7 @@ class MatchedPair:
 
 
 def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the 52 distances of the pair, and what else its local planes tell (45 numbers).
+    """Return the 52 distances of the pair, and 45 further numbers of its local planes.
 
     The second are quantiles of the model's distance from the observed cloud's planes, of |cosine| between the normals
     of partners, and of the model's thickness; the median spacings and extents of both; and the logarithms of their

@@ -1,4 +1,4 @@
-"""The groups of descriptors and some of their columns by name; nothing here needs what computes them."""
+"""The groups of descriptors and some of their columns by name; nothing here needs the code that computes them."""
 
 GROUPS = ("distances", "planes", "motion", "starts", "remedied", "entropy")
 QUANTILES = 13  # of each distance

@@ -1,4 +1,4 @@
-"""What ICP did: how far it moved the cloud, how well it then fits, and where it ends from other starts."""
+"""The motion of ICP: how far it moved the cloud, how well the cloud then fits, and where other starts end."""
 
 from __future__ import annotations
 

@@ -13,10 +13,10 @@ from gpca.causes.dataset import Causes
 
 @dataclass(frozen=True)
 class ObservedPair:
-    """What was observed and the model that was aligned to it, both in the model's frame and in diameters.
+    """The observed cloud and the model, both in the model's frame and in diameters.
 
     Attributes:
-        observed: (N, 3) where ICP put it.
+        observed: (N, 3) points, where ICP put them.
         model: (M, 3).
         T_init: 4×4, takes the observed cloud from where ICP put it back to where ICP started.
         T_runs: (n, 4, 4), takes it from there to what ICP found from other starts; the first is the identity.

@@ -1,4 +1,4 @@
-"""What every point of a registered pair is told of the other cloud, for encoders that see the pair."""
+"""Features of each point of a registered pair that relate it to the other cloud, for encoders of pairs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be measured of registrations as the paper's protocol makes them: two clouds and what ICP did, once."""
+"""Measurements of registrations as the paper's protocol makes them: two clouds and a single run of ICP."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOTION = 5  # of the relations, the last: what ICP did
 
 
 def describe_registrations(registrations: Registrations, *axes: object, points: int) -> dict[str, np.ndarray]:
-    """Return the groups of `WIDTHS`, each (N, F), of N registrations, and what their points are told.
+    """Return the groups of `WIDTHS`, each (N, F), of N registrations, and the features of their points.
 
     - distances: the 52 of :func:`gpca.features.distances.describe_distances`, in diameters.
     - relations: what of a pair does not depend on which object it is (:func:`relations`).
@@ -44,7 +44,7 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
 
 
 def observed_once(registrations: Registrations, row: int, points: int, random: np.random.Generator) -> ObservedPair:
-    """Return what may be seen of a row, thinned to so many points of each cloud, with the one run of ICP there was."""
+    """Return the observed pair of a row, each cloud thinned to `points` points, with its one run of ICP."""
     observed, model = (
         cloud[np.sort(random.permutation(len(cloud))[:points])].astype(np.float64)
         for cloud in (registrations.cloud(row), registrations.target(row))

@@ -1,8 +1,8 @@
-"""Counterfactuals that anyone can make of a registration of his own: it is run again with remedies.
+"""Counterfactuals that anyone can make of their own registration: it is run again with remedies.
 
 The observed cloud is denoised, ICP starts from farther off and the best result counts, or the observed cloud is
-aligned to the model, in which it finds partners everywhere however much of it is missing. Nothing is known of the
-truth; the result with all three remedies stands for it. So v̂ of a subset of the causes, those that are left alone, is
+aligned to the model, in which it finds partners everywhere however much of it is missing. The truth is not
+known; the result with all three remedies stands for it. So v̂ of a subset of the causes, those that are left alone, is
 how far the results with the other remedies lie from that, as v of the truth is the error without the other causes.
 """
 

@@ -1,4 +1,4 @@
-"""How much work a description may take."""
+"""Settings that bound the work of a description."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class View:
 
 
 class MeshScene:
-    """Meshes in one world frame, ready to be looked at.
+    """Meshes in one world frame, ready to be rendered.
 
     Args:
         meshes: (vertices (V, 3) in meters, faces (F, 3)) of each.
@@ -86,11 +86,11 @@ class MeshScene:
         return np.isfinite(self._cast(camera.rays(), T_world_camera)["t_hit"].numpy())
 
     def look(self, camera: Camera, T_world_camera: np.ndarray) -> View:
-        """Return what the camera sees from a pose."""
+        """Return the view of the camera from a pose."""
         return self.along(camera.rays(), T_world_camera)
 
     def along(self, rays_H_W_3: np.ndarray, T_world_camera: np.ndarray) -> View:
-        """Return what rays of a camera meet, which may be of any shape (..., 3); their z has to be 1."""
+        """Return the view along rays of a camera, of any shape (..., 3), whose z has to be 1."""
         hits = self._cast(rays_H_W_3, T_world_camera)
         hit = np.isfinite(hits["t_hit"].numpy())
         mesh = np.where(hit, hits["geometry_ids"].numpy().astype(np.int64), NOTHING)

@@ -19,9 +19,9 @@ class CleanView:
     """An instance in the frame of its object, meters.
 
     Attributes:
-        measured: (P, 3) what the sensor measured.
+        measured: (P, 3) points that the sensor measured.
         clean: (P, 3) where the rays of the same pixels meet the mesh; where one misses it, the nearest rendered point.
-        unmeasured: (V, 3) what else of the mesh the camera would see, had nothing been in front and no pixel failed.
+        unmeasured: (V, 3) the other points that the camera would see, had nothing been in front and no pixel failed.
         share: of the whole visible side that was measured.
     """
 
@@ -59,7 +59,7 @@ def clean_view(instances: Instances, i: int, mesh: MeshScene, surface_m: np.ndar
 def rendered_side(
     mesh: MeshScene, camera_3_3: np.ndarray, T_camera_object: np.ndarray, surface_m: np.ndarray
 ) -> np.ndarray:
-    """Return what a camera would see of an object at a pose, (V, 3) in the object's frame, meters; nothing in front.
+    """Return the points of an object that a camera would see at a pose, (V, 3) in its frame, meters; nothing in front.
 
     None of it is seen where a part of the object would lie behind the camera.
     """

@@ -1,4 +1,4 @@
-"""Data is refused, with the likeliest reason, where an object was measured elsewhere than its annotation says."""
+"""Checks that refuse data, with the likeliest reason, where an object was measured elsewhere than annotated."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ UNKNOWN_SHARED = "check cam_R_m2c and cam_t_m2c, cam_K, and that the models are 
 
 @dataclass(frozen=True)
 class Observation:
-    """One annotated object and what was measured of it.
+    """One annotated object and its measured points.
 
     Attributes:
         subject: where the annotation stands.

@@ -141,8 +141,7 @@ def read_instances(
         settings: how initial poses are found.
 
     Raises:
-        InputError: what the files hold is faulty, an object was measured elsewhere than its pose says, or nothing is
-            left.
+        InputError: the files are faulty, an object was measured elsewhere than its pose says, or nothing is left.
     """
     if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
         raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results or choose another pose")
@@ -176,7 +175,7 @@ def read_instances(
 
 
 def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:
-    """Return what finds an initial pose: an estimator's where one spoke of the object, else the truth with an error."""
+    """Return a function to initial poses: an estimator's if one found the object, else the truth with an error."""
     estimators = {name: _estimators(dataset) for name, (dataset, _, _) in datasets.items()}
     said: dict[int, tuple[str, np.ndarray]] = {}
     errors = EstimatorErrors({(found.name, number) for found, _, _, _ in seen for number in found.symmetric_ids()})
@@ -240,7 +239,7 @@ class _Objects:
         return rows
 
     def observation(self, frame: Frame, n: int, points_m: np.ndarray) -> Observation:
-        """Return what is judged of an annotated object."""
+        """Return the observation of an annotated object, to be judged."""
         annotation = frame.annotations[n]
         number = annotation.object_id
         T_model_object, tree = self._models[number].T_model_object, self._trees[number]

@@ -66,7 +66,7 @@ def read_bop_results(
 
 
 def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.ndarray) -> np.ndarray:
-    """Return the pose whose origin is seen nearest to the mask's center: which of several equal objects is meant."""
+    """Return the pose whose origin is seen nearest to the mask's center, as several equal objects may be in sight."""
     center_2 = pixels_P_2.mean(axis=0)
     seen = [camera_3_3 @ pose[:3, 3] for pose in poses]
     return poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - center_2) for p in seen]))]

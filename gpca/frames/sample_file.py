@@ -1,4 +1,4 @@
-"""The CSV beside registrations of depth frames: which instance each sample shows, and how far off its poses are."""
+"""The CSV beside registrations of depth frames: the instance that each sample shows, and its pose errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shots: what a robot has of an object from a viewpoint that it knows, and clouds fused from several."""
+"""Shots: a robot's measurements of an object from known viewpoints, and clouds fused from several of them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Shot:
 
 
 def median_depth(depth_n_H_W: np.ndarray) -> np.ndarray:
-    """Return the median over frames of what was measured (H, W); 0 where fewer than half of them measured anything."""
+    """Return the median depth (H, W) over frames; 0 where fewer than half of them measured anything."""
     measured = (depth_n_H_W > 0).sum(axis=0)
     # What was not measured sorts last, so the middle of what was is at half its number.
     ordered_n_H_W = np.sort(np.where(depth_n_H_W > 0, depth_n_H_W, np.inf), axis=0)

@@ -258,7 +258,7 @@ class Situations:
         return None
 
     def _in_front(self, clean: Situation, outlines: list, random: np.random.Generator) -> Placed | None:
-        """Stand another object on the table, towards the camera and as near to the object as there is room."""
+        """Stand another object on the table, toward the camera and as near to the object as there is room."""
         from shapely.affinity import translate
 
         taken = [object_.model for object_ in clean.standing]

@@ -26,7 +26,7 @@ def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) 
 
 
 def has_estimates(datasets: Mapping[str, dict]) -> bool:
-    """Return whether any of the resolved datasets says what pose estimators found, or how far off they were."""
+    """Return whether any of the resolved datasets has poses or pose errors of estimators."""
     return any(entry["results"] or entry["errors"] for entry in datasets.values())
 
 
@@ -39,7 +39,7 @@ def conditions_of(config: Mapping) -> dict[str, dict]:
 
 
 def estimated(config: Mapping) -> str:
-    """Return the frames whose initial poses are what estimators said, where there are any: a condition, or all."""
+    """Return the source whose initial poses are those of estimators: a condition's, or else that of all frames."""
     conditions = conditions_of(config).items()
     return next((f"{REAL_WORLD}_{name}" for name, entry in conditions if entry.get("form") == "results"), REAL_WORLD)
 

@@ -86,7 +86,7 @@ def axes_in(arrays: Mapping[str, np.ndarray]) -> Axes:
 
 
 def _with_axes(shapes, kinds, axes: Axes | None) -> tuple[dict, dict]:
-    """Return the shapes and kinds of what has to be read, the axes included where some are expected."""
+    """Return the shapes and kinds of the arrays to read, those of the axes included where axes are expected."""
     of: dict[str, str] = {}
     if axes is not None:
         of = {"source": TEXT} | ({} if axes[1] is None else {"seed": WHOLE})
@@ -94,7 +94,7 @@ def _with_axes(shapes, kinds, axes: Axes | None) -> tuple[dict, dict]:
 
 
 def _fault_of(name: str, array: np.ndarray) -> str | None:
-    """Return what is wrong with the values of an array, whatever it is for."""
+    """Return the fault of an array's values, of those that are faults for any purpose; None if it has none."""
     if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():
         return "NaN or infinity" if not np.isfinite(array).all() else f"numbers above {LARGEST_NUMBER:.0e}"
     if array.dtype.kind == TEXT:

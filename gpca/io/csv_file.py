@@ -1,4 +1,4 @@
-"""CSV files, every fault said in one line."""
+"""CSV files, with a one-line message for every fault."""
 
 from __future__ import annotations
 

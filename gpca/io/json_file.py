@@ -1,4 +1,4 @@
-"""JSON of others, read strictly: what the standard library lets pass in silence is refused in one line."""
+"""JSON files of others, read strictly: faults that the standard library accepts silently are refused in one line."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
 
 
 def parse_json(text: str) -> Any:
-    """Return what a JSON text holds.
+    """Return the value of a JSON text.
 
     Raises:
         ValueError: no JSON (a JSONDecodeError), nested too deeply, a key that stands twice in an object, of which

@@ -1,4 +1,4 @@
-"""How much is read into memory: what a user may have, but no more than the machine can hold.
+"""Limits of reading into memory: enough for users' files, but no more than the machine can hold.
 
 A small file may say that it is a large one, or unpack to one. So sizes are looked at before anything is read.
 """
@@ -31,8 +31,8 @@ def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float
 
     Args:
         path: the file.
-        fault: what is said where there is none.
-        remedy: what to do.
+        fault: the message where there is none.
+        remedy: the advice.
         largest_bytes: that its reader can parse.
     """
     try:
@@ -61,7 +61,7 @@ def _size(number_of_bytes: float) -> str:
 def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: str) -> None:
     """Raise an InputError unless a file of `file_bytes` may well hold so much, and the machine can.
 
-    Half of the physical memory has to do: what is read is checked, cut and converted, which takes as much again.
+    Half of the physical memory is the limit: data is checked, cut and converted, which takes as much again.
     """
     if needed_bytes > max(SMALL_BYTES, LARGEST_RATIO * file_bytes):
         found = f"would unpack to {needed_bytes / 1e9:.3g} GB, more than {LARGEST_RATIO} times its size"

@@ -13,7 +13,7 @@ from gpca.errors import InputError
 
 SPLITS = ("train", "test")
 Axes = tuple[str, int | None]  # source and seed; the objects of a source have no seed
-_BREAKS = ("Cc", "Zl", "Zp")  # control characters, and what separates lines and paragraphs
+_BREAKS = ("Cc", "Zl", "Zp")  # control characters, and separators of lines and paragraphs
 
 
 def is_name(text: str) -> bool:

@@ -1,4 +1,4 @@
-"""YAML and JSON that somebody wrote: read within bounds, with no key twice, and nothing in it but plain values."""
+"""YAML and JSON files of users: read within bounds, without repeated keys, and with plain values alone."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def read_scalar(text: str) -> Any:
 
 
 def require_plain(mapping: Mapping, subject: object) -> None:
-    """Raise an InputError for a key that is no text, and for a value that JSON has no form for.
+    """Raise an InputError for a key that is not text, and for a value that JSON cannot express.
 
     Texts with line breaks or other control characters are refused too: they would end up in file names and tables.
     """
@@ -98,7 +98,7 @@ def _entries(value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Any]]:
 
 
 def _printable(text: str) -> bool:
-    """Whether it has no control character (ASCII's or Unicode's) and no half of a surrogate pair."""
+    """Return whether a text has no control character of ASCII or Unicode and no half of a surrogate pair."""
     return not any(ord(letter) < 32 or 127 <= ord(letter) < 160 or 0xD800 <= ord(letter) < 0xE000 for letter in text)
 
 

@@ -49,14 +49,14 @@ class Clouds:
         settings: ICPSettings,
         notes: list[str],
     ) -> Clouds:
-        """Check what a user gave and bring it into the target's frame.
+        """Check a user's clouds and bring them into the target's frame.
 
         Args:
             source_points, target_points, T_target_source_init, unit, frame: as of
                 :meth:`gpca.model.explainer.Explainer.explain`.
             cloud_points: of each cloud, at most; a note says where points are left out.
             settings: of ICP.
-            notes: grow by what the user should know.
+            notes: list to which remarks for the user are added.
 
         Raises:
             InputError: see :meth:`gpca.model.explainer.Explainer.explain`.

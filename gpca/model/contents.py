@@ -1,6 +1,6 @@
 """Checks of a model file: settings within their bounds, and numbers that fit together.
 
-A model may come from anywhere. What is wrong in it has to be found when it is loaded, not when it hangs or explains.
+A model may come from anywhere. Its faults have to be found when it is loaded, not when it hangs or explains.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
 def require_possible(content: Mapping, settings: EncoderSettings) -> None:
-    """Raise a ValueError that says what cannot be in the content of a model file, whose encoder has these settings."""
+    """Raise a ValueError that names any impossible content of a model file whose encoder has these settings."""
     read_settings(EncoderSettings, vars(settings))
     read_settings(GPCSettings, content["gpc"]["settings"])
     read_settings(ICPSettings, content["icp"])

@@ -22,7 +22,7 @@ from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_ERROR = 1e-3  # diameters; below it lies the spacing of the points
-UNKNOWN = "unknown"  # the state where nothing that is said means anything
+UNKNOWN = "unknown"  # the state of a diagnosis without meaning
 LIKELY = 0.5  # probability from which a concept is called one of the causes
 
 
@@ -38,7 +38,7 @@ class Diagnosis:
         bald: of the least certain of these probabilities, nats (Eq. 7).
         expected_error: of the pose: ADD, or ADD-S of a symmetric object.
         unlikeness: how unlike the training samples the pair is: 1 % of these are above 1.
-        void: the pair is such that none of these numbers means anything (:mod:`gpca.model.voids`).
+        void: whether the pair is such that none of these numbers means anything (:mod:`gpca.model.voids`).
     """
 
     failure: float
@@ -72,11 +72,11 @@ class Diagnosis:
 
 @dataclass(frozen=True)
 class Diagnoser:
-    """Classifiers on the descriptors of a pair, and what describes one as the training samples were described.
+    """Classifiers on the descriptors of a pair, and the settings by which a pair is described as in the training.
 
     Attributes:
         classifier: of failure and of the causes.
-        error_weights: (F + 1,) regression of ln error (diameters) on the normalised descriptors, the constant last.
+        error_weights: (F + 1,) regression of ln error (diameters) on the normalized descriptors, the constant last.
         threshold: probability of failure from which something is called wrong.
         points: of each cloud, at most.
         runs: how ICP runs from other starts.
@@ -91,7 +91,7 @@ class Diagnoser:
     descriptors: DescriptorSettings
 
     def diagnose(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> Diagnosis:
-        """Say what is wrong with a registration; the same clouds give the same numbers.
+        """Diagnose a registration; the same clouds give the same numbers.
 
         Args:
             observed: (N, 3) where ICP started, in diameters and in the model's frame.

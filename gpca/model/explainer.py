@@ -1,6 +1,6 @@
-"""One registration of a user's own, with a trained model: align, say whether it is right, and why it is not.
+"""One registration of a user's own, with a trained model: align it, and tell whether it is right and, if not, why.
 
-What the workflow does with its samples is done here to two clouds, from the same functions: the target's canonical
+Two clouds are treated here as the workflow treats its samples, by the same functions: the target's canonical
 frame, ICP, the mean embedding of random draws, posterior draws.
 """
 
@@ -232,7 +232,7 @@ class Explainer:
         return spread
 
     def _decision(self, scores_C: np.ndarray, bald: float, diagnosis: Diagnosis | None, voids: list[Void]) -> Decision:
-        """Return what to do: by the diagnosis where there is one, otherwise by the scores alone."""
+        """Return the decision: by the diagnosis where there is one, otherwise by the scores alone."""
         if voids:
             return Decision(CHECK, "", ", ".join(void.check for void in voids))
         if diagnosis is None:
@@ -242,7 +242,7 @@ class Explainer:
         return self.policy.decide(np.array([*diagnosis.causes.values()]), diagnosis.bald, concepts=(*diagnosis.causes,))
 
     def _warnings(self, clouds: Clouds, diagnosis: Diagnosis | None) -> list[str]:
-        """Return what makes the scores doubtful, in words."""
+        """Return the reasons to doubt the scores, in words."""
         warnings = list(self.model.familiar.warnings(clouds.source, clouds.target)) if self.model.familiar else []
         if diagnosis is not None and diagnosis.unlikeness > 1:
             warnings.append(

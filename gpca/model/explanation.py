@@ -1,4 +1,4 @@
-"""An explanation of one registration: pose, whether it is right, the causes where it is not, and what to do."""
+"""An explanation of one registration: the pose, whether it is right, the causes if it is not, and the next action."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from gpca.model.diagnoser import UNKNOWN, Diagnosis
 from gpca.recovery.policy import NOTHING, QUEUE
 
-CHECK = "check"  # the branch where nothing that is said means anything: the user checks what was given
-WORDS = {  # what a reader is told of each branch
+CHECK = "check"  # the branch of an explanation without meaning: the user checks the input
+WORDS = {  # the advice to a reader for each branch
     NOTHING: "none",
     "reinitialize": "reinitialize ICP with a broader search",
     "new_view": "change the viewpoint",

@@ -1,4 +1,4 @@
-"""Whether two clouds are like those that a model learned: what is unlike them cannot be explained, only guessed at.
+"""Whether two clouds are like those that a model learned: unlike clouds cannot be explained, only guessed at.
 
 Three numbers of simple geometry, whose ranges over the training samples are kept with the model. None depends on the
 pose but that of size, which is measured about the clouds' own centers.

@@ -1,4 +1,4 @@
-"""The model file: all that it takes to explain a registration, in one file that can be handed on.
+"""The model file: everything needed to explain a registration, in one file that can be handed on.
 
 It holds tensors, numbers and names alone, so that loading one runs nobody's code.
 """
@@ -37,9 +37,9 @@ class Model:
         gpc: the classifier; its classes are the concepts.
         icp: how ICP ran.
         cloud_points: of source and of target, at most.
-        policy: what to do about which causes.
+        policy: the actions for the causes.
         title, stand_in: of the objects that GP-CA learned, and whether they were drawn by the package.
-        familiar: what the clouds that GP-CA learned are like; None in older files, which say nothing of it.
+        familiar: ranges of simple measures of the clouds that GP-CA learned; None in older files.
     """
 
     diagnoser: Diagnoser | None

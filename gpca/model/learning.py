@@ -1,4 +1,4 @@
-"""How a model learns what is wrong with registrations: from those whose causes were measured, of several sources."""
+"""Learning a diagnosis from the registrations of several sources whose causes were measured."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def threshold_of(failure_N: np.ndarray, false_alarms: float) -> float:
 
 
 def fit_error(inputs_N_F: np.ndarray, error_N: np.ndarray) -> np.ndarray:
-    """Return the weights (F + 1,) of a ridge regression of ln error on normalised descriptors, the constant last."""
+    """Return the weights (F + 1,) of a ridge regression of ln error on normalized descriptors, the constant last."""
     from sklearn.linear_model import Ridge
 
     fitted = Ridge(alpha=RIDGE).fit(inputs_N_F, np.log(np.maximum(error_N, SMALLEST_ERROR)))

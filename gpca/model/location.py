@@ -1,4 +1,4 @@
-"""Where the model lies that is meant. No model is opened here, so no heavy library is needed."""
+"""The path of the model to use. No model is opened here, so no heavy library is needed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def require_model(path: str | Path) -> None:
 
 
 def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path:
-    """Return the model that is meant: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
+    """Return the path to use: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
 
     Of those in `results`, by default the folder of that name in the working directory, that of the run ``real`` comes
     first, then ``embedded``, then the newest of any other, and ``smoke`` last.

@@ -1,4 +1,4 @@
-"""Where a model comes from: the data of its run, with their licenses, as the run's provenance tells."""
+"""The origin of a model: the data of its run with their licenses, by the run's provenance."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Origin:
 
     Attributes:
         record: its provenance, as :func:`gpca.process.provenance.record_provenance` wrote it.
-        sources: what it learned, in the order of the record.
+        sources: those that it learned from, in the order of the record.
     """
 
     record: Mapping
@@ -97,7 +97,7 @@ def _source(run: Path, name: str, diagnosed: bool, title: str) -> Source:
 
 
 def _addresses(settings: Mapping) -> list[str]:
-    """Return what was downloaded."""
+    """Return the addresses of the downloads."""
     entries = settings["datasets"].values() if "datasets" in settings else [settings["entry"]]
     return [url for entry in entries for url in (entry.get("urls") or [entry["url"]])]
 

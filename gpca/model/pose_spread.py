@@ -52,12 +52,12 @@ def estimated_spread(
     settings: UncertaintySettings,
     diameter: float,
 ) -> tuple[PoseSpread | None, str]:
-    """Return what an estimator says of a registration that started at the identity, or why it says nothing.
+    """Return an estimator's spread of a registration that started at the identity, or the reason why it has none.
 
     Args:
         name: of the estimator.
         source, target: in diameters; thinned to the settings' points.
-        outcome, method: what was found, and by which registration method.
+        outcome, method: the result, and the registration method that found it.
     """
     source = thin(source, settings.icp_points, "spread")
     target = thin(target, settings.icp_points, "spread", "target")

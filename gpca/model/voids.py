@@ -1,4 +1,4 @@
-"""Pairs whose explanation has no meaning: nothing that a model says of them counts.
+"""Pairs whose explanation has no meaning, so that no output of a model counts.
 
 Unlike a warning of what was rare in the training, each of these leaves no state but `UNKNOWN`, and nothing to do but to
 check what was given.
@@ -30,12 +30,12 @@ class Void:
 
 
 def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: Familiarity | None) -> list[Void]:
-    """Return what leaves the explanation of a registration without meaning, if anything.
+    """Return the faults that leave the explanation of a registration without meaning, if any.
 
     Args:
         source, target: (N, 3) and (M, 3) in diameters of the target.
         fitness: share of source points with a correspondence where the registration ended.
-        familiar: what the clouds of the training were like, where the model says.
+        familiar: ranges of the clouds of the training, if the model has them.
     """
     found = []
     if (matches := round(fitness * len(source))) < FEWEST_MATCHES:

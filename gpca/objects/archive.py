@@ -141,7 +141,7 @@ def _open(path: Path) -> zipfile.ZipFile | tarfile.TarFile:
 
 
 class _TarInfo(tarfile.TarInfo):
-    """Refuses what would be read into memory while the members are listed, since a bomb may say it is gigabytes."""
+    """A tar member that refuses a long header, since listing the members would read it into memory."""
 
     @classmethod
     def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _TarInfo:

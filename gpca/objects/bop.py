@@ -23,7 +23,7 @@ DIAMETER_TOLERANCE = 0.05
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Surfaces of a configured source: keys `objects` (ids, default all) and `unit` (default mm)."""
+    """Return surfaces of a configured source: keys `objects` (ids, default all) and `unit` (default mm)."""
     return surfaces(folder, entry.get("unit") or "mm", entry.get("objects"))
 
 
@@ -74,7 +74,7 @@ def require_entry(entry: dict, folder: Path) -> None:
 
 
 def require_models(models: Path, ids: Sequence[int]) -> None:
-    """Raise an InputError for the first object that a folder of models has no model of."""
+    """Raise an InputError for the first object without a model in a folder of models."""
     for number in ids:
         require_file(_model(models, number), "no such model", "check objects in the config, or fetch the models again")
 

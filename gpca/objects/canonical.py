@@ -55,7 +55,7 @@ def _require_resolution(points: np.ndarray, subject: object) -> None:
 
 
 def diameter(points: np.ndarray, subject: object) -> float:
-    """Largest distance between two of the (P, 3) points, in their unit (the diameter of the BOP benchmark).
+    """Return the largest distance between two of the (P, 3) points, in their unit (the diameter of the BOP benchmark).
 
     The two farthest points are vertices of the convex hull, so only those are compared; of few points, all are.
 
@@ -83,7 +83,7 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
     """Sample a surface uniformly and center it on its bounding box.
 
     A mesh gives `n_points` area-uniform samples with the normals of their triangles. A point cloud keeps all its
-    points, in random order; missing normals are estimated and turned towards the camera at the origin.
+    points, in random order; missing normals are estimated and turned toward the camera at the origin.
 
     Args:
         surface: vertices in meters.
@@ -162,7 +162,7 @@ def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tupl
 
 
 def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
-    """Return unit normals (P, 3) by the nearest neighbors of points (P, 3), turned towards a camera at the origin."""
+    """Return unit normals (P, 3) by the nearest neighbors of points (P, 3), turned toward a camera at the origin."""
     cloud = open3d_cloud(points_m)
     cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBORS))
     cloud.orient_normals_towards_camera_location(np.zeros(3))

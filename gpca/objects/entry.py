@@ -55,7 +55,7 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class NamedSource(Source):
-    """A source of the config, which says what it is."""
+    """A source of the config, with a title and a kind."""
 
     title: Text = field()
     kind: str = field()

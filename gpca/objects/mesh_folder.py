@@ -18,7 +18,7 @@ METERS_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Surfaces of a configured source: keys `files` (patterns, default every mesh of the folder) and `unit`."""
+    """Return surfaces of a configured source: keys `files` (patterns, default every mesh of the folder) and `unit`."""
     return surfaces(files_in(folder, entry.get("files"), SUFFIXES), entry.get("unit"))
 
 
@@ -30,14 +30,14 @@ def surfaces(paths: Iterable[Path], unit: str | None) -> Iterator[Surface]:
 
 
 def meters_per(unit: str | None) -> float:
-    """Meters in one `unit`; InputError for a unit other than m, cm, mm."""
+    """Return the meters in one `unit`; InputError for a unit other than m, cm, mm."""
     if unit not in METERS_PER_UNIT:
         raise InputError(f"unit '{unit}'", "is not a known unit of length", "set unit: m, cm or mm")
     return METERS_PER_UNIT[unit]
 
 
 def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Sequence[str]) -> list[Path]:
-    """Files of a folder, sorted: those that the glob patterns name, or else all with one of the suffixes.
+    """Return the files of a folder, sorted: those that the glob patterns name, or else all with one of the suffixes.
 
     Raises:
         InputError: no such folder, an empty one, a pattern without a match, a match of another format.
@@ -99,7 +99,7 @@ def read_surface(path: Path, scale: float) -> Surface:
 
 
 def _cloud_normals(cloud, path: Path) -> np.ndarray | None:
-    """Unit normals that the PLY of a point cloud carries; None when it has none."""
+    """Return the unit normals that the PLY of a point cloud carries; None when it has none."""
     vertex = cloud.metadata["_ply_raw"]["vertex"]  # the only place where trimesh keeps a cloud's normals
     axes = ("nx", "ny", "nz")
     if not set(axes) <= set(vertex["properties"]):

@@ -1,4 +1,4 @@
-"""A configured source of objects: where its data is, and its surfaces.
+"""A configured source of objects: the place of its data, and its surfaces.
 
 A kind of source is a module beside this one with ``from_entry(entry, folder) -> Iterator[Surface]``; a new kind is
 such a file and nothing else; with a ``require_entry(entry, folder)`` it can refuse an entry whose data is at hand, as

@@ -1,4 +1,4 @@
-"""A surface: what every kind of source yields, a mesh or a point cloud in meters; and views, which their names tell.
+"""A surface, which every kind of source yields: a mesh or a point cloud in meters; and views, told by their names.
 
 RGB-D datasets have views: clouds of one instance from several sides.
 """

@@ -25,7 +25,7 @@ _View = tuple[str, Callable[[], bytes], str]  # name, reader of its bytes, subje
 
 
 def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
-    """Surfaces of a configured source: keys `files`, `unit` (default m), `views_per_instance` (default 6)."""
+    """Return surfaces of a configured source: keys `files`, `unit` (default m), `views_per_instance` (default 6)."""
     paths = [place] if place.is_file() else files_in(place, entry.get("files"), SUFFIXES)
     return surfaces(paths, entry.get("unit", "m"), entry.get("views_per_instance", 6))
 

@@ -1,7 +1,7 @@
 """Describes a run as an RO-Crate: one JSON-LD file that names every result, the job that made it, and from what.
 
 It holds what the records of provenance beside the results say, in the form of RO-Crate 1.1 with its profile for runs of
-single programs, so that catalogues and archives of data can read it.
+single programs, so that catalogs and archives of data can read it.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def read_jobs(folder: Path) -> list[dict[str, Any]]:
     """Return the records of a run's jobs, by their first output; a job that wrote several files left one beside each.
 
     Paths are relative to the run's folder: the ``outputs``, and of the ``inputs`` those that lie in it. The job that
-    writes the crate is left out: what an earlier one has left says nothing of this one.
+    writes the crate is left out: the record of an earlier one says nothing of this one.
     """
     paths_of = defaultdict(list)
     for path in sorted(folder.rglob(f"*{RECORD}")):
@@ -117,7 +117,7 @@ def _relative(folder: Path, path: Path) -> str:
 
 
 def _part(path: str, digest: str | None) -> dict[str, Any]:
-    """A result of the run; its hash is known where another job read it."""
+    """Return a result of the run; its hash is known where another job read it."""
     form = mimetypes.guess_type(path)[0]
     entity: dict[str, Any] = {"@id": path, "@type": "Dataset" if path.endswith("/") else "File", "name": path}
     entity |= {"encodingFormat": form} if form else {}
@@ -139,7 +139,7 @@ def _action(job: Mapping[str, Any], named: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _software(code: Mapping[str, Any], libraries: Mapping[str, str]) -> dict[str, Any]:
-    """The suite in one state of its code."""
+    """Return the suite in one state of its code."""
     commit = f", commit {code['commit']}" if code["commit"] else ""
     changed = " with uncommitted changes" if code["dirty"] else ""
     return {

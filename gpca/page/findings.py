@@ -1,4 +1,4 @@
-"""What a run found, in sentences with the numbers of its files: what the page of the run opens with."""
+"""The findings of a run, in sentences with the numbers of its files, which open the page of the run."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Titles:
 
 
 def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Finding]:
-    """Return what the collected files of a run say, of those findings whose files and results are there.
+    """Return the findings from the collected files of a run, as far as their files and results are there.
 
     Args:
         folder: The folder ``results/{run}``.

@@ -20,7 +20,7 @@ from gpca.reporting.registry import SUFFIXES, by_section
 
 TEMPLATES = Path(__file__).parent / "templates"
 KEY_FIGURES = ("causes_example", "fig2_overview")  # The page opens with the first of these that the run has.
-_CSS_PIXELS = 170 / 300  # A figure's pixel, of 300 in an inch, takes so many: its letters are as large as the text's.
+_CSS_PIXELS = 170 / 300  # A figure's pixel, of 300 in an inch, takes this many: its letters are as large as the text's.
 
 
 @dataclass(frozen=True)
@@ -154,12 +154,12 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
 
 
 def _config(sections: dict | None) -> str:
-    """One hash for those of all sections, or "none" where the step was run by hand."""
+    """Return one hash for those of all sections, or "none" where the step was run by hand."""
     return sha256_of_settings(sections) if sections else "none"
 
 
 def _device(device: dict) -> str:
-    """The processor in words, with the level of instructions that its libraries were held to, and the GPU."""
+    """Return the processor in words, with the level of instructions its libraries were held to, and the GPU."""
     kind = f"{device['vendor']}, family {device['family']}, model {device['model']}, {device['instructions']}"
     return ", ".join(filter(None, [f"{device['name']} ({kind})", device["gpu"]]))
 

@@ -1,4 +1,4 @@
-"""Picks the registrations that the page shows in 3-D, and says how their clouds lie and what GP-CA says of them."""
+"""Picks the registrations that the page shows in 3-D, with the poses of their clouds and GP-CA's predictions."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _STEPS_PER_DIAMETER = 1000  # Coordinates are whole thousandths of the diameter.
 
 
 def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limits) -> list[dict]:
-    """Return what the page's 3-D view needs of the samples of one source that `RULE` names, as plain JSON values.
+    """Return the samples of one source that `RULE` names, for the page's 3-D view, as plain JSON values.
 
     Each holds the target and the ICP-aligned source as flat lists x, y, z of at most `POINTS` points each, in
     thousandths of the object's diameter, and the 4×4 transforms (row by row, in diameters) that take the aligned source
@@ -74,7 +74,7 @@ def first_of_each_concept(registrations: Registrations) -> list[int]:
 
 
 def severity_words(registrations: Registrations, row: int) -> str:
-    """Return what was done to a sample; lengths are in % of the object's diameter."""
+    """Return a sample's perturbation in words; lengths are in % of the object's diameter."""
     concept = str(registrations.concept[row])
     if concept == "noise":
         return f"σ = {100 * registrations.severity_noise[row]:.1f} % of the diameter"

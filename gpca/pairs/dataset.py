@@ -97,7 +97,7 @@ class Registrations:
         return replace(self, **columns, attached=attached)
 
     def without_labels(self) -> Registrations:
-        """Return the same registrations as an explainer may see them: nothing that tells what was perturbed."""
+        """Return the same registrations as explainers may see them, without anything that reveals the perturbation."""
         nan_S = np.full(len(self), np.nan)
         unknown: dict[str, Any] = dict.fromkeys(
             (name for name in REGISTRATION_COLUMNS if name.startswith("severity_")), nan_S
@@ -144,7 +144,7 @@ class Registrations:
 
 
 def _possible(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return for each array which of its entries can be."""
+    """Return for each array which of its entries are possible."""
     possible = {name: arrays[name] >= 0 for name in ("sample", "object_index", "inlier_rmse")}
     possible |= {name: arrays[name] >= 0 for name in arrays if name.startswith("severity_")}
     possible |= {name: np.abs(arrays[name]) <= FARTHEST for name in ("points", "target_points")}
@@ -195,7 +195,7 @@ def load_embeddings(
 
 
 def read_embedding(path: str | Path, registrations: Registrations, logits: bool = False) -> dict[str, np.ndarray]:
-    """Read what is attached to the registrations of an encoder: ``embedding`` (S, d), if asked ``head_logits`` (S, C).
+    """Read an encoder's arrays to attach to the registrations: ``embedding`` (S, d), if asked ``head_logits`` (S, C).
 
     Raises:
         InputError: as :func:`load_embeddings`.

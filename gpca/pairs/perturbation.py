@@ -100,7 +100,7 @@ def within_half_space(along_N: np.ndarray, share: float, fewest: int) -> np.ndar
     """Return the rows, in order, that are left when a half-space takes a share of the points, but for the fewest.
 
     Args:
-        along_N: how far each point lies along the normal of the plane, towards what is lost.
+        along_N: how far each point lies along the normal of the plane, toward what is lost.
     """
     left = max(min(fewest, len(along_N)), round(len(along_N) * (1 - share)))
     return np.sort(np.argsort(along_N, kind="stable")[:left])

@@ -44,7 +44,7 @@ def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Reg
 def registered_backwards(registrations: Registrations, settings: ICPSettings) -> Registrations:
     """Return the same pairs aligned by ICP from the model to what was observed.
 
-    What is seen is the observed cloud as before, moved by the inverse of ICP's result into the frame of the model.
+    The encoder sees the observed cloud as before, moved by the inverse of ICP's result into the frame of the model.
     """
     clouds, targets, poses, fits = [], [], [], []
     for row in range(len(registrations)):

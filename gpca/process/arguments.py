@@ -12,10 +12,10 @@ from gpca.numerals import whole
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """A parser whose errors are one line, as every other refusal of the suite, and whose names are on one line, too."""
+    """A parser whose errors take one line, as everywhere in the suite, and whose names do too."""
 
     def parse_args(self, args=None, namespace=None):
-        """Parse; what is given as text, and not as a path or a number, names something, but for the settings."""
+        """Parse; every text but the settings, if it is neither a path nor a number, has to be a name."""
         options = super().parse_args(args, namespace)
         for option, value in vars(options).items():
             for text in value if isinstance(value, list) else [value]:

@@ -34,7 +34,7 @@ def _cache_folder() -> Path:
 
 
 def _temporary() -> Path:
-    """Return a folder of this user's alone: what lies there is code that will be run."""
+    """Return a folder that belongs to this user alone, since the code in it will be run."""
     folder = Path(tempfile.gettempdir(), f"gpca-numba-{os.getuid()}")
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -95,4 +95,4 @@ class _Notice(Listener):
         self.printed = True
 
     def on_end(self, event: object) -> None:
-        """Others are compiled after the first one."""
+        """Do nothing: the line is printed at the start."""

@@ -26,7 +26,7 @@ SYSTEM_PACKAGES = {
 
 
 def system_library_hint(message: str) -> str | None:
-    """Return what to install for the dynamic linker's `message`, or None if it names no missing shared library."""
+    """Return the advice for the dynamic linker's `message`, or None if it names no missing shared library."""
     missing = re.search(r"(\S+\.so[.\d]*): cannot open shared object file", message)
     if missing is None:
         return None

@@ -2,7 +2,7 @@
 
 Python raises KeyboardInterrupt wherever it happens to be. Inside a callback of compiled code (as llvmlite has them for
 numba's compiler), a ``__del__`` or a weakref callback, it prints "Exception ignored in" and goes on; numba raises a
-SystemError instead. So the signal is remembered besides, and :func:`raise_if_interrupted` raises it anew.
+SystemError instead. So the signal is also remembered, and :func:`raise_if_interrupted` raises it again.
 """
 
 from __future__ import annotations

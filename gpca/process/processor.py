@@ -71,9 +71,9 @@ def cpu_name() -> str:
 
 
 def describe() -> dict[str, str | list[str] | None]:
-    """Return what decides which code a library chooses: name, vendor, family, model, flags of vector instructions.
+    """Return the facts by which libraries choose their code: name, vendor, family, model, flags of vector instructions.
 
-    A field that the system does not tell is None.
+    A field that the system does not report is None.
     """
     told = _cpuinfo()
     vector = ("avx", "fma", "amx", "bmi", "f16c", "sse4")
@@ -93,7 +93,7 @@ def _flags() -> set[str]:
 
 
 def _cpuinfo() -> dict[str, str]:
-    """The fields of the first processor that Linux tells, or none."""
+    """Return the fields of the first processor that Linux lists, or none."""
     if not CPUINFO.exists():
         return {}
     first = CPUINFO.read_text(encoding="utf-8").split("\n\n", 1)[0]

@@ -14,7 +14,7 @@ Item = TypeVar("Item")
 def progress(items: Iterable[Item], title: str, **options) -> Iterator[Item]:
     """Iterate with a progress bar on a terminal, and with a line every ten seconds in a log file.
 
-    What ends before the first of them leaves none: a fault that is found at once is the only line.
+    Work that ends before the first update shows none, so that a fault that is found at once is the only line.
 
     Raises:
         KeyboardInterrupt: at the next item, where Ctrl-C was lost meanwhile.

@@ -1,4 +1,4 @@
-"""Where a result comes from: a JSON sidecar beside every output, apart from the data so that those stay comparable."""
+"""The provenance of results: a JSON sidecar beside every output, apart from the data, which stay comparable."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def record_provenance(
 
     Args:
         outputs, inputs: files; the inputs are hashed (SHA-256).
-        settings: what the result depends on besides its inputs.
+        settings: all that the result depends on besides its inputs.
         seed: the repeat, if there is one.
         folders: the outputs are folders.
 
@@ -75,7 +75,7 @@ def sha256_of_settings(settings: object) -> str:
 
 
 def _code_version() -> dict[str, object]:
-    """The version, the commit, and whether tracked files differ from it.
+    """Return the version, the commit, and whether tracked files differ from it.
 
     Commit and changes are null without git and where git does not keep this package: a virtual environment may well lie
     in the checkout of another project, whose commit says nothing of this code.
@@ -99,7 +99,7 @@ def _git(*arguments: str) -> str | None:
 
 
 def _gpu() -> str | None:
-    """The GPU, where torch was loaded and uses one."""
+    """Return the name of the GPU, where torch was loaded and uses one."""
     torch = sys.modules.get("torch")
     return torch.cuda.get_device_name() if torch is not None and torch.cuda.is_available() else None
 

@@ -1,4 +1,4 @@
-"""What a command prints, so that it arrives in any encoding, and so that nothing is lost in silence."""
+"""Output of a command that arrives in any encoding, with an error wherever some of it is lost."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def standard_streams() -> Iterator[None]:
 
 
 def say(line: str) -> None:
-    """Print a line to stderr; where that cannot be written, the status of the process has to do."""
+    """Print a line to stderr; where that fails, the status of the process has to suffice."""
     try:
         print(line, file=sys.stderr, flush=True)
     except OSError:
@@ -46,5 +46,5 @@ def say(line: str) -> None:
 
 
 def _discard(stream: TextIO) -> None:
-    """Let go what a stream still holds: Python flushes once more when it ends, and would complain in its own words."""
+    """Drop what a stream still holds: Python flushes once more when it ends, and would complain in its own words."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -1,1 +1,1 @@
-"""What to do about an uncertain registration, and a closed loop that measures it."""
+"""Policies and actions for uncertain registrations, and the settings of the closed loop that measures them."""

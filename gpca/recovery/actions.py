@@ -1,4 +1,4 @@
-"""What a robot can do about a registration that failed, by name: search more broadly, look again, measure better.
+"""Actions of a robot on a failed registration, by name: search more broadly, look again, measure better.
 
 An action takes what the robot has (:class:`Holding`) and what it can do with its camera, and
 returns what it has then; the registration is made anew from that. No action is told the true pose.
@@ -25,7 +25,7 @@ BEHIND = (0.1, 0.25)  # the center is tried so many diameters behind the middle 
 
 
 class Robot(Protocol):
-    """What an action may use: the camera, and what is known of the object."""
+    """The means of an action: the camera, and the known shape of the object."""
 
     points_m: np.ndarray
     normals: np.ndarray
@@ -42,7 +42,7 @@ class Robot(Protocol):
 
 @dataclass(frozen=True)
 class Holding:
-    """What a robot has of a case.
+    """A robot's state in a case: its shots, its poses and how it measures.
 
     Attributes:
         shots: one per viewpoint.

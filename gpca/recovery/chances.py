@@ -15,7 +15,7 @@ INVERSE_REGULARizATION = 0.3  # chosen on failures of development seeds
 
 @dataclass(frozen=True)
 class Trial:
-    """What was known of a registration when an action was tried on it, and whether that made its pose right.
+    """One try of an action: what was known of the registration, and whether its pose was right afterward.
 
     Attributes:
         known_F: see :func:`gpca.experiments.recovery.rehearsal.known`.
@@ -30,7 +30,7 @@ class Trial:
 class Chances:
     """A logistic regression for each action, and one for doing nothing, on standardized numbers.
 
-    What always or never helped in the trials gets the rate of Laplace's rule of succession, whatever is known.
+    An action that always or never helped in the trials gets the rate of Laplace's rule of succession.
 
     Args:
         trials: of the training tables.
@@ -54,7 +54,7 @@ class Chances:
 def learn_utility(
     trials: Iterable[Sequence[Trial]], costs: Mapping[str, float], actions: Sequence[str], needless: float = 0.0
 ) -> ExpectedUtility:
-    """Return the policy that the trials of these episodes teach."""
+    """Return the policy learned from the trials of these episodes."""
     together = [trial for of_episode in trials for trial in of_episode]
     return ExpectedUtility(Chances(together, actions), {action: costs[action] for action in actions}, needless)
 
@@ -89,7 +89,7 @@ class ExpectedUtility:
     needless: float = 0.0
 
     def decide(self, known_F: np.ndarray, before: Iterable[str], alarmed: bool = False) -> Decision:
-        """Choose what is done next.
+        """Choose the next action.
 
         An action that was taken without success comes again only after all others. A robot that is asked again knows
         that its pose is wrong yet, as one does that was alarmed.

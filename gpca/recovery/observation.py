@@ -1,4 +1,4 @@
-"""What a robot can tell of its registration without the truth: distances, agreement with the shots, what it did."""
+"""Numbers that a robot can measure without the truth: distances, agreement with the shots, the motion of ICP."""
 
 from __future__ import annotations
 

@@ -19,13 +19,13 @@ from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, 
 
 @dataclass(frozen=True)
 class Case:
-    """What a policy knows when it decides.
+    """The knowledge of a policy when it decides.
 
     Attributes:
         actions: those that were taken, in order.
         scores_T_C, bald_T: what its explainer said at the start and after each action; None where it reads none.
-        known_F: all that is known of the registration (:func:`gpca.experiments.recovery.rehearsal.known`), for whoever
-            learns from it.
+        known_F: all that is known of the registration (:func:`gpca.experiments.recovery.rehearsal.known`), for
+            policies that learn.
         cause: of a failure, for the oracle alone; empty for all others.
         random: the case's own numbers for policies, from their start: the same at every decision.
     """
@@ -43,7 +43,7 @@ Decide = Callable[[Case], Decision]
 
 @dataclass(frozen=True)
 class Means:
-    """What policies are made from: the robot's thresholds and treatments, its actions, and what it has rehearsed."""
+    """The ingredients of policies: the robot's thresholds and treatments, its actions, and its rehearsed utility."""
 
     policy: RecoveryPolicy
     actions: Sequence[str]
@@ -56,7 +56,7 @@ class PolicyEntry:
 
     Attributes:
         title: what tables call it.
-        make: what makes it.
+        make: function that makes it.
         explainer: the one that it reads (:mod:`gpca.explainers.registry`), empty for none.
         queues: whether it leaves cases to a person, whose labels its explainer can learn.
         learns: whether it needs rehearsals.
@@ -78,7 +78,7 @@ def follow_scores(means: Means) -> Decide:
 
     def decide(case: Case) -> Decision:
         scores_T_C, bald_T = case.scores_T_C, case.bald_T
-        assert scores_T_C is not None and bald_T is not None  # whoever reads an explainer is given both
+        assert scores_T_C is not None and bald_T is not None  # policies that read an explainer are given both
         bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
         before = []
         for step, action in enumerate(case.actions):
@@ -109,7 +109,7 @@ def weigh_alarmed(means: Means) -> Decide:
 
 def _weigh(means: Means, alarmed: bool) -> Decide:
     utility = means.utility
-    assert utility is not None  # whoever learns is given rehearsals
+    assert utility is not None  # policies that learn are given rehearsals
 
     def decide(case: Case) -> Decision:
         assert case.known_F is not None
@@ -119,7 +119,7 @@ def _weigh(means: Means, alarmed: bool) -> Decide:
 
 
 def act_at_random(means: Means) -> Decide:
-    """Take any action, the same one again too."""
+    """Take any action at random; the same one may come again."""
 
     def decide(case: Case) -> Decision:
         # The case's numbers start anew at every decision, so the draws before are drawn again.
@@ -146,7 +146,7 @@ def follow_truth(means: Means) -> Decide:
 
 
 def always_act(action: str) -> Callable[[Means], Decide]:
-    """Return what makes the policy of one and the same action."""
+    """Return a maker of the policy that always takes this action."""
     return lambda means: lambda case: Decision(action, "", "always")
 
 

@@ -1,8 +1,8 @@
-"""What to do about an uncertain registration: from concept scores to one of four branches (paper Sec. V, Fig. 6).
+"""The policy for uncertain registrations: from concept scores to one of four branches (paper Sec. V, Fig. 6).
 
 A case is queued for labeling where the classifier is uncertain about it or no concept dominates; else the dominant
 concept is treated: reinitialize ICP with a broader search (pose), change the viewpoint (overlap), filter and check the
-sensor (noise). After each action the scores are worked out anew, and after a few attempts that improved too little
+sensor (noise). After each action the scores are computed again, and after a few attempts that improved too little
 the case is queued as well.
 """
 
@@ -110,7 +110,7 @@ class RecoveryPolicy:
         Args:
             scores_C: scores ŝ_c that sum to one.
             bald: uncertainty in nats; 0 where an explainer has none.
-            before: what was done about this case already, in order.
+            before: the actions taken in this case so far, in order.
         """
         limits = self.thresholds
         stale = [treated.concept for treated in before if treated.fall < limits.improvement]

@@ -1,4 +1,4 @@
-"""What the closed loop reads of the config, as settings of the library's own classes."""
+"""The settings of the closed loop, read from the config into the library's own classes."""
 
 from __future__ import annotations
 

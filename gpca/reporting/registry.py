@@ -19,7 +19,7 @@ Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list
 
 @dataclass(frozen=True)
 class Input:
-    """What becomes one argument of a builder.
+    """The source of one argument of a builder.
 
     Attributes:
         argument: its name.
@@ -139,7 +139,7 @@ class Result:
 
 
 class HasSection(Protocol):
-    """What stands in a section of the paper."""
+    """Anything that stands in a section of the paper."""
 
     @property
     def section(self) -> str:
@@ -183,7 +183,7 @@ def by_section(results: Iterable[InSection]) -> dict[str, list[InSection]]:
 
 
 def input_name(argument: str, keyword: str) -> str:
-    """Return what the files of an input are called: the argument, and the reader's keyword where it has several."""
+    """Return the name of an input's files: the argument, and the reader's keyword where it has several."""
     return f"{argument}_{keyword}" if keyword else argument
 
 

@@ -1,4 +1,4 @@
-"""What every collecting and drawing script of the workflow does around its one call."""
+"""Runs every collecting and drawing script of the workflow: log, provenance and errors around its one call."""
 
 from __future__ import annotations
 

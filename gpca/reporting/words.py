@@ -41,7 +41,7 @@ def span(numbers: Iterable[float]) -> str:
 
 
 def dataset_in_words(name: str) -> str:
-    """Return what a reader calls a dataset of depth frames: ``YCB-Video`` for ``ycbv``."""
+    """Return the usual name of a dataset of depth frames: ``YCB-Video`` for ``ycbv``."""
     return BOP_TITLES.get(name, in_words(name))
 
 
@@ -51,7 +51,7 @@ def in_words(name: object) -> str:
 
 
 def object_in_words(name: object, dataset: str = "") -> str:
-    """Return what a reader calls an object: ``mug`` for ``ycb_025_mug``, ``cat`` for ``obj_000006`` of ``lmo``.
+    """Return the usual name of an object: ``mug`` for ``ycb_025_mug``, ``cat`` for ``obj_000006`` of ``lmo``.
 
     A number alone says nothing without its dataset, so that it is ``object 6 of mine`` where the names are not known.
     """
@@ -66,6 +66,6 @@ def object_in_words(name: object, dataset: str = "") -> str:
 
 
 def object_of_frames(name: object) -> str:
-    """Return what a reader calls an object of depth frames, whose files name it by dataset and model."""
+    """Return the usual name of an object of depth frames, whose files name it by dataset and model."""
     dataset, _, model = str(name).partition(" ")
     return object_in_words(model, dataset) if model else object_in_words(dataset)

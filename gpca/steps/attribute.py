@@ -32,7 +32,7 @@ def run(job: Job) -> None:
             registrations = _load(entry, axes, *inputs)
             observed = registrations if entry.oracle else registrations.without_labels()
             started = perf_counter()
-            if isinstance(explainer, Describing):  # once, for what it learns from and what it is asked about
+            if isinstance(explainer, Describing):  # once, for training and for explanation
                 observed = explainer.describe(observed)
             describing_seconds = (perf_counter() - started) / len(observed)
             train = registrations.rows("train")

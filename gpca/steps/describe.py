@@ -1,4 +1,4 @@
-"""Step ``describe``: causes -> ``descriptors/{source}/seed{seed}.npz``, what can be measured of each pair."""
+"""Step ``describe``: causes -> ``descriptors/{source}/seed{seed}.npz``, the descriptors of each pair."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Step ``model``: what all sources say of causes, and GP-CA of one -> ``model.pt``, for ``python -m gpca explain``."""
+"""Step ``model``: causes of all sources, and GP-CA of one -> ``model.pt``, for ``python -m gpca explain``."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from gpca.process.provenance import record_provenance
 
 
 def run(job: Job) -> None:
-    """Lay the tables, look at them and write what was seen."""
+    """Lay the tables, render them and write the frames."""
     given = dict(job.settings)
     datasets = given.pop("datasets", None)
     settings = SceneSettings.from_dict(given)

@@ -1,4 +1,4 @@
-"""The names of the conditions that each design runs, for those who only read its outcomes: nothing here is slow."""
+"""The names of the conditions that each design runs, for readers of its outcomes; nothing here is slow to load."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gpca.pairs.perturbation import CONCEPTS
 
 
 class Remedies(NamedTuple):
-    """What is switched on, in the order of the concepts noise, pose, overlap."""
+    """The switches of the remedies, in the order of the concepts noise, pose, overlap."""
 
     denoise: bool = False
     restart: bool = False

@@ -44,7 +44,7 @@ class Design:
         conditions: (K,) their names.
         reference: number of the clean condition.
         splits: which rows are evaluated.
-        oracle: needs to know what was perturbed.
+        oracle: whether it needs to know what was perturbed.
     """
 
     evaluate: Callable[[RegisteredRow, np.ndarray, UncertaintySettings, np.random.Generator], list[Spread]]

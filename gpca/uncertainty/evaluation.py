@@ -41,7 +41,7 @@ def evaluate_design(
 ) -> tuple[Outcomes, np.ndarray, np.ndarray]:
     """Run every condition of the design for every registration.
 
-    What is random in a sample is named by source, seed, split and number, not by the design: the observed pair has
+    The random numbers of a sample are named by source, seed, split and number, not by the design: the observed pair has
     the same starts in all of them.
 
     Returns:

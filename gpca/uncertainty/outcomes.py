@@ -1,4 +1,4 @@
-"""The outcomes of a design (designs.py) for S registrations: the files that hold them, and what explainers get."""
+"""The outcomes of a design (designs.py) for S registrations: their files, and their form for explainers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Outcomes:
         covariance: (S, K, 6, 6) of the pose twists, radians and diameters.
         uncertainty: (S, K) u of the condition against the design's clean one, nats.
         residual: (S, K) log distance from the target to the source, diameters.
-        degenerate: (S, K) the covariance says nothing: no correspondences in any run, or one pose in all.
+        degenerate: (S, K) whether the covariance says nothing: no correspondences in any run, or one pose in all.
         icp_calls: (S, K) runs of ICP.
     """
 

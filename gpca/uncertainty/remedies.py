@@ -53,7 +53,7 @@ class RemedyRuns:
         self._target = target
 
     def __call__(self, remedies: Remedies) -> Spread:
-        """Evaluate one combination; what several share is worked out, and charged, once."""
+        """Evaluate one combination; work that several share is done, and charged, once."""
         started = perf_counter()
         tree, points = self._denoised if remedies.denoise else self._observed
         icp, target = self._trimmed if remedies.trim else self._whole

@@ -1,4 +1,4 @@
-"""Settings of Monte-Carlo ICP, apart from what runs it: nothing here needs compiled loops."""
+"""Settings of Monte-Carlo ICP, kept apart from the code that runs it: nothing here needs compiled loops."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def start_deviation(rotation_deg: float, translation: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class UncertaintySettings:
-    """How the spread is measured.
+    """Settings of how the spread is measured.
 
     Attributes:
         starts: n, initial poses per condition.

@@ -24,7 +24,7 @@ SMALLEST_RESIDUAL = 1e-6  # diameters; a cloud on itself counts as this far off,
 
 @dataclass(frozen=True)
 class Runs:
-    """What ICP made of n starts.
+    """The results of ICP from n starts.
 
     Attributes:
         T_target_source_n: (n, 4, 4).
@@ -73,12 +73,12 @@ def run_from_starts(icp: BatchedICP, source: np.ndarray, T_target_source_init: n
 
 @dataclass(frozen=True)
 class Spread:
-    """What is kept of one condition, e.g. one setting of the knobs.
+    """The summary of one condition, e.g. one setting of the knobs.
 
     Attributes:
         covariance: Σ (6, 6).
         residual: log of the root mean square distance from the target's points to the source at the best run's pose.
-        degenerate: the covariance says nothing (:meth:`Runs.degenerate`).
+        degenerate: whether the covariance says nothing (:meth:`Runs.degenerate`).
         icp_calls, icp_seconds, seconds: what the condition cost.
     """
 

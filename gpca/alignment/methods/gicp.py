@@ -1,6 +1,6 @@
 """Generalized ICP (Segal et al. 2009): planes in both clouds, by Open3D and by small_gicp (Koide 2024).
 
-The suite does without the package small_gicp where it is missing.
+The package small_gicp is optional.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ FEWEST = 3  # correspondences that determine a rigid motion
 
 
 class FailedRegistration(Exception):
-    """Raised inside a method that cannot go on; the registry makes a failed outcome of it."""
+    """Raised inside a method that cannot go on; the registry turns it into a failed outcome."""
 
 
 @dataclass(frozen=True)

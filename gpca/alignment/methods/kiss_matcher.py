@@ -1,4 +1,4 @@
-"""KISS-Matcher (Lim et al. 2025): features, pruning and a robust solver, by a package that the suite does without."""
+"""KISS-Matcher (Lim et al. 2025): features, pruning and a robust solver, by an optional package."""
 
 from __future__ import annotations
 

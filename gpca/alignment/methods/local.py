@@ -1,4 +1,4 @@
-"""Local methods: one step more than they took tells whether they have come to rest."""
+"""Local methods: one further step tells whether they have come to rest."""
 
 from __future__ import annotations
 
@@ -34,6 +34,6 @@ def align_by_open3d(
 
 
 def failure_of_a_step(pair: Pair, T_found: np.ndarray, T_further: np.ndarray, max_iterations: int) -> str:
-    """Return why a pose is none to stop at, given that of one step more, or nothing if it is."""
+    """Return why a method must not stop at a pose, given the pose after one more step; empty if it may."""
     moved_N_3 = transform(T_further, pair.source) - transform(T_found, pair.source)
     return still_moving(max_iterations) if np.linalg.norm(moved_N_3, axis=1).max() > AT_REST else ""

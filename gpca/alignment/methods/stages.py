@@ -60,7 +60,7 @@ class Stages:
         rows: of the source that take part, or None for all.
         reject: from matches to those that are kept.
         weigh: from matches to their weights (n,).
-        metric: what is minimized.
+        metric: the distance that is minimized.
         distance: farther points are no match.
     """
 
@@ -97,7 +97,7 @@ def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndar
     """Iterate until the share of matches and their RMSE change no more, as in Open3D.
 
     Returns:
-        the pose, the matches there, and why it is none to stop at, if so.
+        the pose, the matches there, and the reason why it must not stop there, if any.
     """
     from gpca.alignment.icp_kernels import CONVERGED
 

@@ -22,7 +22,7 @@ def titles() -> dict[str, str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Section(ActiveLearningSettings):
-    """The rounds, the concepts that the classifier has never seen, and the encoder that has not either."""
+    """The rounds, the concepts that the classifier has never seen, and the encoder that has not seen them either."""
 
     held_out: Distinct[Concept]
     target: PositiveShare

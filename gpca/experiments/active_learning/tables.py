@@ -117,7 +117,7 @@ def table3_extended(
 def table3_stream(
     metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
 ) -> Table:
-    """Return the stream form: labels asked for, arrivals until a new concept is recognised, accuracy."""
+    """Return the stream form: labels asked for, arrivals until a new concept is recognized, accuracy."""
     stream = conditions["stream"]
     quantities = {
         f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **COUNT), concept=c) for c in _concepts(metrics)

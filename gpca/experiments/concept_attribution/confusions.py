@@ -1,4 +1,4 @@
-"""Draws what every explainer takes each concept for: confusion matrix and predicted classes, explainers by sources."""
+"""Draws the confusion matrix and the predicted classes of every explainer on every source."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _key(confusion: pd.DataFrame, abstained: bool) -> str:
 
 
 def letters(concepts: list[str]) -> list[str]:
-    """Return the shortest capitalized beginnings that tell the concepts apart; what is nominal is OK."""
+    """Return the shortest capitalized beginnings that tell the concepts apart; nominal becomes OK."""
     others = {concept for concept in concepts if concept != NOMINAL}
     length = next(n for n in range(1, 99) if len({concept[:n] for concept in others}) == len(others))
     return ["OK" if concept == NOMINAL else concept[:length].capitalize() for concept in concepts]

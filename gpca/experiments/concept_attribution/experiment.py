@@ -1,4 +1,4 @@
-"""How often each explainer names the concept that was perturbed, and what that costs (Tables I and II)."""
+"""How often each explainer names the concept that was perturbed, and at what cost (Tables I and II)."""
 
 from gpca.experiments.experiment import Experiment, Tidy
 

@@ -140,7 +140,7 @@ def _repeats(table: TableBuilder, metrics: pd.DataFrame, explainers: Iterable[st
 
 
 def _different_samples(metrics: pd.DataFrame, explainers: Mapping[str, Mapping], shown: Iterable[str]) -> list[str]:
-    """Say who explains how many test samples, where not all explain as many."""
+    """Return the footnote on the test samples of each explainer, where their numbers differ."""
     of_test = _test_samples(metrics, shown)
     names: dict[str, list[str]] = {}
     for explainer, values in of_test.groupby("method", sort=False)["value"]:

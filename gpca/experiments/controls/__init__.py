@@ -1,1 +1,1 @@
-"""What explainers say when a shortcut is closed: other draws, unseen objects, other labels, other sources."""
+"""Explanations when a shortcut is closed: other draws, unseen objects, other labels, other sources."""

@@ -1,4 +1,4 @@
-"""What explainers take to learn and to explain: seconds, apart from all that has to be the same in every run."""
+"""The seconds that explainers take to learn and to explain, which differ from run to run and are kept apart."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Costs:
 
     @contextmanager
     def learning(self, control: str, explainer: str) -> Iterator[None]:
-        """Count what passes as learning: of its encoder, if it has one of its own, and of the explainer."""
+        """Count the seconds of the body as learning, be it of the explainer or of its own encoder."""
         started = perf_counter()
         yield
         if control == PAPER:
@@ -41,18 +41,18 @@ class Costs:
 
     @contextmanager
     def asking(self, explainer: str, count: int) -> Iterator[None]:
-        """Count what passes as measuring and embedding so many registrations."""
+        """Count the seconds of the body as measuring and embedding `count` registrations."""
         started = perf_counter()
         yield
         self._asking[explainer] = (perf_counter() - started) / count
 
     def explained(self, control: str, explainer: str, seconds_N: np.ndarray) -> None:
-        """Count what explaining took, when all was measured."""
+        """Count the mean seconds of explaining, with all measurements made."""
         if control == PAPER:
             self._explaining[explainer] = float(seconds_N.mean())
 
     def rows(self) -> pd.DataFrame:
-        """Return `COLUMNS` of each explainer that was asked about bare registrations."""
+        """Return `COLUMNS` of each explainer that reads bare registrations."""
         import pandas as pd
 
         records = [

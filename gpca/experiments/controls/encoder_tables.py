@@ -1,4 +1,4 @@
-"""Makes the parts of Table X on encoders: those that are trained otherwise, and what those of the pair cost."""
+"""Makes the parts of Table X on encoders: those that are trained in other ways, and the cost of those of the pair."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TRAINED = {"random_draws": "draws of random size", "two_layer_head": "head of two layers"}
-SAME_SEEDS = "paper_same_seeds"  # the paper's training, over the seeds that have an encoder trained otherwise
+SAME_SEEDS = "paper_same_seeds"  # the paper's training, over the seeds of the encoders trained in other ways
 KNOWN = {PAPER: TITLES[PAPER], SEEN: "Objects that it learned from (%)", UNSEEN: "Unseen objects (%)"}
 
 
 def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
-    """Return the accuracy of GP-CA on encoders that are trained otherwise, on known and on unseen objects."""
+    """Return the accuracy of GP-CA with encoders that are trained in other ways, on known and on unseen objects."""
     table = TableBuilder("table10_encoders", {"source": "Dataset", "training": "Encoder"})
     forms = {name: words for name, words in explainers.items() if name in GPCA_FORMS}
     for (source, explainer), (dataset, (_, words)) in crossed(ALL_TOGETHER | titles_of(sources), forms):
@@ -64,7 +64,7 @@ def table10_encoders(intervals: pd.DataFrame, sources: Mapping[str, Mapping], ex
 def _on_same_seeds(
     own: Mapping[str, pd.Series], others: Iterable[pd.DataFrame]
 ) -> tuple[list[pd.Series], dict[str, Cell | None]]:
-    """Return what the paper's training has over the seeds of the other trainings, where these are fewer.
+    """Return the values of the paper's training over the seeds of the other trainings, where these are fewer.
 
     It is their own value without their change, which is against it. All trainings have the same seeds.
 
@@ -92,7 +92,7 @@ def _with_seeds(words: str, rows: Iterable[pd.Series]) -> str:
 def table10_costs(
     intervals: pd.DataFrame, costs: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]
 ) -> Table:
-    """Return what explainers that see the registrations themselves cost, beside what they gain.
+    """Return the cost of explainers that see the registrations themselves, beside their gain.
 
     Args:
         costs: What :func:`gpca.experiments.controls.costs.collect_costs` returned.

@@ -23,10 +23,10 @@ def encode(
     encoder: EncoderSettings,
     checkpoint: Path | None = None,
 ) -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
-    """Train an encoder as the paper's is trained, but for the control, and embed the samples of its variant.
+    """Train an encoder like the paper's except for the control, and embed the samples of the variant.
 
     With matched density every draw from a cloud has a random number of points; the clouds are whole, as each epoch
-    draws anew. Of unseen objects it sees neither training nor test samples; so do those that are trained otherwise, by
+    draws anew. An encoder for unseen objects sees no sample of them; nor does one that is trained in another way, by
     such draws or with a head of two layers.
 
     Returns:
@@ -47,6 +47,6 @@ def encode(
 
 
 def nothing() -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
-    """Return what there is where a control is left out: arrays without samples, and no epoch."""
+    """Return the result for a control that is left out: arrays without samples, and no epoch."""
     empty = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
     return {**empty, "sample": np.zeros(0, int), "split": np.zeros(0, "U5")}, []

@@ -1,4 +1,4 @@
-"""From what explainers said under the controls to numbers: one tidy table."""
+"""Turns the explainers' predictions under the controls into one tidy table of metrics."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KEYS = ("control", "source", "trained_on", "explainer", "seed")
 def read_controls(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     """Return the columns `KEYS`, sample, instance, concept, right, entropy and bald (NaN where there is none).
 
-    ``source`` is what was tested; ``instance`` names the object with its source, views of one instance together. An
+    ``source`` is the one tested; ``instance`` names the object with its source, views of one instance together. An
     abstained sample is wrong.
 
     Args:

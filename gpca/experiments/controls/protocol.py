@@ -1,4 +1,4 @@
-"""Every explainer under every control: what it says of the test samples of one source and seed."""
+"""Runs every explainer under every control on the test samples of one source and seed."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ Attach = Callable[[Registrations], Registrations]
 
 @dataclass(frozen=True)
 class ControlRun:
-    """What all controls of one source and seed have in common.
+    """The parts that all controls of one source and seed share.
 
     Attributes:
-        source, seed: name what is random.
-        settings: of the controls.
-        backbone: of the encoder.
-        uncertainty: of Monte-Carlo ICP, for explainers that read a covariance; its ICP is that of the registrations.
-        rivals: by name.
+        source, seed: they name the random numbers.
+        settings: those of the controls.
+        backbone: that of the encoder.
+        uncertainty: settings of Monte-Carlo ICP, for covariances; its ICP is that of the registrations.
+        rivals: the explainers by name.
         embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
         embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one,
-            and by those that are trained otherwise, of the samples of unseen objects.
-        costs: what the explainers took under the paper's protocol.
+            and by those trained in other ways, of the samples of unseen objects.
+        costs: the seconds of the explainers under the paper's protocol.
     """
 
     source: str
@@ -69,7 +69,7 @@ class ControlRun:
         """Return a row for each control, explainer and test sample.
 
         Args:
-            registrations: of the source, by the paper's protocol.
+            registrations: those of the source, by the paper's protocol.
             others: those of the other sources, for transfer.
 
         Returns:
@@ -113,7 +113,7 @@ class ControlRun:
     def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
         """Return the registrations under a control, with all that explainers read attached."""
         changed = variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
-        if control == UNSEEN:  # what was measured of each stays
+        if control == UNSEEN:  # the measurements of each stay
             changed = replace(changed, attached={**changed.attached, **self.embeddings[control]})
         elif control in RETRAINED:
             changed = self._described(replace(changed, attached=dict(self.embeddings[control])), self.source)
@@ -122,7 +122,7 @@ class ControlRun:
         return _attached(self._learned(control, changed), changed) if control in RETRAINED else changed
 
     def _learned(self, control: str, registrations: Registrations) -> dict[str, Attach]:
-        """Return what attaches the embeddings by the rivals' own encoders, learned from the training samples."""
+        """Return functions that attach embeddings by the rivals' own encoders, trained on the training samples."""
         train = registrations.subset(registrations.rows("train"))
         embeds = {}
         for name, rival in self.rivals.items():
@@ -133,7 +133,7 @@ class ControlRun:
         return embeds
 
     def _time_asking(self, plain: Registrations, embeds: Mapping[str, Attach]) -> None:
-        """Measure what has to be known of a registration before an explainer that reads nothing else is asked."""
+        """Time the measurements that explainers of bare registrations need before they can explain."""
         test = plain.subset(plain.rows("test")[:ASKED])
         for name, rival in self.rivals.items():
             if rival.reads == BARE:
@@ -143,7 +143,7 @@ class ControlRun:
                     _attached({name: embeds[name]} if name in embeds else {}, described)
 
     def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
-        """Return the test samples by what they are tests of and their source; those of known objects apart."""
+        """Return the test samples by control and source, with those of known objects apart."""
         test = changed.subset(changed.rows("test"))
         if control != UNSEEN:
             return {(control, self.source): test}
@@ -152,7 +152,7 @@ class ControlRun:
         return {(name, self.source): test.subset(rows) for name, rows in of_rows.items() if len(rows)}
 
     def _trained_otherwise(self, changed: Registrations) -> Iterator[pd.DataFrame]:
-        """Yield what GP-CA says of known and of unseen objects on encoders that are trained otherwise."""
+        """Yield GP-CA's predictions for known and unseen objects with encoders that are trained in other ways."""
         for way in self.settings.encoders:
             if way in self.embeddings:
                 own = replace(changed, attached={**changed.attached, **self.embeddings[way]})
@@ -178,7 +178,7 @@ class ControlRun:
         tests: Mapping[tuple[str, str], Registrations],
         rivals: Mapping[str, Rival],
     ) -> Iterator[pd.DataFrame]:
-        """Yield what each explainer says of the test samples after learning from the training samples."""
+        """Yield each explainer's predictions for the test samples after it has learned from the training samples."""
         for train, asked in self._lessons(control, learned.subset(learned.rows("train")), tests):
             for name, rival in rivals.items():
                 explainer = rival.make()
@@ -197,10 +197,10 @@ class ControlRun:
     def _lessons(
         self, control: str, train: Registrations, tests: Mapping[tuple[str, str], Registrations]
     ) -> Iterator[tuple[Registrations, Mapping[tuple[str, str], Registrations]]]:
-        """Yield training samples, and the test samples that are asked of what has learned from them.
+        """Yield training samples, each with the test samples that are explained after learning from them.
 
-        Labels that say nothing make an explainer name a whole cluster of samples by chance. So they are shuffled in
-        parts, of which each is learned from alone and asked about a part of the test samples.
+        Labels that carry no information make an explainer name a whole cluster by chance. So they are shuffled in
+        parts; an explainer learns from one part alone and explains one part of the test samples.
         """
         if control not in RELABELED:
             yield train, tests

@@ -1,4 +1,4 @@
-"""Explainers that an experiment asks more than once, each made anew for every lesson."""
+"""Explainers that an experiment fits more than once, each made anew for every training set."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Rival:
     """One explainer.
 
     Attributes:
-        make: a new one at every call.
+        make: returns a new one at every call.
         reads, observed_only: what it needs attached, as in :class:`gpca.explainers.interface.ExplainerEntry`.
     """
 
@@ -34,7 +34,7 @@ def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> di
     """Return the explainers of a config's section, name -> settings.
 
     Raises:
-        InputError: none, an unknown one, or settings that it does not take.
+        InputError: no explainer, an unknown one, or settings that it does not take.
     """
     if not explainers:
         raise InputError("setting explainers", "is empty", "name at least one")
@@ -47,7 +47,7 @@ def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> di
 
 
 def described_for(rivals: Mapping[str, Rival], registrations: Registrations) -> Registrations:
-    """Return the registrations with what the explainers measure of each attached, once for all lessons."""
+    """Return the registrations with the explainers' measurements attached, made once for all training sets."""
     for rival in rivals.values():
         explainer = rival.make()
         if isinstance(explainer, Describing):

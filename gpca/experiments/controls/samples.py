@@ -1,4 +1,4 @@
-"""How severe each test sample's perturbation was, and how far off its registration ended."""
+"""The severity of each test sample's perturbation, and the final error of its registration."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ Control = Literal[
 ]
 CONTROLS: tuple[str, ...] = get_args(Control)
 UNSEEN = "unseen_objects"
-SEEN = "seen_objects"  # tests of what was learned for unseen objects, on new samples of the objects learned from
+SEEN = "seen_objects"  # tests of the explainers for unseen objects on new samples of known objects
 RETRAINED = ("density", UNSEEN)  # need an encoder of their own
 Training = Literal["random_draws", "two_layer_head"]
 TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
@@ -34,17 +34,17 @@ Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
 
 @dataclass(frozen=True)
 class ControlSettings:
-    """What is controlled, and how much of it.
+    """The controls, and their sizes.
 
     Attributes:
         controls: their names.
         encoders: other ways to train GP-CA's encoder, compared on known and on unseen objects.
-        encoder_seeds: the first so many of `seeds`, for which further encoders than that of unseen objects are trained.
-        seeds: the first so many of the run's.
+        encoder_seeds: how many of `seeds`, from the first, train more encoders than the one for unseen objects.
+        seeds: how many of the run's seeds are used, from the first.
         draw_points: range of the random number of points of a cloud where density is matched.
-        folds: a source's objects are dealt into so many; one of them is unseen.
+        folds: the number of folds of a source's objects, of which one is unseen.
         success: ADD(-S) below which a registration has succeeded, relative to the diameter.
-        bins: of each severity, equally wide.
+        bins: the number of equally wide bins of each severity.
     """
 
     controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")

@@ -1,4 +1,4 @@
-"""How severe each perturbation was, whether its registration succeeded, and what explainers make of it, in bins."""
+"""Accuracy of the explainers and success of the registrations, in bins of the perturbations' severity."""
 
 from __future__ import annotations
 

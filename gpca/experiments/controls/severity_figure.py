@@ -1,4 +1,4 @@
-"""Draws accuracy, and the share of registrations that succeed, against the severity of what was perturbed."""
+"""Draws accuracy, and the share of registrations that succeed, against the severity of the perturbations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Step ``controls``: registrations and embeddings -> what every explainer says under every control."""
+"""Step ``controls``: registrations and embeddings -> predictions of every explainer under every control."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Makes Table X: every explainer where a shortcut is closed, and from each source to each other."""
+"""Makes Table X: every explainer with a shortcut closed, and its transfer from each source to each other."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TITLES = {
     "shuffled": "Shuffled labels",
 }
 CHANGE = "_change"  # behind a control's name: the key of the column of its differences
-WRONG = "_wrong"  # behind the key of an AUROC: the column of the answers that it has to find
+WRONG = "_wrong"  # behind the key of an AUROC: the column of the answers that it has to detect
 BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
 ALL_TOGETHER = {POOLED: "All together"}
 
@@ -91,7 +91,7 @@ class OfSamples(Column):
 
 
 def _seeds_of(table: TableBuilder, names: Sequence[str]) -> str:
-    """Return over how many seeds the paper's protocol is, and which controls are over others."""
+    """Return the number of seeds of the paper's protocol, and the controls that have another number."""
     of = {name: [cell.seeds for (_, key), cell in table.cells.items() if key == name] for name in names}
     seeds = {name: span(numbers) for name, numbers in of.items() if numbers}
     usual = seeds.pop(PAPER, str(table.most_seeds()))

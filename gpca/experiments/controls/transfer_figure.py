@@ -1,4 +1,4 @@
-"""Draws what every explainer keeps of its accuracy on sources that it did not learn from."""
+"""Draws how much of its accuracy every explainer keeps on sources that it did not learn from."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def draw_transfer(intervals: pd.DataFrame, sources: Mapping[str, str], explainers: Mapping[str, str]) -> Figure:
-    """Draw a matrix for each explainer: rows the source that it learned from, columns the one that it is asked about.
+    """Draw a matrix for each explainer: rows are the sources that it learned from, columns those that it explains.
 
     Args:
         intervals: What :func:`gpca.experiments.controls.intervals.collect` returned.

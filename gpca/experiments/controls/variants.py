@@ -16,7 +16,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.reading import registered_backwards
 from gpca.seeds import generator
 
-FEWEST_OBJECTS = 5  # instances; of fewer, the objects that are left to learn from are no sample of anything
+FEWEST_OBJECTS = 5  # instances; with fewer, too few objects are left to learn from
 
 
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:
@@ -37,7 +37,7 @@ def left_out(control: str, registrations: Registrations, settings: ControlSettin
 def variant(
     control: str, registrations: Registrations, source: str, seed: int, settings: ControlSettings, icp: ICPSettings
 ) -> Registrations:
-    """Return what explainers learn from (split ``train``) and are asked about (``test``) under a control.
+    """Return the samples that explainers learn from (split ``train``) and explain (``test``) under a control.
 
     Controls of the labels and transfer leave the registrations as they are.
     """

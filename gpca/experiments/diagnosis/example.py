@@ -1,4 +1,4 @@
-"""Draws one failed registration with its eight counterfactuals, and what explainers say of it beside the truth."""
+"""Draws one failed registration with its eight counterfactuals, and the explainers' scores beside the truth."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HEAD_IN = 0.3
 CAPTION_IN = 0.17
 TRUTH = "measured share φ"
 ROW_IN = 0.19
-GAP = 0.5  # of a row, between what was measured and the scores, which are not shares
+GAP = 0.5  # of a row, between the measured shares and the scores, which are none
 
 
 def draw_causes_example(

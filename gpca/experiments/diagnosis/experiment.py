@@ -1,4 +1,4 @@
-"""What made a registration fail: explainers of causes against their measured shares in the error (Table IX)."""
+"""Causes of failed registrations: explainers against the measured shares of each cause in the error (Table IX)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gpca.settings import part_of
 
 @dataclass(frozen=True)
 class Section:
-    """How the explainers of causes describe, encode and explain a pair."""
+    """The settings by which explainers of causes describe, encode and explain a pair."""
 
     descriptors: Annotated[dict, part_of(DescriptorSettings)]
     encoder: NamedEncoder

@@ -1,4 +1,4 @@
-"""Test samples with their truth beside what an explainer said of them."""
+"""Test samples with their truth and an explainer's predictions."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ POOLED = "pooled"  # all sources together
 
 @dataclass(frozen=True)
 class Judged:
-    """N test samples.
+    """N test samples with an explainer's predictions.
 
     Attributes:
         label: one of :data:`gpca.causes.labels.LABELS`, or ``borderline``.
         instance: the object, views of one instance together. seed: the repeat.
         error: (N, 8) v of every subset of the causes. phi: (N, 3). causes: (N, 3) whether each is one of them.
-        alarm: what the explainer takes for wrong, larger is worse. scores: (N, 3) of the causes.
+        alarm: how wrong the explainer takes the registration to be, larger is worse. scores: (N, 3) of the causes.
         named: the label that it names; empty where it names none.
         nominal: its score of "nominal".
     """
@@ -101,14 +101,14 @@ def joined(parts: Iterable[Judged]) -> Judged:
 
 
 def judged_by(rows: pd.DataFrame, truth: Causes, seed: int) -> Judged:
-    """Return test samples beside what the rows of a prediction file, in the same order, say of them."""
+    """Return test samples with the predictions of a file whose rows are in the same order."""
     scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
     named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
     return _judged(truth, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
 
 
 def ceiling_of(causes: Causes, seed: int) -> Judged:
-    """Return test samples beside what the truth says of them from other starts."""
+    """Return test samples with the truth measured from other starts as their predictions."""
     again: Truth = causes.truth_again
     error_N = again.error[:, -1]
     shares_N_3 = np.maximum(again.phi, 0) + 1e-12

@@ -1,4 +1,4 @@
-"""From diagnoses to numbers: of every source, explainer and seed, as one tidy table."""
+"""Turns diagnoses into metrics of every source, explainer and seed, in one tidy table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws whether a probability is to be believed: how often what it was given to came true."""
+"""Draws whether a probability can be believed: how often the predicted outcome came true."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FEWEST = 5  # A bin with fewer samples has no point.
-HEADROOM = 2.0  # The axis of the numbers is so many times as high as the highest bar, on its scale.
+HEADROOM = 2.0  # The axis of the numbers is this many times as high as the highest bar.
 
 
 def draw_nominal_reliability(

@@ -45,7 +45,7 @@ def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
 
 
 def observed_only(registrations: Registrations) -> Registrations:
-    """Return the registrations without anything that tells what is wrong with them."""
+    """Return the registrations without anything that reveals what is wrong with them."""
     hidden = registrations.without_labels()
     return replace(hidden, attached={name: array for name, array in hidden.attached.items() if name != "causes"})
 

@@ -80,7 +80,7 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
 
 
 def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[str, str]) -> Table:
-    """Return what explainers that learned from simulated causes say of those measured in frames, the ceiling last.
+    """Return how explainers that learned from simulated causes name those measured in frames, the ceiling last.
 
     Args:
         intervals: What :func:`gpca.experiments.frame_causes.metrics.collect` returned.

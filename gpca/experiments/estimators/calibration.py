@@ -1,4 +1,4 @@
-"""From what estimators say to numbers: how near the reference they are, and what they tell of the error."""
+"""Turns estimates into metrics: how near they are to the reference, and how well they predict the error."""
 
 from __future__ import annotations
 

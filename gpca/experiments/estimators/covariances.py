@@ -1,4 +1,4 @@
-"""The files of what estimators say: a row per registration, and the reference's results, which a figure shows."""
+"""The files of the estimates: a row per registration, and the reference's results, which a figure shows."""
 
 from __future__ import annotations
 

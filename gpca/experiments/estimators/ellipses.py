@@ -1,4 +1,4 @@
-"""Draws one registration with what estimators say of its pose: their ellipses over the results of the reference."""
+"""Draws one registration with the estimators' ellipses of its pose over the results of the reference."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ STYLES: dict[str, tuple[str, Any]] = {  # An estimator has a color and a line ev
 }
 _OTHER = (YELLOW, "-")
 TURN = np.linspace(0, 2 * np.pi, 181)
-PLANE = 95.0  # per cent that an ellipse holds
-WIDEST = 2.0  # An ellipse may make a panel so many times as wide as dots and true pose do; a wider one leaves it.
+PLANE = 95.0  # percent that an ellipse holds
+WIDEST = 2.0  # An ellipse may make a panel this many times as wide as dots and true pose do; a wider one is cut.
 
 
 def style_of(name: str) -> tuple[str, Any]:
@@ -44,7 +44,7 @@ def style_of(name: str) -> tuple[str, Any]:
 
 
 def ellipse(covariance_2_2: np.ndarray) -> np.ndarray:
-    """Return the outline (n, 2) of what holds `PLANE` per cent of a Gaussian about zero."""
+    """Return the outline (n, 2) of the ellipse that holds `PLANE` percent of a Gaussian about zero."""
     values_2, axes_2_2 = np.linalg.eigh(covariance_2_2)
     radius = np.sqrt(-2 * np.log(1 - PLANE / 100))
     return radius * np.column_stack([np.cos(TURN), np.sin(TURN)]) * np.sqrt(np.maximum(values_2, 0)) @ axes_2_2.T
@@ -56,12 +56,12 @@ def draw_ellipses(
     """Draw one registration in the plane in which the reference's results spread most.
 
     Args:
-        panel: axes of matplotlib.
+        panel: the matplotlib axes.
         samples: the reference's results.
         place: the registration's row in the samples.
         estimates: estimator -> its row about the registration, None where it has none.
         block: the numbers of a twist that are drawn, rotation or translation.
-        factor: what turns them into the panel's unit.
+        factor: their factor to the panel's unit.
     """
     twists_n_3 = factor * samples.twists_of(place)[:, block]
     values_3, axes_3_3 = np.linalg.eigh(np.cov(twists_n_3, rowvar=False))

@@ -1,4 +1,4 @@
-"""Asks every estimator how uncertain the same registrations are, and measures what each of them says.
+"""Lets every estimator say how uncertain the same registrations are, and measures its answers.
 
 The registrations are test samples of the causes' track: objects that no training sample shows, and failures of every
 kind. They are held against a reference, Monte-Carlo from many starts, and against the error of the pose.
@@ -34,7 +34,7 @@ from gpca.uncertainty.spread import divergence
 if TYPE_CHECKING:
     import pandas as pd
 
-MOVED: Moved = "model"  # onto what was observed, as the causes' track has it
+MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class EstimatedRow:
     """A test registration by one method.
 
     Attributes:
-        known: what every row about it says: sample, object, method, errors.
-        registered: what an estimator is given.
+        known: the columns of every row about it: sample, object, method, errors.
+        registered: the input of an estimator.
         true_twist: (6,) of the true pose about that of the registration, the symmetric one that is nearest.
         reference_twists: (n, 6) of the reference's results; none where it failed.
         reference_seconds: that they took.
@@ -107,7 +107,7 @@ def try_estimators(
 
 
 def reference_samples(cases: Sequence[EstimatedRow]) -> ReferenceSamples:
-    """Return what the file of the reference's results holds of these registrations."""
+    """Return the reference's results for these registrations, as its file holds them."""
     return ReferenceSamples(
         sample=np.array([case.known["sample"] for case in cases]),
         method=np.array([case.known["method"] for case in cases]),
@@ -155,9 +155,9 @@ class _Maker:
         return example(registered, T_true, judge, MOVED, self._settings.train_starts, *self._axes)
 
     def _registered(self, row: int) -> tuple[RegisteredPair, np.ndarray]:
-        """Return a registration of the model, the source, to what was observed, and the true pose.
+        """Return a registration of the model, the source, to the observed cloud, and the true pose.
 
-        The target's frame is the one in which the causes' track has put what was observed: near the model's.
+        The target's frame is the one in which the causes' track has put the observed cloud: near the model's.
         """
         observed = observed_pair(self._causes, row, *self._axes)
         random = generator(*observed.axes, "clouds")
@@ -187,7 +187,7 @@ def predicted_spread(points_N_3: np.ndarray, covariance_6_6: np.ndarray) -> floa
 
 
 def _judged(case: EstimatedRow, answer: Estimate, reference: Estimate, floor: float) -> dict[str, object]:
-    """Return the row of an estimate; numbers that it has not are NaN."""
+    """Return the row of an estimate; numbers that it lacks are NaN."""
     row = {**case.known, "failure": answer.failure}
     numbers = dict.fromkeys(JUDGED, np.nan)
     if answer.covariance_6_6 is not None:
@@ -210,5 +210,5 @@ def _reference(case: EstimatedRow) -> Estimate:
 
 
 def _spaced(rows: np.ndarray, wanted: int) -> np.ndarray:
-    """Return so many of the rows, evenly spaced: states that are rare come last."""
+    """Return a number of the rows, evenly spaced: states that are rare come last."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(wanted, len(rows))).round().astype(int))]

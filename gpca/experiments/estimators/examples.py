@@ -1,4 +1,4 @@
-"""What estimators that learn are given of a registration: descriptors, results of a few starts, the true twist."""
+"""Examples for estimators that learn: descriptors of a registration, results of a few starts, the true twist."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
     """Return the descriptors (F,) that need no further registration: distances, local planes, entropy.
 
     Args:
-        pair: what was registered.
+        pair: the registered pair.
         outcome: where its source ended.
         moved: which cloud the source is.
     """

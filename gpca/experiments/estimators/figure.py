@@ -1,4 +1,4 @@
-"""Draws what estimators say of the same poses: ellipses over samples, errors over predicted spreads, coverages."""
+"""Draws the estimates of the same poses: ellipses over samples, errors over predicted spreads, coverages."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _draw_shown(panels, shown: Mapping[str, int], samples: ReferenceSamples, of_
 
 
 def coverages(mahalanobis_S: np.ndarray) -> np.ndarray:
-    """Return which share of the true poses lies within what is said to hold each of `LEVELS`."""
+    """Return the share of the true poses that lies within the region predicted for each of `LEVELS`."""
     from scipy.stats import chi2
 
     return (mahalanobis_S[:, None] <= chi2.ppf(LEVELS, 6)).mean(axis=0)
@@ -177,13 +177,13 @@ def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:
 
 
 def _write(panel, place: tuple[float, float], words: str) -> None:
-    """Say in a corner of a panel what it means to lie there."""
+    """Write in a corner of a panel what it means to lie there."""
     across, up = ("left", "top") if place[0] < 0.5 else ("right", "bottom")
     panel.text(*place, words, transform=panel.transAxes, ha=across, va=up, fontsize=SMALL_PT, color=GRAY)
 
 
 def _limits(tables: Sequence[pd.DataFrame]) -> tuple[float, float]:
-    """Return the range, in per cent of the diameter, of all errors and spreads."""
+    """Return the range, in percent of the diameter, of all errors and spreads."""
     both = np.concatenate([table[["spread", "add_relative"]].to_numpy().ravel() for table in tables])
     low, high = 100 * np.quantile(np.maximum(both, 1e-5), (0.0, 1.0))
     return 0.8 * low, 1.25 * high

@@ -1,4 +1,4 @@
-"""Which registrations the estimators of covariance are asked about: apart from what runs them."""
+"""Settings of the registrations for the estimators of covariance, apart from the code that runs them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gpca.uncertainty.settings import start_deviation
 
 @dataclass(frozen=True)
 class EstimatorPairSettings:
-    """Which registrations the estimators of their covariance are asked about, and what they are held against.
+    """The registrations whose covariance is estimated, and the reference that estimates are compared with.
 
     Attributes:
         methods: registration method -> test registrations of each source and seed, at most.
@@ -22,7 +22,7 @@ class EstimatorPairSettings:
         points: of source and of target (fewer where a cloud has fewer).
         starts: of the reference, Monte-Carlo.
         start_rotation_deg, start_translation: root mean square angle and length of all starts' offsets.
-        floor: variance that is added to every covariance before it is judged: below it a spread is none.
+        floor: variance that is added to every covariance before it is judged; a spread below it counts as none.
         failed: error from which a registration has failed, ADD or ADD-S in diameters.
     """
 

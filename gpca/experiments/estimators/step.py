@@ -1,4 +1,4 @@
-"""Step ``estimate``: registrations with measured causes -> what every estimator says of their poses' covariance."""
+"""Step ``estimate``: registrations with measured causes -> every estimator's covariance of their poses."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def table12_uncertainty(
     methods: Mapping[str, str],
     pairs: Mapping,
 ) -> Table:
-    """Return how near the reference each estimator is, and what it tells of the error: methods × estimators.
+    """Return how near each estimator is to the reference and how well it predicts the error: methods × estimators.
 
     Args:
         metrics: The tidy metrics that :func:`gpca.experiments.estimators.calibration.collect_estimates` makes.

@@ -1,1 +1,1 @@
-"""Why registrations of depth frames fail, and what explainers say about it (Table IX on frames)."""
+"""Causes of failed registrations of depth frames, measured and explained (Table IX on frames)."""

@@ -1,4 +1,4 @@
-"""What made registrations of depth frames fail, where nothing was perturbed: part of Table IX."""
+"""Causes of failed registrations of depth frames, where nothing was perturbed: part of Table IX."""
 
 from __future__ import annotations
 

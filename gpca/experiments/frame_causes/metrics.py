@@ -1,4 +1,4 @@
-"""How well explainers say what is wrong with registrations of depth frames, and how few these are."""
+"""How well explainers name what is wrong with registrations of depth frames, and how many of these there are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Step ``frame_causes``: instances of depth frames -> their measured causes, and what explainers say of them.
+"""Step ``frame_causes``: instances of depth frames -> their measured causes, and the explainers' predictions.
 
 The explainers have learned from registrations whose causes were drawn, those of all sources; no frame is among them.
 """
@@ -72,7 +72,7 @@ def _measure(job: Job) -> tuple[Causes, pd.DataFrame]:
 
 
 class _Asked:
-    """Registrations of frames that explainers are asked about, and the lessons that these have had."""
+    """Registrations of frames to be explained, and the training data of the explainers."""
 
     def __init__(
         self, causes: Causes, described: Descriptors, encoder: EncoderSettings, axes: tuple[str, int], lessons: list

@@ -1,4 +1,4 @@
-"""All metrics of depth frames: what explainers say of them, and what labels of them buy."""
+"""All metrics of depth frames: of their explanations, and of learning from their labels."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _of_target(found: pd.DataFrame, percent: str) -> pd.DataFrame:
 
 
 def _repeated(found: pd.DataFrame, embedding: str) -> pd.DataFrame:
-    """Return the rows of an embedding, as those of the chosen one."""
+    """Return the rows of an embedding, renamed as those of the chosen one."""
     rows = found[found["table"].str.split("/").str[1] == embedding]
     return rows.assign(table=rows["table"].str.replace(f"{TABLE}{embedding}", f"{TABLE}{CHOSEN}", regex=False))
 

@@ -13,10 +13,10 @@ PAIR = "pair"  # the embedding that is measurements of the pair, beside those by
 
 @dataclass(frozen=True)
 class FrameLabelSettings:
-    """What differs from active learning on whole objects.
+    """The settings that differ from active learning on whole objects.
 
     Attributes:
-        seeds: the first so many of the run's.
+        seeds: how many of the run's seeds are used, from the first.
         held_out: the new concepts, in turn.
         initial: labeled samples of the known concepts before the first query, balanced.
         labels: L, the budget of queries.
@@ -33,5 +33,5 @@ class FrameLabelSettings:
 
 
 def in_percent(target: float) -> str:
-    """Return how a target stands in the column `table` of the metrics."""
+    """Return a target as the column `table` of the metrics has it."""
     return f"{100 * target:.0f}"

@@ -1,4 +1,4 @@
-"""Makes the table of active learning on depth frames: labels to each target, by what the samples are seen by."""
+"""Makes the table of active learning on depth frames: labels to each target, by the embedding of the samples."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STRATEGIES = {"bald_kmeans": "BALD, to {} % (labels)", "random": "Random, to {} 
 
 
 def table6_labels(metrics: pd.DataFrame, title: str, encoders: Mapping[str, str], conditions: Mapping) -> Table:
-    """Return the labels that BALD and random choice need on depth frames, backbone by backbone and by the pair.
+    """Return the labels that BALD and random choice need on depth frames, for every backbone and for the pair.
 
     Args:
         metrics: The tidy metrics (:func:`gpca.experiments.frame_labels.metrics.collect`).

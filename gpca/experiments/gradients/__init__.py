@@ -1,1 +1,1 @@
-"""What GP-CA's scores react to: gradients in the points of a cloud (saliency) and along concept vectors (TCAV)."""
+"""Gradients of GP-CA's scores: in the points of a cloud (saliency) and along concept vectors (TCAV)."""

@@ -1,4 +1,4 @@
-"""What GP-CA's scores react to: saliency of points, and TCAV."""
+"""Gradients of GP-CA's scores: saliency of points, and TCAV."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From deleted points and TCAV's tests to numbers: one tidy table."""
+"""Turns deleted points and TCAV's tests into one tidy table of metrics."""
 
 from __future__ import annotations
 

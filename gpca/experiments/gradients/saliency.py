@@ -1,4 +1,4 @@
-"""Saliency maps of point clouds, and whether they show what matters: what deleting the most salient points does.
+"""Saliency maps of point clouds, tested by deleting the most salient points.
 
 A saliency map is the gradient of a score in the input (Simonyan et al. 2014), here of GP-CA's log odds of a concept in
 the points that the encoder sees. For clouds Zheng et al. (2019) take deleting a point for moving it to the center:
@@ -87,9 +87,9 @@ def deletions(
     encoding: EncoderSettings,
     settings: GradientSettings,
 ) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
-    """Delete points of test samples in every order, and ask GP-CA again.
+    """Delete points of test samples in every order, and explain what is left with GP-CA.
 
-    What is followed is the score of the concept that GP-CA names on the whole draw.
+    The scores are those of the concept that GP-CA names on the whole draw.
 
     Returns:
         a row for each sample, order and share: ``sample, concept, named, order, deleted, before, after, changed``, the

@@ -10,13 +10,13 @@ from gpca.settings import Bounds, Distinct, OpenShare
 
 @dataclass(frozen=True)
 class GradientSettings:
-    """What is asked of the gradients.
+    """The samples, deletions and concept vectors of the gradients.
 
     Attributes:
         samples: test samples of each source and seed whose points are deleted, balanced; all where there are fewer.
-        deleted: shares of a cloud's points.
-        vectors: concept vectors of each concept, and as many random ones.
-        level: of significance of TCAV, over all its tests of a source and seed.
+        deleted: shares of a cloud's points that are deleted.
+        vectors: the number of concept vectors of each concept, and of random ones.
+        level: TCAV's level of significance, over all its tests of a source and seed.
     """
 
     samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 30

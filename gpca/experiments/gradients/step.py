@@ -1,4 +1,4 @@
-"""Step ``gradients``: registrations, encoder and embeddings -> what GP-CA's scores react to, seed by seed."""
+"""Step ``gradients``: registrations, encoder and embeddings -> saliency and TCAV of GP-CA, seed by seed."""
 
 from __future__ import annotations
 

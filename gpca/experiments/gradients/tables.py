@@ -1,4 +1,4 @@
-"""Makes the tables of gradients: what deleting salient points does, and TCAV's scores with their tests."""
+"""Makes the tables of gradients: the effect of deleting salient points, and TCAV's scores with their tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws accuracy and confidence over iterations by kernel and learning rate, beside what the paper prints."""
+"""Draws accuracy and confidence over iterations by kernel and learning rate, beside the paper's numbers."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def draw_kernel_curves(grid: pd.DataFrame, sources: Mapping[str, str], numbers: 
 
 
 def printed_accuracies(numbers: Iterable[Number], source: str) -> dict[tuple[str, float, int], float]:
-    """Return what Table IV prints for a source, in %, by kernel, learning rate and iterations."""
+    """Return the accuracies of Table IV for a source, in %, by kernel, learning rate and iterations."""
     found = {}
     for number in numbers:
         if number.table == "IV" and number.counterpart and source in number.counterpart.sources:

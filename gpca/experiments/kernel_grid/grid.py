@@ -28,7 +28,7 @@ GRID_COLUMNS = ("kernel", "learning_rate", "iterations", *MEASURES)
 
 @dataclass(frozen=True)
 class KernelGrid:
-    """What is fitted, and when it is judged.
+    """The kernels and learning rates that are fitted, and the iterations at which they are judged.
 
     Attributes:
         kernels, learning_rates: every kernel is fitted at every rate.

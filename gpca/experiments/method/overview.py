@@ -1,4 +1,4 @@
-"""Draws Fig. 2 of the paper, GP-CA at a glance, from one registration of the run and what every stage made of it."""
+"""Draws Fig. 2 of the paper, GP-CA at a glance, from one registration of the run and the results of every stage."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def draw_overview(
     treatments: Mapping[str, str],
     dataset: str = "",
 ) -> Figure:
-    """Draw what the stages make of one registration, from its clouds to what follows.
+    """Draw the results of all stages for one registration, from its clouds to the decision that follows.
 
     The figure shows the clouds before and after ICP, the embedding, the scores ± their deviations, and BALD among all
     test samples. What follows is the action against the concept named, if the registration failed, or a question to a

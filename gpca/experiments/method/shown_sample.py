@@ -1,4 +1,4 @@
-"""Reads one registration of a run with all that the stages made of it, which the figures of the method draw."""
+"""Reads one registration of a run with the results of all stages, for the figures of the method."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stages:
-    """Holds S registrations of one source and seed, and what the stages made of each.
+    """Holds S registrations of one source and seed, with the results of all stages.
 
     Attributes:
         registrations: The registrations.
@@ -57,7 +57,7 @@ class Stages:
         uncertainty_csv: str | Path,
         limits: Mapping[str, float],
     ) -> Stages:
-        """Read what the stages wrote; the limits are those of the config's section ``causes``.
+        """Read the files of the stages; the limits are those of the config's section ``causes``.
 
         Raises:
             InputError: an unusable file, or files of different samples; predictions without variances or BALD.
@@ -111,7 +111,7 @@ class Stages:
         return registration_error(self.registrations, row)
 
     def state(self, row: int) -> str:
-        """Return what the error of a row after ICP is called."""
+        """Return the name of the state of a row after ICP, by its error."""
         return state_of_error(self.error(row), self.limits)
 
     def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:

@@ -13,20 +13,20 @@ from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 
 @dataclass(frozen=True, kw_only=True)
 class Section(NewConceptSettings):
-    """What is learned from, and the encoder that learns without labels."""
+    """The settings of the new concepts, with the encoder that learns without labels."""
 
     encoder: EncoderChanges
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that the encoder that learns without labels has points enough."""
+    """Check that the encoder that learns without labels has enough points."""
     encoder = config["encoders"][config["embedding"]["encoder"]] | config["new_concepts"]["encoder"]
     points = config["registrations"]["cloud_points"]
     require_draws("new_concepts.encoder", encoder, points, "registrations.cloud_points")
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the strategies and seeds, and the embeddings with which an oracle that errs is asked."""
+    """Return the strategies and seeds, and the embeddings for which the oracle also makes errors."""
     section = config["new_concepts"]
     return {
         "new_concept_strategy": list(NEW_CONCEPT_STRATEGIES),
@@ -36,7 +36,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the conditions: those of active learning, and what differs from them."""
+    """Return the conditions: those of active learning, and those that differ from them."""
     conditions = {
         **config["active_learning"],
         **config["new_concepts"],

@@ -1,4 +1,4 @@
-"""Draws how soon a new concept is learned by what the samples are seen by: accuracy over labels, sources as columns."""
+"""Draws how soon a new concept is learned in each embedding: accuracy over labels, sources as columns."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""An embedding without labels: an encoder learns to predict what was measured of the pair.
+"""An embedding without labels: an encoder learns to predict measurements of the pair.
 
-The measurements see both clouds, the encoder the aligned source alone; so it learns what of a cloud goes with how it
+The measurements see both clouds, the encoder the aligned source alone; so it learns what in a cloud goes with how it
 lies on its model, whatever the concepts are. What it predicts is the embedding: in the few dimensions of the
 measurements a few labels say more than in the hundreds of the layer before.
 """
@@ -17,12 +17,12 @@ from gpca.pairs.dataset import Registrations
 def self_supervised(
     registrations: Registrations, measured_S_F: np.ndarray, source: str, seed: int, settings: EncoderSettings
 ) -> np.ndarray:
-    """Train the encoder on the training samples, which lie open without their labels, and embed every sample (S, F).
+    """Train the encoder on the training samples without their labels, and embed every sample (S, F).
 
     Args:
         registrations: S of them; their concepts are not read.
         measured_S_F: of each pair, normalized.
-        source, seed: name what is random.
+        source, seed: they name the random numbers.
         settings: of the encoder.
     """
     train = registrations.rows("train")

@@ -57,7 +57,7 @@ def run(job: Job) -> None:
 
 
 class _Work:
-    """What the experiments of one source and seed read; all files are read at once, so that a fault is found first."""
+    """The files of one source and seed; all are read before the first experiment, so that faults are found early."""
 
     def __init__(self, job: Job, own: NewConceptSettings) -> None:
         self._job = job
@@ -104,7 +104,7 @@ class _Work:
                 _leave_out(self._job.source, name, f"it needs {FROM_OTHERS[name]}")
 
     def _of_causes(self) -> Iterator[NewConceptTrial]:
-        """Yield what has causes as new concepts: by the encoder of the causes, and by what was measured of the pair."""
+        """Yield the experiments with causes as new concepts: by the causes' encoder, and by the pair's measurements."""
         seen = self._seen
         known = tuple(label for label in LABELS if label in seen["encoder"].concept)
         if NOMINAL in self._own.causes:
@@ -143,7 +143,7 @@ def _normalized(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) ->
 
 
 def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str | None = None) -> dict[str, Embedded]:
-    """Return the samples that have a label, or all with the one given, by the encoder and by what was measured."""
+    """Return the samples with a label, or all with the given one, in the encoder's embedding and as measured."""
     label_S = labels_of(causes.truth) if label is None else np.full(len(causes), label)
     rows = np.flatnonzero(label_S != BORDERLINE)
     by = {"encoder": h_S_d, "pair": np.hstack([described.groups[group] for group in GROUPS])}

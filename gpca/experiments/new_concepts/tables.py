@@ -37,7 +37,7 @@ PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
 
 
 def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:
-    """Return the labels that each new concept costs by what the samples are seen by, and what labels can give."""
+    """Return the labels that each new concept costs in each embedding, and the accuracy that labels can reach."""
     metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
     labels = {f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), PAPERS, c) for c in CONCEPTS}
     labels["labels_random"] = Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")
@@ -83,7 +83,7 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
 
 
 def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:
-    """Return what is learned from an oracle that errs: labels to the target and accuracy after all, by its errors."""
+    """Return the results of learning from an oracle that errs: labels to the target, final accuracy, by its errors."""
     metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
     shares = [0, *(round(100 * share) for share in conditions["errors"])]
     labels = {f"labels_{share}": Column(f"Labels, {share} % wrong", **COUNT) for share in shares}

@@ -1,1 +1,1 @@
-"""Samples unlike those of the training, and what the uncertainty of learners is worth on them."""
+"""Samples unlike those of the training, and how useful the uncertainty of learners is on them."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-PRINCIPAL_COMPONENTS = 16  # distances between embeddings are measured in so many
+PRINCIPAL_COMPONENTS = 16  # components in which embeddings are compared
 
 
 def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int = 10) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Classifiers on samples unlike those of the training, and what their uncertainty is worth (Table V)."""
+"""Classifiers on samples unlike those of the training, and how useful their uncertainty is (Table V)."""
 
 from __future__ import annotations
 

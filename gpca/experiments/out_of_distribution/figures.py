@@ -1,4 +1,4 @@
-"""Draws what the uncertainty of learners is worth: risk over coverage, reliability, uncertainty over distance.
+"""Draws how useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance.
 
 All take the same arguments and raise the same error:
 

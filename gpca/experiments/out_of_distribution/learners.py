@@ -1,4 +1,4 @@
-"""What learners say of samples like and unlike those that they were fitted to."""
+"""Predictions of learners for samples like and unlike those that they were fitted to."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def predict_sets(make: Callable[[], ConceptExplainer], sets: ShiftedSets) -> pd.
     """Fit a learner to the training samples of each encoder and let it explain the test samples of its sets.
 
     Args:
-        make: a new learner at every call.
+        make: returns a new learner at every call.
         sets: the samples.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Step ``learners``: embeddings of all sets -> what every learner says of their test samples."""
+"""Step ``learners``: embeddings of all sets -> predictions of every learner for their test samples."""
 
 from __future__ import annotations
 

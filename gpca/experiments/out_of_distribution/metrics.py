@@ -1,4 +1,4 @@
-"""From what learners said of samples like and unlike the training to numbers: one tidy table (docs/diagnostics.md)."""
+"""Turns predictions for samples like and unlike the training into one tidy table (docs/diagnostics.md)."""
 
 from __future__ import annotations
 

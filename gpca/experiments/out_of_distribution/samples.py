@@ -69,7 +69,7 @@ def _instances(registrations: Registrations) -> np.ndarray:
 def _of_unseen_objects(
     registrations: Registrations, held_out: np.ndarray, source: str, seed: int, settings: ShiftSettings
 ) -> dict[str, Registrations]:
-    """Train an encoder that never sees some objects; return what it saw with its kind, and what it never saw."""
+    """Train an encoder that never sees some objects; return the samples of seen objects, and those of unseen ones."""
     held_out_S = np.isin(_instances(registrations), held_out)
     is_train_S = registrations.split == "train"
     train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]

@@ -1,4 +1,4 @@
-"""Selects what the tables of learners take from the tidy diagnostics, and words the notes that all of them have."""
+"""Selects values of the tidy diagnostics for the tables of learners, and words the notes that all of them have."""
 
 from __future__ import annotations
 

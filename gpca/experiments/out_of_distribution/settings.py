@@ -12,12 +12,12 @@ from gpca.settings import Bounds, Count, OpenShare
 
 @dataclass(frozen=True)
 class ShiftSettings:
-    """How many samples are made, how unlike they are and how far is measured.
+    """The number of samples, how unlike the training they are, and how the distances are measured.
 
     Attributes:
         beyond: how the registrations with larger severities are made; their number is `beyond.test`.
         encoder: how the encoder that never sees some objects is trained.
-        samples: at most so many of another source, and of objects that an encoder never saw.
+        samples: the most samples of another source, and of objects that an encoder never saw.
         held_out_share: of the objects, at least one, that this encoder and the learners on it never see.
         train: training samples of that encoder, at most.
         neighbours: of the mean distance to the nearest training samples.

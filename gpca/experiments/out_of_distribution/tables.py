@@ -1,4 +1,4 @@
-"""Makes the tables of learners and of what their uncertainty is worth (Table V) from the tidy diagnostics."""
+"""Makes the tables of learners and of the worth of their uncertainty (Table V) from the tidy diagnostics."""
 
 from __future__ import annotations
 

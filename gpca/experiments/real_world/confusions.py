@@ -1,4 +1,4 @@
-"""Draws what GP-CA takes each concept for on depth frames, by backbone, with the numbers of samples."""
+"""Draws which concept GP-CA takes each for on depth frames, by backbone, with the numbers of samples."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
 HEIGHT_IN = 2.4
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
-AROUND = (2.5, 1.2)  # The first picture, and the two others, show so many times the object's extent.
+AROUND = (2.5, 1.2)  # The first picture, and the two others, show this many times the object's extent.
 
 
 def draw_real_world_example(
@@ -125,7 +125,7 @@ def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray)
 
 
 def title_of_frame(object_name: str, title: str) -> str:
-    """Return what the one frame is called, by the dataset before its object's name; else the title of all frames."""
+    """Return the title of the shown frame, by the dataset before its object's name; else the title of all frames."""
     dataset = BOP_TITLES.get(object_name.partition(" ")[0], "")
     return f"{dataset} frame" if dataset and dataset in title else title
 
@@ -133,7 +133,7 @@ def title_of_frame(object_name: str, title: str) -> str:
 def covered(own_P_2: np.ndarray, kept_P_2: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Return the mask (H, W) of an object's pixels (u, v) that a sample has lost.
 
-    A sample has at most so many points, drawn at random: what lies between those that it kept counts as kept.
+    A sample keeps a random draw of its points, so that pixels between kept ones count as kept.
     """
     from scipy.ndimage import binary_closing, label
 

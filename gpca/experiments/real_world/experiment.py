@@ -22,7 +22,7 @@ GLOBAL_POSE = "Global registration"
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check the section against what exists; reads no data."""
+    """Check that the names in the section exist, without reading data."""
     section, encoders_left_out = config["real_world"], left_out("encoders")
     require_names("real_world.backbones", section["backbones"], config["encoders"], "encoder", encoders_left_out)
     if REAL_WORLD in config["sources"]:
@@ -58,7 +58,7 @@ def _check_training(config: dict) -> None:
 
 
 def _check_reductions(config: dict) -> None:
-    """Check that embeddings have components enough; how long they are, only the suite's own backbones tell."""
+    """Check that embeddings have enough components; their length is known of the suite's own backbones only."""
     section = config["real_world"]
     for name in section["reductions"]:
         reduction = make_reduction(name, config["reductions"].get(name) or {})
@@ -70,7 +70,7 @@ def _check_reductions(config: dict) -> None:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the rows of Table VI, the conditions of the initial pose, and what is shown and compared of them."""
+    """Return the rows of Table VI, the conditions of the initial pose, and those that are shown and compared."""
     frames = config["real_world"]
     backbones = reduced_backbones(frames)
     return {
@@ -88,7 +88,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of the frames, of their initial poses, of the encoders and of what else explains them."""
+    """Return the titles of the frames, their initial poses, the encoders and the other explainers."""
     frames = config["real_world"]
     source = {"title": frames["title"], "stand_in": not frames["datasets"]}
     poses = {REAL_WORLD: frames["initial_pose"]}
@@ -116,13 +116,13 @@ def reduced_backbones(frames: Mapping) -> list[str]:
 
 
 def unreduced_methods(frames: Mapping) -> dict[str, str]:
-    """Return the titles of what explains frames by a whole embedding, or without one."""
+    """Return the titles of the explainers that read a whole embedding of a frame, or none."""
     backbones = [name for name in reduced_backbones(frames) if name.endswith("-none")]
     return {name: encoder_title(*name.split("-")) for name in backbones} | titles(frames["explainers"])
 
 
 def _pretrained_on(frames: Mapping) -> str:
-    """Return what the encoders of frames are trained on before the frames; empty where they are not."""
+    """Return the data that the encoders of frames are trained on before the frames; empty where there is none."""
     if not frames["pretraining"]:
         return ""
     return "whole objects" + (" and on frames rendered of the models of all objects" if frames["virtual"] else "")

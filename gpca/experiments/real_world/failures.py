@@ -1,4 +1,4 @@
-"""Draws the ten most confident mistakes on depth frames: cloud over model, and what GP-CA said."""
+"""Draws the ten most confident mistakes on depth frames: cloud over model, and GP-CA's scores."""
 
 from __future__ import annotations
 

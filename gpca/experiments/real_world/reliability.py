@@ -1,4 +1,4 @@
-"""Draws whether GP-CA's confidence on depth frames is to be believed, backbone by backbone."""
+"""Draws whether GP-CA's confidence on depth frames can be believed, backbone by backbone."""
 
 from __future__ import annotations
 

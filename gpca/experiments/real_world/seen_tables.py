@@ -30,7 +30,7 @@ def table6_seen_unseen(
     explainers: Mapping[str, str],
     rendered: bool = False,
 ) -> Table:
-    """Return the accuracy on depth frames by what was seen in training and by dataset, under every condition.
+    """Return the accuracy on depth frames, for seen and unseen objects and by dataset, under every condition.
 
     Args:
         metrics: The tidy metrics (:func:`gpca.experiments.real_world.metrics.collect`).

@@ -1,4 +1,4 @@
-"""The section ``real_world`` of the config: depth frames, and what is learned and explained on them."""
+"""The section ``real_world`` of the config: depth frames, and the encoders and explainers on them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class FrameDataset:
 
 @dataclass(frozen=True)
 class VirtualFrames:
-    """Frames rendered of the datasets' own models: so many scenes, views of each, and training samples in all."""
+    """Frames rendered of the datasets' own models: numbers of scenes, of views of each, and of training samples."""
 
     count: Annotated[int, Bounds(minimum=2)]
     views: Count

@@ -30,7 +30,7 @@ CLASSIC = {
 
 
 def encoder_title(encoder: str, reduction: str) -> str:
-    """Return what figures call an encoder and the reduction after it."""
+    """Return the name of an encoder and the reduction after it in figures."""
     named = BACKBONES.get(encoder, encoder)
     return named if reduction == "none" else f"{named}, {REDUCTIONS.get(reduction, reduction)}"
 

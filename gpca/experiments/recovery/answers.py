@@ -1,4 +1,4 @@
-"""What explainers answered about episodes: each sees a registration once, together with all others that are new."""
+"""The explainers' answers about episodes: each sees a registration once, together with all others that are new."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Explain = Callable[[Registrations], Attribution]
 
 
 class CaseKey(NamedTuple):
-    """What an explainer is asked about: an episode after these actions."""
+    """A registration to be explained: that of an episode after these actions."""
 
     explainer: str
     episode: int
@@ -63,7 +63,7 @@ class Answers:
             self._answers |= dict(zip(new, answers_of(attribution), strict=True))
 
     def history(self, explainer: str, episode: int, actions: tuple[str, ...]) -> list[Answer]:
-        """Return what an explainer said at the start and after each of these actions."""
+        """Return an explainer's answers at the start and after each of these actions."""
         return [self._answers[CaseKey(explainer, episode, actions[:n])] for n in range(len(actions) + 1)]
 
 

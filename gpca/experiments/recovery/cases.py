@@ -22,13 +22,13 @@ FEWEST_POINTS = 64  # with fewer points of the object in all shots there is noth
 
 @dataclass(frozen=True)
 class Attempt:
-    """A registration: what the robot holds, the columns of its row, the truth about it.
+    """A registration: the robot's data, the columns of its row, the truth about it.
 
     Attributes:
-        holding: what the robot has, with the pose that ICP ended at.
+        holding: the robot's measurements, with the pose that ICP ended at.
         record: what :func:`gpca.pairs.synthesis.align_pair` returns, which lacks sample and split.
         error: ADD, or ADD-S of symmetric objects, relative to the diameter. Never shown to a policy.
-        seconds: what ICP and the action before it took, without the camera.
+        seconds: the time of ICP and of the action before it, without the camera.
     """
 
     holding: Holding
@@ -52,7 +52,7 @@ class RobotIn:
         self._axes = axes
 
     def shoot(self, T_world_camera: np.ndarray, frames: int) -> Shot:
-        """Measure from a viewpoint; the noise is named by what was done before and by the viewpoint."""
+        """Measure from a viewpoint; the noise is named by the actions before and by the viewpoint."""
         started = perf_counter()
         shot = self._situation.shoot(T_world_camera, frames, *self._axes, T_world_camera.round(6).tolist())
         self.camera_seconds += perf_counter() - started
@@ -80,7 +80,7 @@ def register_first(situation: Situation, points: int, icp: ICPSettings) -> Attem
 
 
 def register_misplaced(situation: Situation, clean: Attempt, points: int, icp: ICPSettings) -> Attempt | None:
-    """Register what was measured without a pose error from the estimate that has the situation's."""
+    """Register the measurement made without a pose error, from the estimate that has the situation's error."""
     T_init = clean.holding.T_world_object_init @ situation.T_object_estimated
     return register_held(situation, Holding(clean.holding.shots, T_init, T_init), points, icp)
 

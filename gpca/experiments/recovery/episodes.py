@@ -2,7 +2,7 @@
 
 A failure is a registration whose pose is wrong (ADD, or ADD-S of symmetric objects, above 10 % of the diameter) and
 whose cause is known: without it, the same registration succeeds. An action gives the same result whichever policy
-takes it after the same actions, so what was tried once is kept.
+takes it after the same actions, so every outcome is kept.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from gpca.recovery.settings import LoopSettings
 from gpca.seeds import generator
 
 POSE = "pose"  # the cause that disturbs nothing but ICP's start
-MISPLACED = 40  # so many of its starts are tried in a situation until one fails; in every other one, only the first
+MISPLACED = 40  # its starts that are tried in a situation until one fails; in every other one, only the first
 
 
 class Episode:

@@ -1,4 +1,4 @@
-"""One failure as pictures and numbers, kept for Fig. 1: what was seen at first, from the new viewpoint, and after."""
+"""One failure as pictures and numbers, kept for Fig. 1: the view at first, from the new viewpoint, and after."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def save_example(
 ) -> None:
     """Write the npz: of the ``first`` and the ``next`` view the image and silhouettes; scores, errors; viewpoints.
 
-    Silhouettes are those of what is seen of the object, of the whole object, and of the model where ICP put it. For
+    Silhouettes are those of the visible part of the object, of the whole object, and of the model where ICP put it. For
     each viewpoint that was to choose from there is the direction to it and the share of the model's surface that was
     expected to have been seen after it.
 

@@ -80,7 +80,7 @@ def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = ""
 
 
 def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, placed: np.ndarray) -> None:
-    """Show the part of an image around both outlines; what is seen of the object is outlined in full."""
+    """Show the part of an image around both outlines; the visible part of the object is outlined in full."""
     panel.imshow(image)
     for silhouette, color, line in ((true, YELLOW, "--"), (mask, YELLOW, "-"), (placed, TARGET_COLOR, "-")):
         if silhouette.any():
@@ -116,5 +116,5 @@ def _zenith_deg(towards: np.ndarray) -> np.ndarray:
 
 
 def _instead(action: str) -> str:
-    """Return what the policy did where it did not change the viewpoint, as the panels show it."""
+    """Return the policy's action, if it did not change the viewpoint, in the words of the panels."""
     return "" if action == "new_view" else f" ({in_words(action)})"

@@ -1,4 +1,4 @@
-"""What every policy makes of failed registrations, in a closed loop on tables of a virtual camera (Table VIII)."""
+"""Policies of recovery from failed registrations, in a closed loop on tables of a virtual camera (Table VIII)."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of the policies and of what stands on the tables, the treatments, and the budget of actions."""
+    """Return the titles of the policies and of the objects on the tables, the treatments, and the budget of actions."""
     recovery = config["recovery"]
     objects = sources[recovery["objects"]]
     return {

@@ -1,6 +1,6 @@
 """The closed loop: policies of recovery on the same failures, with the same budget of actions.
 
-They are asked about registrations that did not fail too, of which each says what it would do; nothing is done then.
+Each policy also says what it would do about registrations that did not fail; nothing is done about those.
 """
 
 from __future__ import annotations

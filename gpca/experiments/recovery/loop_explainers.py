@@ -29,7 +29,7 @@ class LoopExplainers:
         explain: for each name the function that attributes registrations without labels.
         fitted: for each name the explainer itself.
         attach: for each name the function that adds to registrations what the explainer reads.
-        calibration: for each name what it says of the calibration samples.
+        calibration: for each name its predictions for the calibration samples.
         concepts: (N,) the truth about those.
     """
 

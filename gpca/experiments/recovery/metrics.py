@@ -1,4 +1,4 @@
-"""From what policies did about failures to numbers: of every policy, cause and seed, as one tidy table."""
+"""Turns the actions of the policies into metrics of every policy, cause and seed, in one tidy table."""
 
 from __future__ import annotations
 

@@ -27,9 +27,9 @@ ASKED = {
 
 
 def draw_mitigation(title: str, policy_json: str | Path) -> Figure:
-    """Draw the mapping of one policy: what it reads, its branches in the order of asking, and the ways back.
+    """Draw the mapping of one policy: its inputs, its branches in the order of the tests, and the ways back.
 
-    An action leads to new scores; what is queued leads to a label and to a classifier that has learned it.
+    An action leads to new scores; a queued case leads to a label and to a classifier that has learned it.
     """
     policy = json.loads(Path(policy_json).read_text(encoding="utf-8"))
     limits, treatments = policy["thresholds"], policy["treatments"]

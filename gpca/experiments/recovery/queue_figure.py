@@ -1,4 +1,4 @@
-"""Draws what queued cases teach: failures that the first action leaves, over the labels that a person gave."""
+"""Draws learning from queued cases: failures that the first action leaves, over the labels that a person gave."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What queued cases teach: the error on other failures, by how many cases a person has labeled.
+"""Learning from queued cases: the error on other failures, by the number of cases that a person has labeled.
 
 A label is what solved the case: its cause for the classifier, the outcome of every action for the learned chances.
 """
@@ -31,16 +31,16 @@ DRAWS = 5  # random orders
 
 
 class QueueLearner(Protocol):
-    """What is in doubt about queued cases, learns their labels, and decides about others."""
+    """A learner that doubts queued cases, learns their labels, and decides about others."""
 
     def doubts(self) -> np.ndarray:
-        """Return how much each queued case (N,) is in doubt."""
+        """Return the doubt about each queued case (N,)."""
 
     def learn(self, rows: np.ndarray) -> None:
         """Learn the labels of these cases."""
 
     def choose(self) -> list[str]:
-        """Return the action that it takes first about each of the failures that it is judged by."""
+        """Return the learner's first action for each of the failures that it is judged by."""
 
 
 class ClassifierLearner:
@@ -77,7 +77,7 @@ class ChancesLearner:
 
     Args:
         trials: of each queued case; the first tells what was known at its start.
-        judged_N_F: what is known of the failures that it is judged by.
+        judged_N_F: the known features of the failures that it is judged by.
         costs: action -> its cost.
     """
 
@@ -96,7 +96,7 @@ class ChancesLearner:
         return np.array([1 - max(chances.of(a, trials[0].known_F) for a in self._costs) for trials in self._trials])
 
     def learn(self, rows: np.ndarray) -> None:
-        """Learn what helped."""
+        """Learn which actions helped."""
         self._learned += rows.tolist()
 
     def choose(self) -> list[str]:
@@ -114,10 +114,10 @@ def learners_of(
     explainers: LoopExplainers,
     budget: int,
 ) -> dict[str, Callable[[], QueueLearner]]:
-    """Return what makes the learner of each of these policies that queues cases or learns from rehearsals.
+    """Return the makers of the learners, for those of these policies that queue cases or learn from rehearsals.
 
     Args:
-        rehearsal: its failures are what is queued; None where no policy learns.
+        rehearsal: its failures are the queued cases; None where no policy learns.
         judged: other failures.
         budget: how many actions a failure may take.
     """
@@ -151,7 +151,7 @@ def error_by_labels(
     """Return a row per learner, order and number of labels: how many of the judged failures its first action leaves.
 
     Args:
-        learners: what makes each by its name, as it is before any label.
+        learners: the maker of each by its name, without any label learned.
         solved: of each judged failure, whether each action solves it.
         rehearsal: its failures are the queued cases.
         axes: names of the random orders.

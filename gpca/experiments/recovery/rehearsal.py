@@ -35,12 +35,12 @@ class Rehearsal:
 
     @property
     def failures(self) -> list[Episode]:
-        """Those that every action was tried on."""
+        """The episodes that every action was tried on."""
         return [episode for episode in self.episodes if episode.failed]
 
 
 def known(observed_F: np.ndarray, answer: Answer) -> np.ndarray:
-    """Return all that a policy may weigh: what the robot observes; scores, variances and BALD of an explainer."""
+    """Return all that a policy may weigh: the robot's observations; scores, variances and BALD of an explainer."""
     return np.concatenate([observed_F, np.nan_to_num([*answer.scores_C, *answer.variances_C, answer.bald])])
 
 
@@ -49,7 +49,7 @@ def rehearse(
 ) -> Rehearsal:
     """Try every action on every failure, and one more where that did not help.
 
-    The second action is each of the others in turn. What did not fail is only told from what did.
+    The second action is each of the others in turn. Registrations that did not fail get no action.
     """
     names = tuple(actions)
     taken: list[tuple[Episode, tuple[str, ...]]] = []
@@ -76,7 +76,7 @@ def rehearse(
 def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
     """Return the declared thresholds, and the one that is chosen on the rehearsed failures unless it is declared.
 
-    Those were searched for as the failures are that policies are asked about, on other tables. Without a rehearsal no
+    Those are found like the failures that policies are judged by, on other tables. Without a rehearsal no
     policy queues anything.
 
     Args:

@@ -1,4 +1,4 @@
-"""The section ``recovery`` of the config: what a robot does about a failed registration."""
+"""The section ``recovery`` of the config: a robot's policies after a failed registration."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class DeclaredThresholds:
 
 @dataclass(frozen=True)
 class Estimator(InitialPoseSettings):
-    """How the robot estimates a pose."""
+    """The settings of the robot's pose estimate."""
 
     form: Literal["global_registration"] = "global_registration"
 
 
 @dataclass(frozen=True)
 class RecoverySettings:
-    """What is done about a failed registration, in a closed loop on tables of the virtual camera."""
+    """Recovery from failed registrations, in a closed loop on tables of the virtual camera."""
 
     objects: str
     policies: Distinct[str]

@@ -1,4 +1,4 @@
-"""Step ``recover``: settings -> failures on virtual scenes, and what every policy of recovery makes of them."""
+"""Step ``recover``: settings -> failures on virtual scenes, and every policy's recovery from them."""
 
 from __future__ import annotations
 

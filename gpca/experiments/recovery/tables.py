@@ -1,4 +1,4 @@
-"""Makes Table VIII: what policies of recovery make of the same failures with the same number of actions."""
+"""Makes Table VIII: policies of recovery on the same failures with the same number of actions."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def lay_tables(
 def register_situations(
     situations: Mapping[str, Situations], train: int, calibration: int, settings: LoopSettings
 ) -> Registrations:
-    """Register situations of all causes, failed or not: what the classifier learns from, and is judged by.
+    """Register situations of all causes, failed or not, from which the classifier learns and is calibrated.
 
     Samples 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
 

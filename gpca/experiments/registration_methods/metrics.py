@@ -1,4 +1,4 @@
-"""From registrations by every method to numbers: of every source, method, cause and severity, as one tidy table."""
+"""Turns registrations into metrics of every source, method, cause and severity, in one tidy table."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _groups(rows: pd.DataFrame, severities: Mapping[str, Iterable[float]]) -> di
 
 
 def share_of_milder(rows: pd.DataFrame, concept: str, severities: Mapping[str, Iterable[float]]) -> np.ndarray:
-    """Return how large a share of what is drawn for a cause is milder than each row, in [0, 1].
+    """Return the share of a cause's drawn severities that is milder than each row, in [0, 1].
 
     A pose error has two severities, each uniform in its range; it is as severe as the mean of its places in the two.
     """

@@ -1,4 +1,4 @@
-"""On which pairs registration methods are tried, and what counts as a success: apart from what runs them."""
+"""Settings of the pairs that are registered, and of what counts as a success, apart from the code that runs it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gpca.settings import Bounds, PositiveShare
 
 @dataclass(frozen=True)
 class PairSettings:
-    """Which pairs.
+    """The pairs that every method registers.
 
     Attributes:
         samples: test samples of each source and seed, balanced, at most.

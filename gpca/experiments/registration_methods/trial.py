@@ -86,7 +86,7 @@ def try_methods(
 
 
 def pair_to_register(registrations: Registrations, row: int, source: str, seed: int, points: int) -> Pair:
-    """Return what a method is given of a registration: clouds thinned to `points`, normals estimated on these."""
+    """Return the input of a method for a registration: clouds thinned to `points`, normals estimated on these."""
     axes = (source, seed, "methods", registrations.split[row], registrations.sample[row])
     observed = registrations.source(row)
     kept = generator(*axes, "clouds").permutation(len(observed))[:points]

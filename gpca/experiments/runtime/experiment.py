@@ -11,7 +11,7 @@ from gpca.settings import Bounds
 
 @dataclass(frozen=True)
 class RuntimeSettings:
-    """How often every stage is timed."""
+    """The number of times that every stage is timed."""
 
     repeats: Annotated[int, Bounds(minimum=2)] = 100
 

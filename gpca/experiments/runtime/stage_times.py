@@ -30,7 +30,7 @@ Times = Iterator[tuple[tuple[str, str], float]]  # (component, device) and its s
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:
-    """Return what a function returns, and the seconds that it took."""
+    """Return the result of a function, and the seconds that it took."""
     started = perf_counter()
     result = work()
     return result, perf_counter() - started

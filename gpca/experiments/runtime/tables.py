@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def table7_runtime(runtime: pd.DataFrame, title: str, numbers: Iterable[Number]) -> Table:
-    """Return mean, standard deviation and median of each component in milliseconds, and what the paper prints.
+    """Return mean, standard deviation and median of each component in milliseconds, and the paper's numbers.
 
     Args:
         runtime: The frame that :func:`gpca.model.runtime_file.read_runtime` reads.

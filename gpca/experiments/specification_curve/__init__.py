@@ -1,1 +1,1 @@
-"""What the paper leaves unstated, tried value by value: which choice explains a printed number (docs/comparison.md)."""
+"""Choices that the paper leaves unstated, tried value by value to explain printed numbers (docs/comparison.md)."""

@@ -1,4 +1,4 @@
-"""The printed numbers under every reading of what the paper leaves unstated (Table XIII)."""
+"""The printed numbers under every reading of the choices that the paper leaves unstated (Table XIII)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from gpca.settings import Bounds, Keys
 
 @dataclass(frozen=True, kw_only=True)
 class Section(ReadingSizes):
-    """What the paper leaves unstated, by group, and how much of the data the readings see.
+    """The choices that the paper leaves unstated, by group, and how much of the data the readings see.
 
     Attributes:
-        frame_seeds: the first so many of the run's, for which encoders of depth frames that see other clouds are
-            trained.
+        frame_seeds: how many of the run's seeds, from the first, are used to train encoders that see other clouds of
+            depth frames.
     """
 
     frame_seeds: Annotated[int, Bounds(minimum=0)]

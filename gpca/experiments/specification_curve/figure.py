@@ -1,4 +1,4 @@
-"""Draws what every reading of the unstated gives in place of the printed numbers: specification curves."""
+"""Draws specification curves: the value that every reading gives in place of a printed number."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 COLUMNS = 3
 PANEL_IN, LINE_IN = 1.9, 0.13  # the height of a row of panels, and what each line of the legends below it adds
-FARTHEST = 30.0  # times what is close
+FARTHEST = 30.0  # times the close tolerance
 COLORS = tuple(color for color in PALETTE if color != YELLOW)  # Yellow lines are hard to see on white.
 NUMBER = ["table", "row", "column"]  # what names a printed number
 LETTERS = 48  # of a number's name, which a panel has room for
@@ -31,7 +31,7 @@ def draw_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: Mapp
     """Draw a panel per group: a curve for each number that is not reproduced, its readings in order of their values.
 
     Args:
-        judged: what :func:`gpca.comparison.readings.read_judged` returned.
+        judged: the rows that :func:`gpca.comparison.readings.read_judged` returned.
     """
     missed = asked_about(judged)
     shown = [name for name in groups if (missed["group"] == name).any()]

@@ -56,7 +56,7 @@ def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) 
 
 
 def pretrained(run_files: RunFiles, cloud: str, frames: str) -> dict[str, torch.Tensor] | None:
-    """Return the weights after the training on all sources but the frames; None where the config has none of it."""
+    """Return the weights after training on all sources but the frames; None where the config has no pretraining."""
     parts = [(path, axes) for axes, path in run_files.registrations.items() if axes[0] != frames]
     if not parts or not run_files.section("pretraining"):
         return None
@@ -69,7 +69,7 @@ def pretrained(run_files: RunFiles, cloud: str, frames: str) -> dict[str, torch.
 def named(
     run_files: RunFiles, shown: Registrations, cloud: str, start: dict[str, torch.Tensor] | None, source: str, seed: int
 ) -> np.ndarray:
-    """Return what GP-CA names the test samples (S,) of frames whose clouds the encoder sees otherwise."""
+    """Return the concepts that GP-CA names for test samples (S,) of frames, with other clouds before the encoder."""
     settings = _settings(run_files, cloud, "training")
     instance_S = read_instances_of(run_files.poses[source, seed], shown)
     seen = read_as(cloud, shown, _icp(run_files))

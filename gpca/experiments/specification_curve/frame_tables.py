@@ -1,4 +1,4 @@
-"""Makes the table of what the encoder sees on depth frames: Table VI's first backbone, by the cloud before it."""
+"""Makes the table of the encoder's inputs on depth frames: Table VI's first backbone, by the cloud before it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Table VI under other readings: what varies between its repeats, and which objects the test samples show."""
+"""Table VI under other readings of the part that varies between repeats and of the objects in test samples."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) 
 
 
 def refitted(registrations: Registrations, settings: dict, drawn: bool, *axes: object) -> np.ndarray:
-    """Return what a new classifier names the test samples (S,), fitted to the training samples or to a draw of them.
+    """Return the concepts (S,) that a new classifier names, fitted to the training samples or to a draw of them.
 
     A draw is with replacement, of as many samples as there are (Efron 1979).
     """

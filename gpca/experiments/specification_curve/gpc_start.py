@@ -33,7 +33,7 @@ FITTED = (("rbf", 0.001, 200), ("polynomial", 0.001, 200), ("rbf", 0.01, 100))
 
 
 def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield accuracies under each reading, and of the last of `FITTED` what Table V prints."""
+    """Yield accuracies under each reading, and Table V's numbers of the last of `FITTED`."""
     for source, seed, sets, registrations in run_files.in_distribution():
         train, test = (registrations.rows(split) for split in ("train", "test"))
         distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]

@@ -1,4 +1,4 @@
-"""From what is predicted under a reading to the values of the printed numbers that it touches."""
+"""Turns the predictions under a reading into values of the printed numbers that it touches."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def accuracies_of_named(true_S: np.ndarray, named_S: np.ndarray) -> Values:
 
 
 def table5(true_S: np.ndarray, scores_S_C: np.ndarray, distance_S: np.ndarray) -> Values:
-    """Return the accuracies, and what Table V prints of the uncertainty 1 - max ŝ: ρ, AUC and ECE."""
+    """Return the accuracies, and Table V's diagnostics of the uncertainty 1 - max ŝ: ρ, AUC and ECE."""
     target_S = np.array([CONCEPTS.index(concept) for concept in true_S])
     confidence_S = scores_S_C.max(axis=1)
     return accuracies(true_S, scores_S_C) | {

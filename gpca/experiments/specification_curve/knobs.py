@@ -108,7 +108,7 @@ def _steps(pair: tuple, settings: UncertaintySettings) -> dict[str, np.ndarray]:
 
 
 def _corners(pair: tuple, starts: Sequence[int]) -> dict[int, np.ndarray]:
-    """Return the covariances (8, 6, 6) of the corners of the knobs' middle, over the first so many starts."""
+    """Return the covariances (8, 6, 6) of the corners of the knobs' middle, by the number of first starts."""
     (_, _, _, T_ref), knob_runs = pair
     corners = [knob_runs.runs(Knobs(*np.where(switches, MIDDLE, UNTOUCHED)))[0] for switches in CORNERS]
     return {n: np.array([runs.chosen(np.arange(n)).covariance(T_ref) for runs in corners]) for n in starts}

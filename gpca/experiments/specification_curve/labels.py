@@ -1,4 +1,4 @@
-"""Table III under other readings: what the pool holds, how labels come, and what an epoch is."""
+"""Table III under other readings of the pool, of the rounds of labels, and of an epoch."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gpca.process.progress import progress
 
 NEW = "overlap"  # the paper's new concept
 RANDOM_BATCH = 10  # random choice is the same in rounds of any size, and needs many labels
-EVERY, MOST = 5, 200  # epochs after which the accuracy is looked at, and of which there are at most so many
+EVERY, MOST = 5, 200  # epochs between looks at the accuracy, and the most of them
 
 
 def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:

@@ -25,7 +25,7 @@ FOREST, SVM = "learner_forest", "learner_linear_svm"
 
 
 def kernel(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield what Table V prints of the GPC, by its kernel and schedule."""
+    """Yield the GPC's numbers of Table V, by its kernel and schedule."""
     for source, seed, sets, registrations in run_files.in_distribution():
         train, test = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
         distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
@@ -40,7 +40,7 @@ def kernel(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSize
 
 
 def linear_svm(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield what Table V prints of the linear SVM, by its kind."""
+    """Yield the linear SVM's numbers of Table V, by its kind."""
     for source, seed, sets, registrations in run_files.in_distribution():
         distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         train, test = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))

@@ -1,4 +1,4 @@
-"""The groups of readings by name: what each asks, what it reads, and what runs it."""
+"""The groups of readings by name: the choice, the files and the function of each."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class Group:
     """A group of choices that the paper leaves open.
 
     Attributes:
-        title: what is open.
+        title: the open question in words.
         choices: the class of its choices.
         run: ``module:function`` beside this module, of the files given, the readings and their sizes, that
             yields reading, source, method, metric, concept, seed and value, named as in published.csv.
         reads: kinds of files, fields of :class:`gpca.experiments.specification_curve.run_files.RunFiles`.
-        sources: of which printed numbers are asked; empty for depth frames.
-        methods: whose predictions it reads.
+        sources: those whose printed numbers are compared; empty for depth frames.
+        methods: those whose predictions it reads.
         explainers: those that it fits itself, found by name.
         costly: it takes minutes a seed, so that it sees the first one alone.
     """
@@ -43,7 +43,7 @@ class Group:
         return f"gpca.experiments.specification_curve.{self.run.partition(':')[0]}"
 
     def function(self) -> Callable:
-        """Return what runs it."""
+        """Return the function that runs it."""
         return load(f"gpca.experiments.specification_curve.{self.run}")
 
 

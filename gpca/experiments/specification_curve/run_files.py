@@ -20,7 +20,7 @@ Row = tuple[Reading, str, str, str, str, int, float]
 
 @dataclass(frozen=True)
 class RunFiles:
-    """Paths by what names them.
+    """The paths of a run's files.
 
     Attributes:
         registrations, sets: (source, seed) -> file of the step ``registrations`` or ``shift``.

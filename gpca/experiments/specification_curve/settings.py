@@ -37,7 +37,7 @@ Starts = Annotated[int, Bounds(minimum=2)]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What sensitivity analysis differentiates, and which derivative names the cause."""
+    """The quantity that sensitivity analysis differentiates, and the derivative that names the cause."""
 
     quantity: Distinct[Quantity]
     sign: Distinct[Literal["signed", "absolute", "lowest"]]
@@ -47,7 +47,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class Shap:
-    """What SHAP's uncertainty is of."""
+    """The uncertainty that SHAP explains, and the pair that it is compared with."""
 
     starts: Distinct[Starts]
     background: Distinct[Literal["observed", "clean"]]
@@ -58,7 +58,7 @@ class Shap:
 
 @dataclass(frozen=True)
 class TestSeverities:
-    """How strong the perturbations of the test samples are."""
+    """The strength of the test samples' perturbations."""
 
     part: Distinct[Literal["all", "weakest", "middle", "strongest"]]
     classifier: Distinct[Literal["paper", "converged"]]
@@ -66,7 +66,7 @@ class TestSeverities:
 
 @dataclass(frozen=True)
 class GPCStart:
-    """How the Gaussian process classifier starts."""
+    """The start of the Gaussian process classifier."""
 
     inputs: Distinct[Literal["standardised", "unit_norm", "raw"]]
     inducing: Distinct[Literal["kmeans", "random"]]
@@ -84,7 +84,7 @@ class TableKernel:
 
 @dataclass(frozen=True)
 class LinearSVM:
-    """Which linear support vector machine, and how it gives probabilities."""
+    """The kind of linear support vector machine, and how it gives probabilities."""
 
     machine: Distinct[Literal["svc", "linear_svc"]]
     inputs: Distinct[Literal["standardised", "raw"]]
@@ -111,7 +111,7 @@ class Diagnostics:
 
 @dataclass(frozen=True)
 class LabelPool:
-    """What there is to be labeled."""
+    """The pool of samples to be labeled, and the labels at the start and in a round."""
 
     new_share: Distinct[OpenShare]
     batch: Distinct[Count]
@@ -120,7 +120,7 @@ class LabelPool:
 
 @dataclass(frozen=True)
 class Epochs:
-    """What an epoch is: a pass of Adam over these labels, at this rate."""
+    """An epoch as a pass of Adam over these labels, at this rate."""
 
     learning_rate: Distinct[LearningRate]
     labels: Distinct[Literal["at_target", "all"]]
@@ -128,7 +128,7 @@ class Epochs:
 
 @dataclass(frozen=True)
 class FrameRepeats:
-    """What varies between the repeats on depth frames, and which objects the test samples show."""
+    """The part that varies between repeats on depth frames, and the objects that the test samples show."""
 
     repeats: Distinct[Literal["everything", "classifiers", "samples"]]
     objects: Distinct[Literal["all", "seen", "unseen"]]
@@ -136,7 +136,7 @@ class FrameRepeats:
 
 @dataclass(frozen=True)
 class FrameInput:
-    """What the encoder sees on depth frames, and which objects the test samples show."""
+    """The cloud that the encoder sees on depth frames, and the objects that the test samples show."""
 
     input: Distinct[ReadAs]
     objects: Distinct[Literal["all", "seen", "unseen"]]
@@ -144,17 +144,17 @@ class FrameInput:
 
 @dataclass(frozen=True)
 class ClassicFeatures:
-    """Which of the classic features there are."""
+    """The classic features that are read."""
 
     features: Distinct[Literal["all", "no_counts", "no_residual", "residual", "counts"]]
 
 
 @dataclass(frozen=True)
 class ReadingSizes:
-    """What the readings of a run see.
+    """The seeds and samples that the readings of a run see.
 
     Attributes:
-        seeds: the first so many of the run's.
+        seeds: how many of the run's seeds are used, from the first.
         encoders: of these, seeds for which another encoder is trained.
         samples: test samples of each source and seed on which Monte-Carlo ICP is run, balanced, at most.
     """
@@ -173,5 +173,5 @@ def readings_of(choices: Mapping[str, Sequence]) -> list[Reading]:
 
 
 def name_of(group: str, reading: Reading) -> str:
-    """Return what `table` of the tidy rows of a reading says, e.g. ``frames/classifiers/seen``."""
+    """Return the name of a reading in `table` of its tidy rows, e.g. ``frames/classifiers/seen``."""
     return "/".join([group, *(f"{value:g}" if isinstance(value, float) else str(value) for value in reading.values())])

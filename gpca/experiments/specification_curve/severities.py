@@ -1,4 +1,4 @@
-"""GP-CA on test samples that were perturbed weakly or strongly: what other severities would do to its accuracy."""
+"""GP-CA on test samples that were perturbed weakly or strongly: the effect of severity on its accuracy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbers of the paper that are missed, with what every reading of the unstated gives in their place."""
+"""The numbers of the paper that are missed, with the values that every reading gives in their place."""
 
 from __future__ import annotations
 

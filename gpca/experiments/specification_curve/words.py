@@ -1,4 +1,4 @@
-"""What a reader calls the readings of the unstated: words for the values of each group's choices."""
+"""Words for the readings: for the values of each group's choices."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ NUMBERS = {  # field -> the words around a number
 def reading_in_words(group: str, reading: str) -> str:
     """Return a reading as words: ``RBF, 100 iterations`` for ``rbf/100`` of the group ``kernel``.
 
-    What is not known is kept as it is.
+    Unknown values stay as they are.
     """
     values = reading.split("/")
     names = [field.name for field in fields(GROUPS[group].choices)] if group in GROUPS else []

@@ -1,11 +1,11 @@
-"""Which explainers can be asked with something else beneath them."""
+"""Checks that an explainer can run with something else beneath it."""
 
 from __future__ import annotations
 
 from gpca.errors import InputError
 from gpca.explainers.registry import explainer_entry
 
-DESIGN = "additive"  # whose conditions estimators are asked about
+DESIGN = "additive"  # the design whose conditions are estimated
 
 
 def require_exchangeable(name: str) -> None:

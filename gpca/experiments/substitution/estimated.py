@@ -32,26 +32,26 @@ OBSERVED = (UNTOUCHED,)  # the condition of explainers that read the observed pa
 
 @dataclass(frozen=True)
 class Estimates:
-    """What one estimator says of S registrations under K conditions.
+    """One estimator's covariances of S registrations under K conditions.
 
     Attributes:
-        covariance: (S, K, 6, 6), radians and diameters; NaN where it says nothing.
-        failure: (S, K) why.
+        covariance: (S, K, 6, 6), radians and diameters; NaN where there is none.
+        failure: (S, K) why there is none.
     """
 
     covariance: np.ndarray
     failure: np.ndarray
 
     def why_untold(self, conditions: int) -> np.ndarray:
-        """Return (S,) why one of the first so many conditions has no estimate, empty where all have."""
+        """Return (S,) why one of the first `conditions` has no estimate, empty where all have one."""
         return np.array([next(filter(None, row), "") for row in self.failure[:, :conditions]])
 
     def attach_to(self, registrations: Registrations, rows: np.ndarray, conditions: int, floor: float) -> Registrations:
-        """Return the given rows with what explainers read of a design; its cost is not told.
+        """Return the given rows with the outcomes of a design attached for explainers; its cost is not known.
 
         Args:
-            registrations: the S.
-            rows: those that have all of the first so many conditions.
+            registrations: the S registrations.
+            rows: those that have all of the first `conditions`.
             conditions: how many.
             floor: ε of the divergence.
         """
@@ -101,7 +101,7 @@ class KnobbedRegistrar:
         estimators: Mapping[str, Callable[[RegisteredPair], Estimate]],
         settings_of_knobs: Sequence[Knobs] = ADDITIVE_KNOBS,
     ) -> dict[str, Estimates]:
-        """Return what each estimator says of the rows under each setting."""
+        """Return each estimator's covariances of the rows under each setting."""
         shape = len(rows), len(settings_of_knobs)
         estimates = {
             name: Estimates(np.full((*shape, 6, 6), np.nan), np.full(shape, "", object)) for name in estimators

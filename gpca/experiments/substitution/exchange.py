@@ -30,11 +30,11 @@ UNTAUGHT = "too few training registrations have an estimate"
 
 @dataclass(frozen=True)
 class Exchange:
-    """What is exchanged beneath the explainers of one source and seed.
+    """The methods and estimators exchanged beneath the explainers of one source and seed.
 
     Attributes:
-        source, seed: name what is random.
-        settings: of the exchange.
+        source, seed: they name the random numbers.
+        settings: those of the exchange.
         methods, estimators: name -> settings.
         uncertainty: floor, points and spread of the starts, of the estimators.
         rivals: by name. Those that read an uncertainty get each estimator's, the others each method's registrations.
@@ -51,10 +51,10 @@ class Exchange:
     embed: Embed
 
     def run(self, registrations: Registrations, judges: Judges) -> pd.DataFrame:
-        """Return a row for each explainer, test sample, and what was exchanged beneath it.
+        """Return a row for each explainer, test sample, and method or estimator beneath it.
 
         Args:
-            registrations: of the source, by the paper's protocol.
+            registrations: those of the source, by the paper's protocol.
             judges: of their objects.
 
         Returns:
@@ -140,7 +140,7 @@ class Exchange:
 
 
 def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
-    """Return the rows of the first so many samples of a split: threes of one object, which go round the objects."""
+    """Return the rows of the first `samples` of a split: threes of one object, which go round the objects."""
     return np.flatnonzero((registrations.split == split) & (registrations.sample < samples))
 
 

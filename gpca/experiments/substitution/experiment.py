@@ -26,7 +26,7 @@ class Section(ExchangeSettings):
 
 
 def check(config: dict, names_left_out: LeftOut) -> None:
-    """Check that all names exist, and that the explainers read what is exchanged."""
+    """Check that all names exist, and that the explainers read the parts that are exchanged."""
     exchange = config["exchange"]
     for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
         require_names(f"exchange.{key}", exchange[key], config[key], noun, names_left_out(key))
@@ -47,7 +47,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of what stands in the tables, and the methods whose package is missing here."""
+    """Return the titles for the tables, and the methods whose package is missing here."""
     exchange = config["exchange"]
     missing = left_out(exchange["methods"])
     return {

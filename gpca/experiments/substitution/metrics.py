@@ -1,4 +1,4 @@
-"""From what explainers said with something else beneath them to numbers: one tidy table."""
+"""Turns predictions with something else beneath the explainers into one tidy table of metrics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The same registrations by another method: what encoders and descriptors see of them then."""
+"""The same registrations by another method, as encoders and descriptors then see them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is exchanged beneath the explainers, and on how many registrations: nothing here needs torch."""
+"""The methods and estimators exchanged beneath the explainers, and the sizes: nothing here needs torch."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Annotated
 from gpca.settings import Bounds, Count, Distinct
 
 BALANCED = {"multipleOf": 3}  # over the concepts
-METHOD, ESTIMATOR = "method", "estimator"  # what is exchanged
+METHOD, ESTIMATOR = "method", "estimator"  # the two exchanges
 LABELS = ("exchanged", "learnt_from", "asked_of", "explainer")  # columns before those of a prediction file
 FAILURE = "failure"  # the column behind them: why the method failed, or the estimator
 
 
 @dataclass(frozen=True)
 class ExchangeSettings:
-    """Which methods and estimators, and how many registrations.
+    """The methods and estimators, and the numbers of registrations.
 
     Attributes:
-        seeds: the first so many of the run's.
-        methods: registration methods, each learned from and asked about in its turn.
+        seeds: how many of the run's seeds are used, from the first.
+        methods: registration methods, each used for training and for test registrations in turn.
         train, test: registrations of each source and seed, by each of them, at most.
         points: of source and of target that are registered, at most.
         estimators: of the covariance, each in the place of Monte-Carlo.

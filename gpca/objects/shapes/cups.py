@@ -72,7 +72,7 @@ CUPS = {
 
 
 def build(cup: Cup) -> trimesh.Trimesh:
-    """Mesh of one cup in meters, foot at z = 0, first handle towards +x."""
+    """Build the mesh of one cup in meters, with its foot at z = 0 and its first handle toward +x."""
     radii, heights = np.array(cup.profile).T
     outline = PchipInterpolator(heights, radii)
     top = heights[-1]
@@ -100,7 +100,7 @@ def build(cup: Cup) -> trimesh.Trimesh:
 
 
 def _heights(bottom: float, fillet: float, top: float, lip: float) -> np.ndarray:
-    """Heights from bottom to top, dense where the fillet and the rounded lip are steep."""
+    """Return heights from bottom to top, dense where the fillet and the rounded lip are steep."""
     rise = 1 - np.cos(np.linspace(0, np.pi / 2, 8))
     straight = np.linspace(bottom + fillet, top - lip, 32)[1:-1]
     return np.concatenate([bottom + fillet * rise, straight, (top - lip * rise)[::-1]])

@@ -52,7 +52,7 @@ def ape() -> trimesh.Trimesh:
 
 
 def benchvise() -> trimesh.Trimesh:
-    """Vise on a turntable: fixed jaw with anvil, sliding jaw, screw, tommy bar."""
+    """Build a vise on a turntable: fixed jaw with anvil, sliding jaw, screw, tommy bar."""
     base = revolve(
         [(0, 0), (60, 0), (60, 10), (52, 16), (38, 22), (32, 40), (26, 50), (26, 58), (36, 62), (36, 74), (0, 74)]
     )
@@ -70,7 +70,7 @@ def benchvise() -> trimesh.Trimesh:
 
 
 def camera() -> trimesh.Trimesh:
-    """Reflex camera with its lens towards x: grip, prism, dial, shutter button, eyecup, screen."""
+    """Build a reflex camera with its lens toward x: grip, prism, dial, shutter button, eyecup, screen."""
     body = hull(box((40, 128, 60), (0, 0, 36), 8), box((30, 104, 76), (0, 0, 40), 8))
     grip = hull(cylinder(14, 74, (14, -56, 39)), box((20, 24, 76), (-4, -58, 39), 6))
     prism = hull(box((44, 62, 10), (4, 0, 74), 4), box((30, 30, 10), (6, 0, 94), 4))
@@ -86,7 +86,7 @@ def camera() -> trimesh.Trimesh:
 
 
 def can() -> trimesh.Trimesh:
-    """Build a watering can, open half at the top: spout with rose towards -y, handle at the back, bow above."""
+    """Build a watering can, open half at the top: spout with rose toward -y, handle at the back, bow above."""
     outline = [(0, 0), (50, 0), (50, 4), (48, 6), (48, 24), (50, 26), (48, 28), (48, 84), (50, 86), (48, 88)]
     body = revolve([*outline, (48, 112), (50, 114), (50, 118), (0, 118)])
     spout = tube([(0, -40, 22), (0, -66, 62), (0, -82, 108)], [13, 10, 8])
@@ -105,7 +105,7 @@ def can() -> trimesh.Trimesh:
 
 
 def cat() -> trimesh.Trimesh:
-    """Kitten standing along y, tail up, head turned towards x."""
+    """Build a kitten standing along y, tail up, head turned toward x."""
     head = [ellipsoid((26, 29, 25)), ellipsoid((11, 14, 10), (19, 0, -9)), ellipsoid((4, 5, 3), (30, 0, -4))]
     for y in BOTH:
         head.append(
@@ -123,7 +123,7 @@ def cat() -> trimesh.Trimesh:
 
 
 def driller() -> trimesh.Trimesh:
-    """Cordless driller: chuck towards x, pistol grip, trigger, battery foot."""
+    """Build a cordless driller: chuck toward x, pistol grip, trigger, battery foot."""
     motor = [
         (0, 0),
         (22, 0),
@@ -148,7 +148,7 @@ def driller() -> trimesh.Trimesh:
 
 
 def duck() -> trimesh.Trimesh:
-    """Rubber duck."""
+    """Build a rubber duck."""
     parts = [
         ellipsoid((42, 35, 27), (-2, 0, 26)),
         ellipsoid((24, 27, 22), (12, 0, 34)),
@@ -180,7 +180,7 @@ def eggbox() -> trimesh.Trimesh:
 
 
 def glue() -> trimesh.Trimesh:
-    """Flat glue bottle with sloping shoulders, a nub at the side and a stepped nozzle."""
+    """Build a flat glue bottle with sloping shoulders, a nub at the side and a stepped nozzle."""
     half = [(30, 0), (37, 4), (38, 40), (36, 66), (30, 90), (20, 118), (14, 126)]
     outline = half + [(-y, z) for y, z in reversed(half)]
     bottle = move(extrude(outline, 37, 4, 8), (-18.5, 0, 0), (90, 0, 90))
@@ -192,7 +192,7 @@ def glue() -> trimesh.Trimesh:
 
 
 def holepuncher() -> trimesh.Trimesh:
-    """Office hole puncher: chip tray, cheeks, two punches, broad lever with a slot."""
+    """Build an office hole puncher: chip tray, cheeks, two punches, broad lever with a slot."""
     tray = union(box((96, 106, 9), (0, 0, 4.5), 3), box((60, 96, 14), (-10, 0, 14), 3))
     paper_slot = box((46, 120, 3), (22, 0, 15))
     cheek = [(-40, 8), (-40, 36), (-28, 48), (-8, 44), (18, 22), (20, 8)]
@@ -208,7 +208,7 @@ def holepuncher() -> trimesh.Trimesh:
 
 
 def iron() -> trimesh.Trimesh:
-    """Clothes iron, tip towards x: sole, water tank, looped handle, dial, spray nozzle, cord."""
+    """Build a clothes iron, tip toward x: sole, water tank, looped handle, dial, spray nozzle, cord."""
 
     def outline(length: float, width: float, back: float, z: float) -> np.ndarray:
         turn = np.linspace(0, 2 * np.pi, 96, endpoint=False)
@@ -229,7 +229,7 @@ def iron() -> trimesh.Trimesh:
 
 
 def lamp() -> trimesh.Trimesh:
-    """Desk spotlight: forked foot, leaning post, cone shade open to the front with its bulb inside."""
+    """Build a desk spotlight: forked foot, leaning post, cone shade open to the front with its bulb inside."""
     fork = [box((130, 24, 12), (-30, y * 26, 6), 3) for y in BOTH]
     foot = [*fork, box((56, 76, 14), (16, 0, 7), 3)]
     post = hull(box((34, 54, 4), (14, 0, 12), 1), box((16, 34, 4), (0, 0, 106), 1))
@@ -245,7 +245,7 @@ def lamp() -> trimesh.Trimesh:
 
 
 def phone() -> trimesh.Trimesh:
-    """Cordless telephone standing in its cradle: keypad, display, earpiece slots."""
+    """Build a cordless telephone standing in its cradle: keypad, display, earpiece slots."""
     base = hull(extrude(_rectangle(74, 147), 14, 30), box((40, 116, 18), (-16, 4, 38), 8))
     keys = [box((9, 12, 5), (24, y, z), 2) for y in (-14, 0, 14) for z in (26, 40, 54, 68)]
     body = union(box((28, 52, 158), (8, 0, 79), 10), cylinder(8, 5, (22, 0, 88), "x"), *keys)
@@ -278,7 +278,7 @@ DRAWN = {  # name: (drawing, extents mm, diameter mm)
 
 
 def build(name: str) -> trimesh.Trimesh:
-    """Mesh of one object in meters, foot at z = 0."""
+    """Return the mesh of one object in meters, with its foot at z = 0."""
     draw, extents_mm, diameter_mm = DRAWN[name]
     mesh = scale_to(draw(), np.multiply(extents_mm, 0.001), diameter_mm * 0.001)
     return move(mesh, (0, 0, -mesh.bounds[0, 2]))

@@ -27,7 +27,7 @@ Points = ArrayLike  # (K, 3), in a section (K, 2)
 
 
 def box(extents: Point, at: Point = (0, 0, 0), rounding: float = 0) -> trimesh.Trimesh:
-    """Box of full side lengths `extents` centered at `at`; `rounding` is the radius of all edges and corners."""
+    """Return a box of full side lengths `extents` centered at `at`; `rounding` is the radius of edges and corners."""
     inner = np.asarray(extents, float) - 2 * rounding
     if not rounding:
         return _trimesh(Manifold.cube(inner, center=True).translate(at))
@@ -37,23 +37,23 @@ def box(extents: Point, at: Point = (0, 0, 0), rounding: float = 0) -> trimesh.T
 
 
 def cylinder(radius: float, height: float, at: Point = (0, 0, 0), axis: str = "z", top: float | None = None):
-    """Cylinder centered at `at` along x, y or z; with `top` a cone frustum of that radius at its upper end."""
+    """Return a cylinder centered at `at` along x, y or z; `top` is the upper radius of a cone frustum."""
     body = Manifold.cylinder(height, radius, radius if top is None else top, SEGMENTS, center=True)
     return _trimesh(body.rotate(AXES[axis]).translate(at))
 
 
 def ellipsoid(radii: float | Point, at: Point = (0, 0, 0)) -> trimesh.Trimesh:
-    """Ellipsoid of semi-axes `radii` (one number: a ball) centered at `at`."""
+    """Return an ellipsoid of semi-axes `radii` (one number: a ball) centered at `at`."""
     return _trimesh(Manifold.sphere(1, SEGMENTS).scale(np.broadcast_to(radii, 3)).translate(at))
 
 
 def revolve(profile_rz: Points) -> trimesh.Trimesh:
-    """Solid of revolution about z of the closed profile (r ≥ 0, z): one that touches the axis, or a ring."""
+    """Return the solid of revolution about z of a closed profile (r ≥ 0, z), which touches the axis or makes a ring."""
     return _trimesh(Manifold.revolve(_section(profile_rz), SEGMENTS))
 
 
 def extrude(polygon_xy: Points, height: float, rounding: float = 0, rounding_z: float = 0) -> trimesh.Trimesh:
-    """Prism over a polygon, z from 0 to `height`.
+    """Return a prism over a polygon, z from 0 to `height`.
 
     `rounding` rounds the polygon's corners (the upright edges); `rounding_z` rounds the rims of top and bottom, and all
     corners with them. The polygon must be wider than twice the rounding everywhere.
@@ -78,7 +78,7 @@ def tube(
     steps: int = 48,
     segments: int = 32,
 ) -> trimesh.Trimesh:
-    """Sweep of a circle along a path, flat at both ends: handles, spouts, tails, bananas.
+    """Sweep a circle along a path, flat at both ends: for handles, spouts, tails, bananas.
 
     Args:
         path: (K, 3) points; a cubic spline runs through them when `smooth`, else straight lines.
@@ -112,27 +112,27 @@ def tube(
 
 
 def loft(rings: Sequence[Points]) -> trimesh.Trimesh:
-    """Skin over rings of equally many points, counter-clockwise seen from the last ring; both ends closed flat."""
+    """Return a skin over rings of equally many points, counterclockwise seen from the last; the ends are flat."""
     return _skin([np.asarray(ring, float) for ring in rings])
 
 
 def hull(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Convex hull of all meshes together: tapered blocks, rounded slabs."""
+    """Return the convex hull of all meshes together: for tapered blocks and rounded slabs."""
     return _trimesh(Manifold.hull_points(np.vstack([mesh.vertices for mesh in meshes])))
 
 
 def union(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
-    """All of the meshes in one."""
+    """Return the union of all meshes."""
     return _trimesh(Manifold.batch_boolean([_manifold(mesh) for mesh in meshes], OpType.Add))
 
 
 def difference(mesh: trimesh.Trimesh, *cut: trimesh.Trimesh) -> trimesh.Trimesh:
-    """`mesh` without the others."""
+    """Return `mesh` without the others."""
     return _trimesh(Manifold.batch_boolean([_manifold(each) for each in (mesh, *cut)], OpType.Subtract))
 
 
 def intersection(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return what all of the meshes share."""
+    """Return the part that all of the meshes share."""
     return _trimesh(Manifold.batch_boolean([_manifold(mesh) for mesh in meshes], OpType.Intersect))
 
 
@@ -147,7 +147,7 @@ def blend(*meshes: trimesh.Trimesh, edge: float, rounds: int = 10) -> trimesh.Tr
 
 
 def move(mesh: trimesh.Trimesh, translation: Point = (0, 0, 0), rotation_xyz_deg: Point = (0, 0, 0), scale: float = 1):
-    """Copy of the mesh, scaled, then turned about the fixed axes x, y, z through the origin, then shifted."""
+    """Return a copy of the mesh, scaled, then turned about the fixed axes x, y, z through the origin, then shifted."""
     x, y, z = np.radians(rotation_xyz_deg)
     transform = euler_matrix(x, y, z, axes="sxyz")
     transform[:3, :3] *= scale
@@ -156,7 +156,7 @@ def move(mesh: trimesh.Trimesh, translation: Point = (0, 0, 0), rotation_xyz_deg
 
 
 def scale_to(mesh: trimesh.Trimesh, extents: Point | None = None, diameter: float | None = None) -> trimesh.Trimesh:
-    """Copy scaled about the origin, per axis to `extents` and then evenly to `diameter`; at least one is given."""
+    """Return a copy scaled about the origin, per axis to `extents`, then evenly to `diameter` (at least one)."""
     scaled = mesh.copy()
     if extents is not None:
         scaled.apply_scale(np.asarray(extents, float) / mesh.extents)

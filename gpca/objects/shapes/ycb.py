@@ -32,7 +32,7 @@ from gpca.objects.shapes.solids import (
 
 
 def _can(radius: float, height: float, ribs: int = 0) -> trimesh.Trimesh:
-    """Tin can: a seam around both ends, lids sunk below it, ribs around the body."""
+    """Build a tin can: a seam around both ends, lids sunk below it, ribs around the body."""
     body, lid = radius - 1.6, 4.0
     side = []
     for z in np.linspace(0, height, ribs + 2)[1:-1]:
@@ -59,7 +59,7 @@ def _ellipse(x: float, y: float, at: tuple[float, float] = (0, 0), turn_deg: flo
 
 
 def _bottle(stations: list[tuple[float, float, float, float, float]]) -> trimesh.Trimesh:
-    """Skin over superellipses, rows of (z, left, right, half depth, exponent), smooth in z; exponent 2: ellipse."""
+    """Build a skin over superellipses, smooth in z: rows of (z, left, right, half depth, exponent; 2: ellipse)."""
     table = np.array(stations)
     heights = np.unique(np.concatenate([table[:, 0], np.linspace(table[0, 0], table[-1, 0], 60)]))
     angle = np.linspace(0, 2 * np.pi, 72, endpoint=False)
@@ -88,7 +88,7 @@ def _banana() -> trimesh.Trimesh:
 
 
 def _spout(inset: float) -> trimesh.Trimesh:
-    """Pitcher's lip towards -x, shrunk by `inset` and then raised through the rim, for the cavity."""
+    """Build a pitcher's lip toward -x, shrunk by `inset` and then raised through the rim, for the cavity."""
     lip = cylinder(9 - inset, 4 + inset, (-74 + inset, 0, 238 + inset / 2))
     mouth = cylinder(28 - inset, 4 + inset, (-38 + inset, 0, 238 + inset / 2))
     return hull(lip, mouth, ellipsoid(3, (-58 + 2 * inset, 0, 195)))
@@ -142,7 +142,7 @@ def _mug() -> trimesh.Trimesh:
 
 
 def _power_drill() -> trimesh.Trimesh:
-    """Lies on its side: the chuck points to -y, the grip to +x, the battery at its end."""
+    """Build a drill on its side: the chuck points to -y, the grip to +x, with the battery at its end."""
     spin = [(0, 0), (9, 0), (13, 4), (19, 24), (21, 26), (21, 46), (23, 50), (23, 64), (0, 64)]
     chuck = move(revolve(spin), (28, 0, 28.5), (-90, 0, 0))
     gearbox = tube(
@@ -159,7 +159,7 @@ def _power_drill() -> trimesh.Trimesh:
 
 
 def _scissors() -> trimesh.Trimesh:
-    """Lie flat, points to +y: two thin blades crossed at the pivot, two thick finger loops of unequal size."""
+    """Build scissors lying flat, points to +y: two thin blades crossed at the pivot, two unequal thick finger loops."""
     blades = [
         move(extrude([(24, 96), (42, 108), (38, 120), (8, 197), (4, 198), (12, 160)], 2.8), (0, 0, 7.9)),
         move(extrude([(26, 106), (44, 100), (40, 118), (15, 190), (10, 191), (16, 160)], 2.8), (0, 0, 5.2)),
@@ -189,7 +189,7 @@ def _marker() -> trimesh.Trimesh:
 def _clamp(
     jaw: float, jaw_half: float, length: float, half_spread: float, grip: float, thick: float
 ) -> trimesh.Trimesh:
-    """Build a spring clamp lying flat, its tip at the origin, grips towards +x.
+    """Build a spring clamp lying flat, its tip at the origin, grips toward +x.
 
     Args:
         jaw: distance from tip to pivot.

@@ -63,7 +63,7 @@ def view_from(azimuth_rad: float, elevation_rad: float = _ELEVATION_RAD) -> np.n
 
 
 def views_around(count: int = 24) -> list[np.ndarray]:
-    """Return the views from so many directions around the object."""
+    """Return the views from a number of directions around the object."""
     return [view_from(azimuth) for azimuth in np.linspace(0, 2 * np.pi, count, endpoint=False)]
 
 
@@ -73,7 +73,7 @@ def widest_views(cloud_P_3: np.ndarray, count: int = 8) -> list[np.ndarray]:
 
 
 def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:
-    """Draw what a person is asked about, the aligned source over its target, along each axis at one scale, as a PNG."""
+    """Draw the query for a person as a PNG: the aligned source over its target, along each axis at one scale."""
     clouds = [
         (thinned(target_Q_3, _POINTS_OF_QUERY), TARGET_COLOR, "reference"),
         (thinned(cloud_P_3, _POINTS_OF_QUERY), SOURCE_COLOR, "aligned source"),

@@ -1,4 +1,4 @@
-"""Lays out figures of one panel or many: what stands around the panels finds its room by itself."""
+"""Lays out figures of one panel or many: room for all that stands around the panels is found automatically."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def panels(rows: int, columns: int, height_in: float, width_in: float = TEXT_WID
 
 
 def panels_in_lines(count: int, panel_height_in: float, most: int = MOST_PER_ROW, **options):
-    """Return a figure and so many panels with shared axes, in lines of `most` or fewer, as even as they can be."""
+    """Return a figure and its panels with shared axes, in lines of `most` or fewer, as even as they can be."""
     lines = -(-count // most)
     options = {"sharex": True, "sharey": True} | options
     figure, grid = panels(lines, -(-count // lines), 0.75 + panel_height_in * lines, **options)
@@ -39,7 +39,7 @@ def label_outer(of_panels: list, across: str, up: str) -> None:
 
 
 def legend_below(figure, handles: list, labels: list[str] | None = None, columns: int = 0, **style) -> None:
-    """Name lines and markers below all panels, in one line or in so many columns."""
+    """Name lines and markers below all panels, in one line or in columns."""
     labels = [handle.get_label() for handle in handles] if labels is None else labels
     figure.legend(handles, labels, loc="outside lower center", ncols=columns or len(labels), columnspacing=1.4, **style)
 
@@ -48,7 +48,7 @@ def draw_percentages(panel, percentages: np.ndarray, form: str, counts: np.ndarr
     """Draw a matrix in blues and write the number of every cell into it; a NaN has neither.
 
     Args:
-        form: of what is written, as in ``{:.0f}``; a second pair of braces holds the count of the cell.
+        form: that of the numbers, as in ``{:.0f}``; a second pair of braces holds the count of the cell.
     """
     panel.imshow(np.ma.masked_invalid(percentages), cmap=blues(), vmin=0, vmax=100, aspect="auto")
     for cell, percentage in np.ndenumerate(percentages):

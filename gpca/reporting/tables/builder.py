@@ -83,7 +83,7 @@ class TableBuilder:
         return list(dict.fromkeys(labels[0][0] for labels in self.rows))
 
     def stand_in_clause(self, sources: Mapping[str, Mapping], partly: bool = True) -> str:
-        """Return what the caption says of stand-ins among the sources that name the rows."""
+        """Return the caption's clause on stand-ins among the sources that name the rows."""
         return stand_in_clause((sources[name] for name in self.first_labels()), partly)
 
     def most_seeds(self) -> int:
@@ -129,7 +129,7 @@ def mean_over(seeds: int | str, samples: int | str) -> str:
 
 
 def interval_over(seeds: int | str) -> str:
-    """Return what ± means in a table of means over so many seeds, such as ``5`` or ``1 to 3``, without a full stop."""
+    """Return what ± means in a table of means over these seeds, such as ``5`` or ``1 to 3``, without a full stop."""
     fewest, most = (int(number) for number in (str(seeds).split()[0], str(seeds).split()[-1]))
     if most < LEAST_SEEDS:
         return f"with fewer than {LEAST_SEEDS} there is no interval and no bold"

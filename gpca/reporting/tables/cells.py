@@ -1,4 +1,4 @@
-"""Makes the cells of tables: means over seeds, shares of samples, and what has its interval already."""
+"""Makes the cells of tables: means over seeds, shares of samples, and values that have their interval already."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WILSON = "In brackets: the Wilson interval (95 %)"
 
 
 def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
-    """Return the rows whose columns hold what is wanted, e.g. ``rows_where(metrics, source="ycb", concept="all")``."""
+    """Return the rows whose columns hold these values, e.g. ``rows_where(metrics, source="ycb", concept="all")``."""
     chosen = None
     for column, value in wanted.items():
         holds = frame[column] == value

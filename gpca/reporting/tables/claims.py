@@ -1,4 +1,4 @@
-"""What the paper says in sentences, with the differences in this run that support or refute each."""
+"""The paper's claims in sentences, with the differences in this run that support or refute each."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Toler
 
 
 def summary(comparison: pd.DataFrame) -> str:
-    """Return what was counted: means, each value once, by verdict; standard deviations and repeats apart."""
+    """Return the counts: means, each value once, by verdict; standard deviations and repeats apart."""
     once, deviations, repeats = _parts(comparison)
     told = [f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {_told(once)}."]
     if len(deviations):

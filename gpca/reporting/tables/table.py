@@ -15,8 +15,8 @@ from gpca.io.files import whole_file
 
 EMPTY = "–"  # A dash stands where there is no number.
 LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.
-_COLUMN_CHARACTERS = 50  # So many fill one column of a two-column paper.
-_TEXT_CHARACTERS = 100  # So many fill both columns.
+_COLUMN_CHARACTERS = 50  # This many fill one column of a two-column paper.
+_TEXT_CHARACTERS = 100  # This many fill both columns.
 _SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"
 
 
@@ -236,5 +236,5 @@ _TEX = {
 
 
 def _tex(text: str) -> str:
-    """Escape what LaTeX reads otherwise; a hyphen before a number is a minus."""
+    """Escape the characters special to LaTeX; a hyphen before a number is a minus."""
     return re.sub(r"(?<![\w-])-(?=\d)", "$-$", "".join(_TEX.get(sign, sign) for sign in text))

@@ -20,7 +20,7 @@ def estimate(
     batch: int = 128,
     step_size: float = 0.1,
 ) -> np.ndarray:
-    """Return the covariance of what the chains visit after `burn_in` steps; they begin at the pose."""
+    """Return the covariance of the twists that the chains visit after `burn_in` steps; they begin at the pose."""
     posterior = Posterior(registered)
     random = generator("bayesian_icp", registered.pair.seed)
     slope = partial(posterior.slope_of_batch, batch=batch, random=random)
@@ -38,7 +38,7 @@ def langevin(
     step_size: float,
     random: np.random.Generator,
 ) -> np.ndarray:
-    """Return what n chains visit after the burn-in, all in one (m, 6): x ← x + ½ε M ∇ln p + √(εM) η.
+    """Return the twists of n chains after the burn-in, all in one (m, 6): x ← x + ½ε M ∇ln p + √(εM) η.
 
     Args:
         slope: ∇ln p (n, 6) at (n, 6), exact or from a mini-batch.

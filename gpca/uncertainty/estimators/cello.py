@@ -1,6 +1,6 @@
 """CELLO-3D (Landry, Pomerleau & Giguère 2019): the covariance is the mean of those of like training pairs.
 
-Which pairs are alike tells a learned metric of descriptors: a weight exp(-|L (φ - φ')|²) for each training pair, L
+A learned metric of descriptors tells which pairs are alike: a weight exp(-|L (φ - φ')|²) for each training pair, L
 diagonal and chosen so that the runs of each training pair are likely under the covariance that the others give it.
 """
 

@@ -1,4 +1,4 @@
-"""What every estimator takes and gives: a registered pair in, the covariance of its pose out.
+"""The interface of estimators: a registered pair in, the covariance of its pose out.
 
 All lengths are in diameters of the object, and twists are (rotation, translation) on the left of the pose, in the
 target's frame: T = exp(ξ) T̂.
@@ -25,7 +25,7 @@ Starter = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 class FailedEstimate(Exception):
-    """Raised inside an estimator that cannot tell; the registry makes a failed estimate of it."""
+    """Raised inside an estimator that cannot give a covariance; the registry turns it into a failed estimate."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class RegisteredPair:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What an estimator says: Σ (6, 6) in radians and diameters, or why it says nothing."""
+    """The result of an estimator: Σ (6, 6) in radians and diameters, or the reason why there is none."""
 
     covariance_6_6: np.ndarray | None
     failure: str = ""
@@ -176,7 +176,7 @@ class EstimatorEntry:
 
     @property
     def function(self) -> Callable[..., object]:
-        """The one that takes the settings."""
+        """The function that takes the settings."""
         return self.learn or self.estimate  # type: ignore[return-value]
 
 
