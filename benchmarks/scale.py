@@ -36,6 +36,7 @@ from benchmarks.pipeline import SIDECAR, number  # noqa: E402
 from benchmarks.schedule import Job, critical_path, wall_time  # noqa: E402
 from benchmarks.targets import name_of_run, parser_of_run, plan, read_plan  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
+from gpca.experiments.registry import experiments  # noqa: E402
 
 RUN = "scale"
 SLOTS = (50, 500)  # jobs of a cluster at once
@@ -204,7 +205,8 @@ def is_local(job: Job) -> bool:
 def _local_rules() -> set[str]:
     text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "workflow/rules").glob("*.smk"))
     blocks = re.split(r"^rule (\w+):$", text, flags=re.MULTILINE)[1:]
-    return {rule for rule, block in zip(blocks[::2], blocks[1::2], strict=True) if "localrule: True" in block}
+    local = {rule for rule, block in zip(blocks[::2], blocks[1::2], strict=True) if "localrule: True" in block}
+    return local | {tidy.target for each in experiments() for tidy in each.tidy if tidy.collector}
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def test_plain_torch_path_agrees_with_fused_path():
 
 def test_gradient_check_in_double_precision(monkeypatch):
     """Of the passes as they are written: to compile them for doubles as well would take ten seconds."""
-    for name in ("gather_extreme_and_sums", "normalise_activate", "edge_max_backward"):
+    for name in ("gather_extreme_and_sums", "normalize_activate", "edge_max_backward"):
         monkeypatch.setattr(edge_kernels, name, getattr(edge_kernels, name).py_func)
     layer = EdgeConv(3, 4, 5).double()
     x = torch.randn(2, 12, 3, dtype=torch.double, requires_grad=True)

@@ -200,12 +200,6 @@ def test_more_text_than_can_be_parsed_is_not_read(name, tmp_path):
     assert "truncated" not in line
 
 
-@pytest.mark.parametrize("points", [0, 63, -5])
-def test_too_few_points_of_a_surface(points, tmp_path):
-    (tmp_path / "ball.ply").write_text(ply())
-    refusal([*arguments("mesh_folder"), "--surface-points", points], tmp_path, "--surface-points", "from 256")
-
-
 def test_the_same_files_unspoilt_are_read(tmp_path):
     from gpca.objects.mesh_folder import files_in, surfaces
 

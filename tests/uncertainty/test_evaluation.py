@@ -145,12 +145,12 @@ def test_the_observed_pair_starts_alike_in_every_design(registrations):
 def test_what_was_perturbed_is_hidden_from_all_but_the_oracle(registrations, monkeypatch, design):
     shown = []
 
-    class Recorded(evaluation.Pair):
+    class Recorded(evaluation.RegisteredRow):
         def __init__(self, registrations, row):
             shown.append(registrations)
             super().__init__(registrations, row)
 
-    monkeypatch.setattr(evaluation, "Pair", Recorded)
+    monkeypatch.setattr(evaluation, "RegisteredRow", Recorded)
     evaluate(design, registrations, registrations.rows("test")[:1])
     (given,) = shown
     told = given.concept[0] in CONCEPTS and np.isfinite(given.severity_noise[0])

@@ -166,4 +166,6 @@ def test_a_wrong_setting_of_an_own_explainer_stops_at_load(project):
     project.append("config/smoke.yaml", "  fitness_only: {sharpnes: 50.0}\n")
     done = project.plan("all", *SMOKE, check=False)
     assert done.returncode != 0
-    assert "gpca: config key explainers.fitness_only: explainer 'fitness_only': got an unexpected" in done.stderr
+    assert (
+        "gpca: config key explainers.fitness_only: explainer 'fitness_only': setting sharpnes: unknown;" in done.stderr
+    )

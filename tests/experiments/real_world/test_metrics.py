@@ -56,5 +56,3 @@ def test_files_that_do_not_belong_together_are_refused(tmp_path):
         collect([said], [poses(tmp_path, source="other")])
     with pytest.raises(InputError, match="lacks samples of"):
         collect([said], [poses(tmp_path, sample=[0, 1, 2, 7])])
-    with pytest.raises(InputError, match="'in_training' contains values other than True and False"):
-        collect([said], [poses(tmp_path, in_training="perhaps")])
