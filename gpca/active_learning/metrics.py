@@ -16,7 +16,7 @@ TABLE = "active_learning/"  # `table` of the tidy rows reads this and the settin
 RANDOM = "random"  # the strategy that the others are compared with, seed by seed
 # A count that ended with the budget where the share beside it is below 1: its mean is a lower bound then.
 CENSORED_BY = {"labels_to_target": "reached", "epochs_to_target": "reached", "delay": "recognised"}
-RECOGNizED = 0.5  # share of a new concept's test samples named right, from which on it counts as recognized
+RECOGNIZED = 0.5  # share of a new concept's test samples named right, from which on it counts as recognized
 
 
 def collect_curves(files: Iterable[str | Path], target: float) -> pd.DataFrame:
@@ -66,9 +66,9 @@ def stream_metrics(curve: pd.DataFrame) -> dict[str, float]:
     """Return the metrics of one stream.
 
     Its delay counts the arrivals from the first row with samples of the new concept to that in which at least
-    `RECOGNizED` of its test samples are named right; never recognized, it is that to the end, a lower bound.
+    `RECOGNIZED` of its test samples are named right; never recognized, it is that to the end, a lower bound.
     """
-    hits = (curve["present"] == 1) & (curve["accuracy_new"] >= RECOGNizED)
+    hits = (curve["present"] == 1) & (curve["accuracy_new"] >= RECOGNIZED)
     first = int(hits.argmax()) if hits.any() else len(curve) - 1
     appeared = curve["arrived"][int((curve["present"] == 1).argmax())]
     return {
