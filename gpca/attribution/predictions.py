@@ -20,7 +20,16 @@ if TYPE_CHECKING:
     from gpca.attribution.scores import Attribution
     from gpca.pairs.dataset import Registrations
 
-PREDICTION_COLUMNS = ("sample", "split", "object", "concept_true", "concept_predicted", "abstained", "icp_calls")
+PREDICTION_COLUMNS = (
+    "sample",
+    "split",
+    "object",
+    "cluster",
+    "concept_true",
+    "concept_predicted",
+    "abstained",
+    "icp_calls",
+)
 TIMING_COLUMNS = ("sample", "split", "seconds", "icp_seconds")
 _OF_CONCEPTS = ("score_?*", "variance_?*", "bald", "entropy")  # further columns; an explainer may lack some
 
@@ -39,6 +48,7 @@ def prediction_frame(registrations: Registrations, attribution: Attribution) -> 
             "sample": registrations.sample,
             "split": registrations.split,
             "object": registrations.object_name,
+            "cluster": registrations.cluster,
             "concept_true": registrations.concept,
             "concept_predicted": attribution.predicted_N,
             **{f"score_{c}": attribution.scores_N_C[:, i] for i, c in enumerate(attribution.concepts)},

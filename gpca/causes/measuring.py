@@ -62,6 +62,8 @@ class Measuring:
             "object_index": subject.index,
             "object_name": subject.name,
             "diameter_m": subject.diameter_m,
+            "cluster": subject.family,
+            "fold": subject.fold,
             "cloud": transform(runs.T_target_source_n[0], candidate.observed(causes)).astype(np.float32),
             "target": candidate.reference(causes).astype(np.float32),
             "T_target_source_true": scale_translation(T_true, subject.diameter_m),

@@ -15,7 +15,7 @@ from gpca.causes.shapley import NONE
 from gpca.errors import InputError
 from gpca.io.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
-from gpca.objects.surface import instance_of
+from gpca.objects.splits import drawn, unseen
 from gpca.objects.symmetry import find_symmetries
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
@@ -26,7 +26,7 @@ JUDGED_POINTS = 256  # of the model, over which an error is the mean
 # Of an object's clean pairs. Where more are off, hardly any of its candidates would be kept; of the others, those whose
 # own clean pair is off are refused one by one. Half would be a matter of chance for mugs, at so few pairs each.
 MOST_FAILING = 0.9
-FEWEST_INSTANCES = 2  # one for training, one for testing; intervals over objects need more
+FEWEST_FAMILIES = 2  # one for training, one for testing; intervals over objects need more
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Subject:
 
     Attributes:
         index: its number in the file of the objects.
+        family, fold: as :class:`gpca.objects.canonical.ObjectClouds` has them.
         surface: (N, 3) its points, in diameters.
         errors: of its pose.
     """
@@ -45,6 +46,8 @@ class Subject:
     surface: np.ndarray
     symmetric: bool
     errors: PoseErrors
+    family: str
+    fold: int
 
     @classmethod
     def of(cls, objects: ObjectClouds, index: int, symmetric: bool) -> Subject:
@@ -52,7 +55,16 @@ class Subject:
         diameter_m = float(objects.diameters_m[index])
         surface = objects.points(index).astype(np.float64) / diameter_m
         errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
-        return cls(index, str(objects.names[index]), diameter_m, surface, symmetric, errors)
+        return cls(
+            index,
+            str(objects.names[index]),
+            diameter_m,
+            surface,
+            symmetric,
+            errors,
+            objects.family(index),
+            objects.fold(index),
+        )
 
 
 def read_subjects(objects: ObjectClouds) -> list[Subject]:
@@ -64,22 +76,22 @@ def read_subjects(objects: ObjectClouds) -> list[Subject]:
 def split_by_object(
     subjects: list[Subject], source: str, seed: int, settings: CauseSettings
 ) -> dict[str, list[Subject]]:
-    """Return the subjects of each split; views of one instance are in the same.
+    """Return the subjects of each split; those of one family are in the same.
 
     Raises:
-        InputError: fewer than two instances.
+        InputError: fewer than two families.
     """
-    instances = sorted({instance_of(subject.name) for subject in subjects})
-    if len(instances) < FEWEST_INSTANCES:
-        fault = f"{len(instances)} object(s) cannot be split into training and test objects"
-        raise InputError(f"causes of {source}", fault, f"give at least {FEWEST_INSTANCES} objects")
-    order = generator(source, seed, "causes", "objects").permutation(instances)
-    count = min(max(1, round(settings.test_objects * len(order))), len(order) - 1)
-    test = set(order[:count].tolist())
+    family_N = np.array([subject.family for subject in subjects])
+    if len(set(family_N.tolist())) < FEWEST_FAMILIES:
+        fault = "has objects of one family alone, which cannot be split into training and test objects"
+        raise InputError(f"causes of {source}", fault, "give objects of at least two families of shapes")
+    is_test_N = unseen(np.array([subject.fold for subject in subjects]), seed)
+    if is_test_N is None:
+        is_test_N = drawn(family_N, settings.test_objects, source, seed, "causes", "objects")
     train, tested = SPLITS
     return {
-        train: [subject for subject in subjects if instance_of(subject.name) not in test],
-        tested: [subject for subject in subjects if instance_of(subject.name) in test],
+        train: [subject for subject, is_test in zip(subjects, is_test_N, strict=True) if not is_test],
+        tested: [subject for subject, is_test in zip(subjects, is_test_N, strict=True) if is_test],
     }
 
 

@@ -1,6 +1,7 @@
-"""Intervals over objects and seeds of the shares that stand beside printed numbers, from predictions of single samples.
+"""Intervals over clusters of samples and seeds of the shares that stand beside printed numbers, from predictions of single samples.
 
-Seeds share objects, so that an interval over seeds does not say how much the choice of the objects matters. Values of
+Seeds share objects, so that an interval over seeds does not say how much the choice of the objects matters; and objects
+of one family, or seen in one scene, are alike (:mod:`gpca.objects.splits`). Values of
 which a run keeps no predictions (kernels, learning curves, times, areas and correlations) have the former only.
 """
 
@@ -16,7 +17,6 @@ from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.metrics import ALL, PREDICTED_AS, source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import Counterpart, Number
-from gpca.objects.surface import instance_of
 from gpca.seeds import generator
 
 FOLDERS = {"metrics.csv": "predictions", "real_world.csv": "predictions", "diagnostics.csv": "learners"}
@@ -41,7 +41,7 @@ def folders_behind(numbers: Iterable[Number]) -> list[Folder]:
 def cluster_intervals(
     numbers: Iterable[Number], prediction_files: Iterable[str | Path]
 ) -> dict[Counterpart, tuple[float, float]]:
-    """Return counterpart -> bounds of its share by the pigeonhole bootstrap over objects and seeds.
+    """Return counterpart -> bounds of its share by the pigeonhole bootstrap over clusters and seeds.
 
     Args:
         numbers: the printed numbers; those whose folder has no file are left out.
@@ -62,7 +62,7 @@ def cluster_intervals(
     for folder, of_folder in counterparts.items():
         if folder in files:
             rows = _samples(files[folder])
-            weights_B_N = pigeonhole_weights(generator("printed", *folder), rows["seed"], rows["instance"])
+            weights_B_N = pigeonhole_weights(generator("printed", *folder), rows["seed"], rows["cluster"])
             found |= {counterpart: _bounds_of(counterpart, rows, weights_B_N) for counterpart in of_folder}
     return found
 
@@ -76,8 +76,7 @@ def _samples(paths: list[str | Path]):
         labels = ("set",) if Path(path).parts[-4] == "learners" else ()
         rows = read_predictions(path, labels)
         parts.append(rows[rows["split"] == "test"].assign(seed=source_method_seed(path)[2]))
-    rows = pd.concat(parts, ignore_index=True)
-    return rows.assign(instance=rows["object"].map(instance_of))
+    return pd.concat(parts, ignore_index=True)
 
 
 def _bounds_of(counterpart: Counterpart, rows, weights_B_N: np.ndarray) -> tuple[float, float]:

@@ -34,6 +34,15 @@ class Objects:
 
 
 @dataclass(frozen=True)
+class Splits:
+    """The files that say which objects and scenes are for what, and what this run is for."""
+
+    objects: Place | None
+    scenes: Place | None
+    role: Literal["development", "evaluation"]
+
+
+@dataclass(frozen=True)
 class NoReduction:
     """The reduction ``none`` has no settings."""
 
@@ -100,6 +109,7 @@ class SharedSections:
     downloads: Place
     seeds: Distinct[Annotated[int, Bounds(minimum=0, maximum=2**32 - 1)]]
     objects: Objects
+    splits: Splits
     registrations: Annotated[dict, part_of(RegistrationSettings)]
     encoders: Annotated[dict[Name, NamedEncoder], Field(min_length=1)]
     reductions: Reductions

@@ -38,7 +38,7 @@ class Frame:
         scene, image: numbers, as the folder and its files are named.
         camera_3_3: K, in pixels.
         depth_scale: millimeters per unit of the depth image.
-        depth, color: files.
+        depth, color: files; a frame need not have colors.
         annotations: the objects in it.
     """
 
@@ -47,7 +47,7 @@ class Frame:
     camera_3_3: np.ndarray
     depth_scale: float
     depth: Path
-    color: Path
+    color: Path | None
     annotations: tuple[Annotation, ...]
 
     @property
@@ -193,7 +193,7 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
                 camera_3_3=camera_3_3,
                 depth_scale=depth_scale,
                 depth=_image(folder / "depth", f"{image:06d}"),
-                color=_image(colors, f"{image:06d}"),
+                color=_image_if_any(colors, f"{image:06d}"),
                 annotations=tuple(_annotation(folder, image, n, entry) for n, entry in enumerate(truth)),
             )
         )
@@ -207,7 +207,11 @@ def _annotation(folder: Path, image: int, n: int, entry: object) -> Annotation:
 
 
 def _image(folder: Path, stem: str) -> Path:
-    for suffix in (".png", ".jpg", ".jpeg", ".tif"):
-        if (path := folder / f"{stem}{suffix}").is_file():
-            return path
+    if (path := _image_if_any(folder, stem)) is not None:
+        return path
     raise InputError(folder / f"{stem}.png", "no such image", REMEDY)
+
+
+def _image_if_any(folder: Path, stem: str) -> Path | None:
+    paths = (folder / f"{stem}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".tif"))
+    return next((path for path in paths if path.is_file()), None)

@@ -9,6 +9,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.io.arrays import REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.objects.splits import unseen
 from gpca.seeds import generator
 
 
@@ -23,7 +24,8 @@ class Instances:
         T_camera_object_true, T_camera_object_init: (I, 4, 4), meters.
         init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
         camera_3_3: (I, 3, 3) K in pixels.
-        colour: (I,) path of the color image.
+        colour: (I,) path of the color image; empty where there is none.
+        fold: (I,) that the scene is tested with; `DRAWN` where no file says so, or where only training sees it.
         points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
             ``points_m[offsets[i]:offsets[i + 1]]``.
         pixels: (ΣP, 2) int32, where each was seen, (u, v).
@@ -39,6 +41,7 @@ class Instances:
     init_from: np.ndarray
     camera_3_3: np.ndarray
     colour: np.ndarray
+    fold: np.ndarray
     points_m: np.ndarray
     pixels: np.ndarray
     offsets: np.ndarray
@@ -54,16 +57,23 @@ class Instances:
         """Return the pixels (P, 2) of instance i."""
         return self.pixels[self.offsets[i] : self.offsets[i + 1]]
 
-    def split(self, source: str, seed: int, test_share: float) -> dict[str, np.ndarray]:
-        """Return the rows of ``train`` and ``test``: whole scenes, in an order of the seed's, until the share is met.
+    @property
+    def cluster(self) -> np.ndarray:
+        """(I,) the scene: its frames show the same objects in the same places."""
+        return np.array([f"{dataset} {scene}" for dataset, scene in zip(self.dataset, self.scene, strict=True)])
 
-        Frames of one scene show the same objects in the same places, so that one in training would give another away.
+    def split(self, source: str, seed: int, test_share: float) -> dict[str, np.ndarray]:
+        """Return the rows of ``train`` and ``test``: whole scenes, as one in training would give another frame away.
+
+        The seed's fold is tested; without folds, scenes in an order of the seed's, until the share is met.
 
         Raises:
             InputError: all frames are of one scene.
         """
-        names = [f"{of} {number}" for of, number in zip(self.dataset, self.scene, strict=True)]
-        _, scene_I = np.unique(names, return_inverse=True)
+        is_test = unseen(self.fold, seed)
+        if is_test is not None:
+            return {"train": np.flatnonzero(~is_test), "test": np.flatnonzero(is_test)}
+        _, scene_I = np.unique(self.cluster, return_inverse=True)
         scenes = generator(source, seed, "split").permutation(scene_I.max() + 1)
         if len(scenes) < 2:
             raise InputError(f"instances of {source}", "all are from one scene", "give frames from at least two scenes")

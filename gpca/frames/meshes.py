@@ -13,6 +13,7 @@ from gpca.frames.reading import CenteredModel, Dataset, distinct_surfaces, read_
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.source import folders
+from gpca.objects.splits import EVALUATION, read_scene_splits
 from gpca.objects.surface import Surface
 from gpca.process.environment import require_open3d
 
@@ -20,9 +21,17 @@ MOST_FACES = 2000  # of a mesh; what decimation moves is far below the noise of 
 
 
 def datasets_of(
-    datasets: Mapping[str, dict] | None, data_dir: str | None, downloads: Path, scenes: Path | None
+    datasets: Mapping[str, dict] | None,
+    data_dir: str | None,
+    downloads: Path,
+    scenes: Path | None,
+    splits: Path | None = None,
+    role: str = EVALUATION,
 ) -> dict[str, Dataset]:
     """Return the datasets of the config, by name, or the rendered scenes in their place, of which all frames are read.
+
+    Args:
+        splits, role: the file of scenes, and what the frames are for (:mod:`gpca.objects.splits`).
 
     Raises:
         InputError: neither is given, or what :func:`gpca.frames.source.resolve_datasets` refuses.
@@ -32,7 +41,16 @@ def datasets_of(
     entries = resolve_datasets(datasets, data_dir)
     if not entries:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
-    return {name: Dataset(name, tuple(folders(entry, downloads)), **_given(entry)) for name, entry in entries.items()}
+    return {
+        name: Dataset(
+            name,
+            tuple(folders(entry, downloads)),
+            places=read_scene_splits(splits, name) if splits else {},
+            role=role,
+            **_given(entry),
+        )
+        for name, entry in entries.items()
+    }
 
 
 def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredModel]]:
@@ -91,5 +109,5 @@ def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
 
 def _given(entry: dict) -> dict:
     given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
-    errors = Path(entry["errors"]) if entry["errors"] else None
-    return given | {"results": tuple(map(Path, entry["results"])), "errors": errors}
+    paths = {name: Path(entry[name]) if entry.get(name) else None for name in ("models", "errors")}
+    return given | paths | {"results": tuple(map(Path, entry["results"]))}

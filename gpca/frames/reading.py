@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from gpca.frames.plausibility import Observation, require_plausible, require_sha
 from gpca.frames.results_file import PosesByObject, read_bop_results
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_center
+from gpca.objects.splits import DRAWN, EVALUATION, Place
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries, read_symmetries
 from gpca.process.progress import progress
@@ -38,7 +39,10 @@ class Dataset:
         split: the split whose frames are read.
         results: BOP results files with initial poses, one of each estimator.
         errors: CSV of errors that estimators made elsewhere on its objects, or None.
+        models: the folder of its models where they are not in its own.
         most_frames: where there are more frames, so many are drawn; None reads all.
+        places: of its scenes, by number; none where no file says so.
+        role: what the frames are for: scenes for development are for training alone, or nothing else is read.
     """
 
     name: str
@@ -47,19 +51,35 @@ class Dataset:
     split: str = "test"
     results: tuple[Path, ...] = ()
     errors: Path | None = None
+    models: Path | None = None
     most_frames: int | None = 200
+    places: Mapping[int, Place] = field(default_factory=dict)
+    role: str = EVALUATION
 
     def frames(self) -> list[Frame]:
-        """Return its frames, or a draw of them."""
-        found = read_frames(self.folders, self.split)
+        """Return its frames, or a draw of them; InputError for a scene that the splits lack."""
+        found = [frame for frame in read_frames(self.folders, self.split) if self._is_read(frame)]
         if self.most_frames is None or len(found) <= self.most_frames:
             return found
         rows = generator(self.name, "frames").choice(len(found), self.most_frames, replace=False)
         return [found[row] for row in np.sort(rows)]
 
+    def _is_read(self, frame: Frame) -> bool:
+        if not self.places:
+            return True
+        if frame.scene not in self.places:
+            fault = f"scene {frame.scene} is in no split"
+            raise InputError(f"dataset {self.name}", fault, "add it to the file of scenes, or set splits.scenes: null")
+        return self.role == EVALUATION or self.places[frame.scene].role == self.role
+
+    def fold(self, scene: int) -> int:
+        """Return the fold that a scene is tested with; `DRAWN` where no file says so, or where only training sees it."""
+        place = self.places.get(scene)
+        return place.fold if place is not None and place.role == self.role else DRAWN
+
     def models_folder(self) -> Path:
         """Return the folder of its models."""
-        for folder in self.folders:
+        for folder in (self.models,) if self.models else self.folders:
             try:
                 return bop.models_folder(folder)
             except InputError:
@@ -152,7 +172,8 @@ def read_instances(
         of_dataset: list[tuple[_Objects, Frame, int, dict]] = []
         for frame in progress(frames, f"frames of {dataset.name}"):
             shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
-            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color)}
+            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or "")}
+            shown["fold"] = dataset.fold(frame.scene)
             of_dataset += [(found, frame, n, shown | row) for n, row in found.in_frame(frame, left_out)]
         observations = [found.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]
         require_shared_form(dataset.name, observations)

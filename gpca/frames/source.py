@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.objects.repository import folders_of_data
 from gpca.objects.source import data_files, require_place, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
@@ -16,7 +17,7 @@ ONE_ENCODER = f"{REAL_WORLD}_one_encoder"  # the same, where seeds are those of 
 def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) -> dict[str, dict]:
     """Return the resolved entries of the config's section ``real_world.datasets``; reads no data.
 
-    Those that are ``optional`` and nowhere to be found are left out.
+    Those that are ``optional`` are left out where they are in no folder: they are not downloaded.
 
     Raises:
         InputError: as :func:`gpca.objects.source.resolve` raises it, and for a results file that is not there.
@@ -54,20 +55,24 @@ def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path
     files = []
     for entry in resolve_datasets(datasets, data_dir).values():
         files += data_files(entry) + [Path(path) for path in (*entry["results"], entry["errors"]) if path]
+        files += sorted(Path(entry["models"]).glob("models/*")) if entry.get("models") else []
     return files
 
 
 def _is_absent(entry: dict, data_dir: str | None) -> bool:
     """Return whether a dataset that a run can do without is not there."""
-    return bool(entry.get("optional")) and not entry.get("urls") and not _below(data_dir, entry["location"]).is_dir()
+    return bool(entry.get("optional")) and not any(path.is_dir() for path in _places(data_dir, entry["location"]))
 
 
 def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
     found = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
     given = found.get("results") or []
-    named = [_below(data_dir, path) for path in ([given] if isinstance(given, str) else given)]
-    found["results"] = [str(path) for pattern in named for path in _matching(pattern)]
-    errors = _matching(_below(data_dir, found["errors"])) if found.get("errors") else []
+    named = [given] if isinstance(given, str) else given
+    found["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]
+    errors = _matching(data_dir, found["errors"]) if found.get("errors") else []
+    if models := found.get("models"):
+        places = _places(data_dir, models)
+        found["models"] = str(next((path for path in places if path.is_dir()), places[0]))
     found["errors"] = str(errors[0]) if errors else None
     for path in (*found["results"], found["errors"]):
         if path and not Path(path).is_file():
@@ -75,10 +80,14 @@ def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
     return found
 
 
-def _below(data_dir: str | None, path: str) -> Path:
-    return require_place(Path(data_dir or "", require_place(path))).absolute()
+def _places(data_dir: str | None, path: str) -> list[Path]:
+    """Return where a path may lead that a config names."""
+    return [require_place(base / require_place(path)).absolute() for base in folders_of_data(data_dir)]
 
 
-def _matching(path: Path) -> list[Path]:
+def _matching(data_dir: str | None, name: str) -> list[Path]:
     """Return the files that a name with an asterisk matches, which may be none, or the one that is named in full."""
-    return sorted(path.parent.glob(path.name)) if "*" in path.name else [path]
+    places = _places(data_dir, name)
+    if "*" not in name:
+        return [next((path for path in places if path.is_file()), places[0])]
+    return next((found for path in places if (found := sorted(path.parent.glob(path.name)))), [])

@@ -60,7 +60,7 @@ def make_frame_registrations(
     import pandas as pd
 
     require_open3d()
-    rows_of = instances.split(source, seed, settings.test_share)
+    rows_of, cluster_I = instances.split(source, seed, settings.test_share), instances.cluster
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings.registration, split))]
     trained = set(instances.object_index[rows_of["train"]].tolist())
     records, poses = [], []
@@ -72,6 +72,7 @@ def make_frame_registrations(
         random = generator(source, seed, "registration", split, n)
         record, lost_to = _register_one(instances, i, objects, concept, settings, random)
         record |= {"sample": n, "split": split, "concept": concept}
+        record |= {"cluster": str(cluster_I[i]), "fold": int(instances.fold[i])}
         records.append(record)
         poses.append(_pose_row(instances, i, objects, record, trained) | {"lost_to": lost_to})
     return *as_registrations(records, (source, seed)), pd.DataFrame(poses)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _CONTROL = r"[\x00-\x08\x0a-\x1f\x7f]"  # all but tabs, by which a user's program may part numbers
-NAMES = ("object", "method", "explainer", "policy")  # columns whose entries name something in every file
+NAMES = ("object", "cluster", "method", "explainer", "policy")  # columns whose entries name something in every file
 ANY = ("*",)
 
 

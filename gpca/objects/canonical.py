@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,8 @@ from gpca import seeds
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import is_name
-from gpca.objects.surface import Surface
+from gpca.objects.splits import DRAWN, UNUSED, place_of, read_object_splits
+from gpca.objects.surface import Surface, instance_of
 from gpca.process.environment import open3d_cloud, require_open3d
 
 FEWEST_CLOUD_POINTS = 64
@@ -169,13 +170,30 @@ def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
     return np.asarray(cloud.normals)
 
 
-def write_objects(surfaces: Iterable[Surface], source: str, path: str | Path, n_points: int = 16384) -> None:
+def write_objects(
+    surfaces: Iterable[Surface],
+    source: str,
+    path: str | Path,
+    n_points: int = 16384,
+    splits: str | Path | None = None,
+) -> None:
     """Write the canonical clouds of a source to an objects npz (read it with :class:`ObjectClouds`).
+
+    Args:
+        splits: a file that says which objects are alike and unseen together (:mod:`gpca.objects.splits`).
 
     Raises:
         InputError: no object at all, two of one name, or a fault in one of them; nothing is written then.
     """
-    sample_objects(surfaces, source, n_points).save(path, source)
+    places = read_object_splits(splits, source) if splits else {}
+    if not places:
+        sample_objects(surfaces, source, n_points).save(path, source)
+        return
+    used = (surface for surface in surfaces if place_of(surface.name, places, splits).role != UNUSED)
+    objects = sample_objects(used, source, n_points)
+    of_objects = [places[name] for name in objects.names]
+    families, folds = (tuple(getattr(place, name) for place in of_objects) for name in ("cluster", "fold"))
+    replace(objects, families=families, folds=folds).save(path, source)
 
 
 def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:
@@ -205,11 +223,14 @@ class ObjectClouds:
         names: those of the O objects.
         diameters_m: (O,) float64.
         clouds: for each object its points (P, 3) in meters and unit normals (P, 3), both float32.
+        families, folds: of each object, where a file of splits says so; else an instance is a family of its own.
     """
 
     names: tuple[str, ...]
     diameters_m: np.ndarray
     clouds: tuple[tuple[np.ndarray, np.ndarray], ...]
+    families: tuple[str, ...] = ()
+    folds: tuple[int, ...] = ()
 
     @classmethod
     def load(cls, path: str | Path, source: str | None = None) -> ObjectClouds:
@@ -218,9 +239,10 @@ class ObjectClouds:
         A file that does not say of which source it is may be of any: rules of users' own write such files.
         """
         shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
-        kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE}
+        shapes |= {"families": ("O",), "folds": ("O",)}
+        kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE, "families": TEXT, "folds": WHOLE}
         axes = None if source is None else (source, None)
-        arrays = load_arrays(path, shapes, kinds, axes, optional=("source",))
+        arrays = load_arrays(path, shapes, kinds, axes, optional=("source", "families", "folds"))
         points_m, offsets, names = arrays["points_m"], arrays["offsets"], arrays["names"].tolist()
         whole = len(offsets) == len(names) + 1 and offsets[0] == 0 and offsets[-1] == len(points_m)
         if not whole or not names or not (np.diff(offsets) > 0).all():
@@ -228,7 +250,8 @@ class ObjectClouds:
         if len(set(names)) < len(names):
             raise InputError(path, "contains two objects with the same name", REGENERATE)
         parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
-        objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)))
+        alike = {name: tuple(arrays[name].tolist()) for name in ("families", "folds") if name in arrays}
+        objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)), **alike)
         for i, name in enumerate(names):
             objects._require_object(i, f"{path}, object '{name}'")
         return objects
@@ -257,9 +280,18 @@ class ObjectClouds:
         """(P, 3) float32 unit normals."""
         return self.clouds[i][1]
 
+    def family(self, i: int) -> str:
+        """Return the family of shapes that an object belongs to."""
+        return self.families[i] if self.families else instance_of(self.names[i])
+
+    def fold(self, i: int) -> int:
+        """Return the fold that an object is unseen with; `DRAWN` where no file says so."""
+        return self.folds[i] if self.folds else DRAWN
+
     def save(self, path: str | Path, source: str) -> None:
         """Write the objects npz, and say on stderr what is in it."""
         points_m, normals = zip(*self.clouds, strict=True)
+        alike = {"families": np.array(self.families), "folds": np.array(self.folds)} if self.families else {}
         save_arrays(
             path,
             {
@@ -268,6 +300,7 @@ class ObjectClouds:
                 "normals": np.concatenate(normals),
                 "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
                 "diameters_m": self.diameters_m,
+                **alike,
             },
             (source, None),
         )

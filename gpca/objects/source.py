@@ -19,15 +19,18 @@ from gpca import objects
 from gpca.errors import InputError
 from gpca.io.files import sha256_of_file
 from gpca.objects import archive, download, procedural
+from gpca.objects.repository import folders_of_data, require_whole_if_ours
 from gpca.objects.surface import Surface
 
 SYSTEM = ("/dev", "/proc", "/sys")
+# Keys of an entry that a procedural source has no use for: a config may lay one over a source of files.
+OF_FILES = ("location", "files", "objects", "unit", "url", "urls", "sha256", "views_per_instance")
 
 
 def resolve(entry: dict, data_dir: str | None) -> dict:
     """Decide where a source's data comes from; reads no data, so it is quick enough for the loading of a workflow.
 
-    What lies under `data_dir` comes first: what the entry's `local` part names (its keys then override the others),
+    What lies under `data_dir` comes first, then what the repository's own data holds: what the entry's `local` part names (its keys then override the others),
     else what the entry itself names. A `location` counts as soon as it exists; without one, each pattern of `files`
     must match below `data_dir`. Last comes its `url` or `urls`.
 
@@ -53,9 +56,10 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             if not candidate.get("family"):
                 raise InputError(subject, "names no family", "set family in the config")
             procedural.require_family(candidate["family"])
-            return {**candidate, "origin": "procedural"}
+            return {name: value for name, value in candidate.items() if name not in OF_FILES} | {"origin": "procedural"}
         module = _module_of(candidate.get("kind"))
         if folder := _found(candidate, data_dir):
+            require_whole_if_ours(folder)
             if require_entry := getattr(module, "require_entry", None):
                 require_entry(candidate, folder)
             return {**candidate, "origin": "local", "location": os.path.abspath(folder)}
@@ -137,15 +141,32 @@ def _unpacked(file: Path) -> Path:
 
 
 def _found(entry: dict, data_dir: str | None) -> Path | None:
-    location, patterns = entry.get("location"), entry.get("files")
-    folder = require_place(Path(data_dir or "", require_place(location or "")))
+    location, patterns = require_place(entry.get("location") or ""), entry.get("files")
     for pattern in patterns or ():
         _require_pattern(pattern)
-    if (data_dir is None and not folder.is_absolute()) or not (location or patterns) or not folder.exists():
+    if not (entry.get("location") or patterns):
         return None
-    if not (folder.is_dir() or folder.is_file()):
-        raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
-    return folder if location or all(any(folder.glob(pattern)) for pattern in patterns or ()) else None
+    for base in folders_of_data(data_dir):
+        if not (folder := require_place(base / location)).exists():
+            continue
+        if not (folder.is_dir() or folder.is_file()):
+            raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
+        if entry.get("location") or all(any(folder.glob(pattern)) for pattern in patterns or ()):
+            return folder
+    return None
+
+
+def find_file(place: str, data_dir: str | None) -> Path:
+    """Return a file that a config names relative to `data_dir` or to the repository's data.
+
+    Raises:
+        InputError: neither has it.
+    """
+    paths = [require_place(base / require_place(place)) for base in folders_of_data(data_dir)]
+    if (found := next((path for path in paths if path.is_file()), None)) is None:
+        raise InputError(paths[-1], "no such file", "correct the config, or restore it: git checkout -- data")
+    require_whole_if_ours(found)
+    return found
 
 
 def require_place(place: str | Path) -> Path:

@@ -29,6 +29,7 @@ class Registrations:
         split: (S,) ``train`` or ``test``.
         concept: (S,) what was perturbed: ``noise``, ``pose`` or ``overlap``.
         object_index, object_name, diameter_m: (S,) the object registered.
+        cluster, fold: (S,) samples that are alike: a family of shapes or a scene (:mod:`gpca.objects.splits`).
         points: (ΣP, 3) float32, the ICP-aligned source clouds in the target's frame; cloud i is
             ``points[offsets[i]:offsets[i + 1]]``.
         target_points, target_offsets: the clean target clouds (ΣQ, 3) float32, in the same frame and kept the same way.
@@ -45,6 +46,8 @@ class Registrations:
     object_index: np.ndarray
     object_name: np.ndarray
     diameter_m: np.ndarray
+    cluster: np.ndarray
+    fold: np.ndarray
     points: np.ndarray
     offsets: np.ndarray
     target_points: np.ndarray
@@ -124,8 +127,8 @@ class Registrations:
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(REGISTRATION_COLUMNS, ("S",))
         shapes |= {name: ("S", 4, 4) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
         shapes |= {"points": ("P", 3), "offsets": ("O",), "target_points": ("Q", 3), "target_offsets": ("R",)}
-        kinds = dict.fromkeys(shapes, REAL) | dict.fromkeys(("split", "concept", "object_name"), TEXT)
-        kinds |= dict.fromkeys(("sample", "object_index", "offsets", "target_offsets"), WHOLE)
+        kinds = dict.fromkeys(shapes, REAL) | dict.fromkeys(("split", "concept", "object_name", "cluster"), TEXT)
+        kinds |= dict.fromkeys(("sample", "object_index", "fold", "offsets", "target_offsets"), WHOLE)
         of = {"source": TEXT, "seed": WHOLE}
         arrays = load_arrays(path, shapes | dict.fromkeys(of, ()), kinds | of, axes)
         for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):

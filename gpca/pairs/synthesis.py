@@ -106,6 +106,8 @@ def align_pair(
         "object_index": object_index,
         "object_name": str(objects.names[object_index]),
         "diameter_m": diameter_m,
+        "cluster": objects.family(object_index),
+        "fold": objects.fold(object_index),
         "cloud": transform(registration.T_target_source, perturbed.points).astype(np.float32),
         "target": target.astype(np.float32),
         "T_target_source_true": scale_translation(perturbed.T_target_source_true, diameter_m),

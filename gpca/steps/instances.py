@@ -9,6 +9,7 @@ from gpca.frames.meshes import datasets_of, files_behind
 from gpca.frames.plausibility import points_on_model
 from gpca.frames.reading import distinct_surfaces, read_instances, read_models, with_shared_models
 from gpca.objects.canonical import sample_objects
+from gpca.objects.splits import EVALUATION
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 
@@ -20,6 +21,8 @@ def run(job: Job) -> None:
         job.data_dir,
         job.downloads,
         job.get("scenes"),
+        job.get("splits"),
+        job.settings.get("role", EVALUATION),
     )
     inputs = files_behind(job.settings.get("datasets"), job.data_dir, job.get("scenes"))
     initial_pose = InitialPoseSettings(**job.settings.get("initial_pose", {}))

@@ -12,5 +12,6 @@ def run(job: Job) -> None:
     """Read the source's surfaces, sample them and write the canonical clouds."""
     entry = resolve(job.settings, job.data_dir)
     declared = {"entry": entry, "surface_points": job.surface_points}
-    with record_provenance([job.out], data_files(entry), declared):
-        write_objects(surfaces(entry, job.downloads), job.source, job.out, job.surface_points)
+    splits = job.get("splits")
+    with record_provenance([job.out], [*data_files(entry), *filter(None, [splits])], declared):
+        write_objects(surfaces(entry, job.downloads), job.source, job.out, job.surface_points, splits)

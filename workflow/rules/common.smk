@@ -7,6 +7,7 @@ from gpca.alignment.methods.registry import method_module
 from gpca.code_files import code_files
 from gpca.encoders.registry import ENCODERS
 from gpca.objects.procedural import FAMILIES
+from gpca.objects.source import find_file
 from gpca.experiments.run import names_of, settings_of
 
 # An own kind of source is a file in sources/ that writes <results>/objects/<name>.npz and adds itself to SOURCES.
@@ -46,6 +47,12 @@ def settings(*keys):
         return json.dumps(found or {}, sort_keys=True)
 
     return section
+
+
+def split_file(kind):
+    """Return the file that says which objects or scenes are for what, or nothing where they are drawn."""
+    name = config["splits"][kind]
+    return find_file(name, config["data_dir"]) if name else []
 
 
 def as_json(section):

@@ -61,6 +61,7 @@ rule render_scenes:
 rule instances:
     input:
         **FRAMES_FROM,
+        splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
         code=code_files("gpca.steps.instances"),
     output:
         instances="<results>/instances/{frames}.npz",
@@ -78,6 +79,7 @@ rule instances:
             {
                 "datasets": REAL_WORLD["datasets"],
                 "initial_pose": CONDITIONS[wildcards.frames],
+                "role": config["splits"]["role"],
             }
         ),
         source=FRAMES,

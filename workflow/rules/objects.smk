@@ -10,6 +10,7 @@ rule objects:
 rule sample_objects:
     input:
         data=lambda wildcards: data_files(SOURCES[wildcards.source]),
+        splits=split_file("objects"),
         code=lambda wildcards: code_files(
             "gpca.steps.objects", *source_modules(SOURCES[wildcards.source])
         ),

@@ -15,7 +15,6 @@ from gpca.experiments.controls.protocol import LABELS
 from gpca.experiments.controls.settings import TRANSFER
 from gpca.experiments.diagnosis.measures import ranking
 from gpca.io.csv_file import numbers
-from gpca.objects.surface import instance_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +40,7 @@ def read_controls(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     for path in prediction_files:
         _, trained_on, seed = source_method_seed(path)
         rows = read_predictions(path, LABELS)
-        instances = rows["tested"] + "/" + rows["object"].map(instance_of)
+        instances = rows["tested"] + "/" + rows["cluster"]
         frames.append(
             pd.DataFrame(
                 {

@@ -10,7 +10,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.encoders.settings import OF_ANY_SIZE
 from gpca.experiments.controls.settings import TRAININGS, UNSEEN, WRONG_LABELS, ControlSettings
-from gpca.objects.surface import instance_of
+from gpca.objects.splits import unseen
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.reading import registered_backwards
@@ -22,7 +22,7 @@ FEWEST_OBJECTS = 5  # instances; with fewer, too few objects are left to learn f
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:
     """Return why these registrations, or the backbone of their encoder, do not admit a control; None where they do."""
     if control in (UNSEEN, *TRAININGS):
-        found = len(set(instances(registrations)))
+        found = len(np.unique(registrations.cluster))
         if found < FEWEST_OBJECTS:
             return f"it needs at least {FEWEST_OBJECTS} objects, but there are {found}"
     if control in ("density", "random_draws"):
@@ -70,14 +70,15 @@ def thinned(registrations: Registrations, points: tuple[int, int], *axes: object
 def of_unseen_objects(registrations: Registrations, folds: int, source: str, seed: int) -> Registrations:
     """Return training samples of most objects; test samples are those of the same objects, and all of the others.
 
-    The objects of a source are dealt into folds once for all seeds, and a seed leaves out the fold of its number: so
-    many seeds as there are folds test every object once. Views of one instance are in the same fold.
+    The families of a source's objects are in folds that a file names, or are dealt into `folds` once for all seeds. A
+    seed leaves out the fold of its number: so many seeds as there are folds test every object once.
     """
-    of_row = instances(registrations)
-    names = generator(source, "folds").permutation(np.unique(of_row))
-    unseen = np.isin(of_row, names[seed % folds :: folds])
-    train = np.flatnonzero(~unseen & (registrations.split == "train"))
-    test = np.concatenate([np.flatnonzero(~unseen & (registrations.split == "test")), np.flatnonzero(unseen)])
+    is_unseen = unseen(registrations.fold, seed)
+    if is_unseen is None:
+        families = generator(source, "folds").permutation(np.unique(registrations.cluster))
+        is_unseen = np.isin(registrations.cluster, families[seed % folds :: folds])
+    train = np.flatnonzero(~is_unseen & (registrations.split == "train"))
+    test = np.concatenate([np.flatnonzero(~is_unseen & (registrations.split == "test")), np.flatnonzero(is_unseen)])
     chosen = registrations.subset(np.concatenate([train, test]))
     # Numbered anew, since the test samples come from both splits.
     split = np.repeat(["train", "test"], [len(train), len(test)])
@@ -86,9 +87,8 @@ def of_unseen_objects(registrations: Registrations, folds: int, source: str, see
 
 
 def shows_known_object(registrations: Registrations) -> np.ndarray:
-    """Return which samples (S,) show an object of the training samples."""
-    of_row = instances(registrations)
-    return np.isin(of_row, of_row[registrations.split == "train"])
+    """Return which samples (S,) show an object of a family that the training samples show."""
+    return np.isin(registrations.cluster, registrations.cluster[registrations.split == "train"])
 
 
 def relabeled(control: str, train: Registrations, *axes: object) -> Registrations:
@@ -110,8 +110,3 @@ def relabeled(control: str, train: Registrations, *axes: object) -> Registration
         numbers = np.array([CONCEPTS.index(name) for name in concept[rows]], int)
         concept[rows] = np.array(CONCEPTS)[(numbers + steps) % len(CONCEPTS)]
     return replace(train, concept=concept)
-
-
-def instances(registrations: Registrations) -> np.ndarray:
-    """Return the instance (S,) that each sample shows."""
-    return np.array([instance_of(str(name)) for name in registrations.object_name])

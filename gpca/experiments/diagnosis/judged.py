@@ -15,7 +15,6 @@ from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, labels_of
 from gpca.causes.truth import NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of_file
 
@@ -122,10 +121,9 @@ def ceiling_of(causes: Causes, seed: int) -> Judged:
 
 def _judged(causes: Causes, seed: int, alarm_N, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
     truth = causes.truth
-    instances = [instance_of(str(name)) for name in causes.registrations.object_name]
     return Judged(
         label=labels_of(truth),
-        instance=np.array(instances),
+        instance=causes.registrations.cluster,
         seed=np.full(len(truth), seed),
         error=truth.error,
         phi=truth.phi,

@@ -14,10 +14,9 @@ from gpca.experiments.out_of_distribution.sets import SPACES, ShiftedSets
 from gpca.experiments.out_of_distribution.settings import ShiftSettings
 from gpca.explainers.analytical_features import analytical_features
 from gpca.objects.canonical import ObjectClouds
-from gpca.objects.surface import instance_of
+from gpca.objects.splits import drawn, unseen
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.synthesis import make_registrations
-from gpca.seeds import generator
 
 
 def make_sets(
@@ -47,30 +46,25 @@ def make_sets(
         h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
         parts[name] = replace(parts[name], attached={"embedding": h_S_d})
     measured = [_measured(parts, source, seed, settings)]
-    held_out = held_out_objects(_instances(registrations), settings.held_out_share, source, seed)
-    if len(held_out):
-        parts = _of_unseen_objects(registrations, held_out, source, seed, settings)
+    held_out_S = held_out(registrations, settings.held_out_share, source, seed)
+    if held_out_S.any():
+        parts = _of_unseen_objects(registrations, held_out_S, source, seed, settings)
         measured.append(_measured(parts, source, seed, settings))
     return ShiftedSets.join(measured)
 
 
-def held_out_objects(instances: np.ndarray, share: float, source: str, seed: int) -> np.ndarray:
-    """Return the objects to be held out: a share of them, rounded, at least one; none where there is only one."""
-    instances = np.unique(instances)
-    count = min(max(1, round(share * len(instances))), len(instances) - 1)
-    return np.sort(generator(source, seed, "held-out objects").permutation(instances)[:count])
-
-
-def _instances(registrations: Registrations) -> np.ndarray:
-    """Return the object of each sample, of which several views may have names of their own."""
-    return np.array([instance_of(name) for name in registrations.object_name.tolist()])
+def held_out(registrations: Registrations, share: float, source: str, seed: int) -> np.ndarray:
+    """Return which samples (S,) show families to be held out: the seed's fold, or a share of all; not the only one."""
+    is_unseen = unseen(registrations.fold, seed)
+    if is_unseen is None:
+        is_unseen = drawn(registrations.cluster, share, source, seed, "held-out objects")
+    return is_unseen
 
 
 def _of_unseen_objects(
-    registrations: Registrations, held_out: np.ndarray, source: str, seed: int, settings: ShiftSettings
+    registrations: Registrations, held_out_S: np.ndarray, source: str, seed: int, settings: ShiftSettings
 ) -> dict[str, Registrations]:
     """Train an encoder that never sees some objects; return the samples of seen objects, and those of unseen ones."""
-    held_out_S = np.isin(_instances(registrations), held_out)
     is_train_S = registrations.split == "train"
     train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
     seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))
@@ -108,7 +102,8 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
                 features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
             distance_S_K[test, 2 * i] = knn_distance(features_N_F, query_S_F, settings.neighbours)
             distance_S_K[test, 2 * i + 1] = mahalanobis_distance(features_N_F, query_S_F)
-        columns = {column: getattr(part, column) for column in ("split", "sample", "concept", "object_name")}
+        kept = ("split", "sample", "concept", "object_name", "cluster")
+        columns = {column: getattr(part, column) for column in kept}
         named = np.full(len(part), name)
         joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
     return ShiftedSets.join(joined)

@@ -35,7 +35,7 @@ class ShiftedSets:
     Attributes:
         set: (S,) name of the set, a key of `TRAINED_ON`.
         split: (S,) ``train`` (fitted to) or ``test``.
-        sample, concept, object_name: (S,) as in :class:`gpca.pairs.dataset.Registrations`.
+        sample, concept, object_name, cluster: (S,) as in :class:`gpca.pairs.dataset.Registrations`.
         h: (S, d) embeddings by the encoder of the set.
         distance: (S, 4) `DISTANCES` to the training samples of the set's encoder; 0 for these themselves.
     """
@@ -45,6 +45,7 @@ class ShiftedSets:
     sample: np.ndarray
     concept: np.ndarray
     object_name: np.ndarray
+    cluster: np.ndarray
     h: np.ndarray
     distance: np.ndarray
 
@@ -58,7 +59,9 @@ class ShiftedSets:
         zeros_S = np.zeros(len(rows), int)
         columns: dict[str, Any] = dict.fromkeys(REGISTRATION_COLUMNS, nan_S) | {"object_index": zeros_S}
         columns |= {name: np.full((len(rows), 4, 4), np.nan) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
-        columns |= {name: getattr(self, name)[rows] for name in ("sample", "split", "concept", "object_name")}
+        columns |= {
+            name: getattr(self, name)[rows] for name in ("sample", "split", "concept", "object_name", "cluster")
+        }
         nothing = [np.zeros((0, 3), np.float32)] * len(rows)
         return Registrations(**columns | ragged(nothing, nothing), attached={"embedding": self.h[rows]})
 

@@ -49,7 +49,8 @@ def draw_real_world_example(
     objects = ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)
     samples = read_samples(poses_csv, predictions_csv)
-    row = choose_sample(samples, predictions_csv, np.diff(instances.offsets))
+    colored_I = instances.colour != ""
+    row = choose_sample(samples, predictions_csv, np.where(colored_I, np.diff(instances.offsets), 0))
     sample = samples.iloc[row]
     i = int(sample["instance"])
     camera = _Camera(instances, i, registrations, row)
@@ -112,10 +113,11 @@ def draw_real_world_example(
 
 
 def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray) -> int:
-    """Return the row that is shown; see :func:`draw_real_world_example`. Instance i has ``pixels_I[i]`` pixels."""
-    overlap = samples[(samples["split"] == "test") & (samples["concept_true"] == "overlap")]
+    """Return the row that is shown; see :func:`draw_real_world_example`. Instance i shows ``pixels_I[i]`` colors."""
+    is_seen = pixels_I[samples["instance"].to_numpy(int)] > 0
+    overlap = samples[is_seen & (samples["split"] == "test") & (samples["concept_true"] == "overlap")]
     if overlap.empty:
-        raise InputError(path, "has no test sample of overlap", "raise real_world.test")
+        raise InputError(path, "has no test sample of overlap in a frame with colors", "raise real_world.test")
     for column, wanted in (("lost_to", OCCLUDER), ("concept_predicted", "overlap")):
         narrower = overlap[overlap[column] == wanted]
         overlap = overlap if narrower.empty else narrower

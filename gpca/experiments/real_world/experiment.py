@@ -16,6 +16,7 @@ from gpca.explainers.registry import require_settings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.title import title_of
+from gpca.reporting.words import dataset_in_words
 
 POSES = {"results": "Pose estimators", "true_pose": "True pose, small error"}  # titles by form; all others:
 GLOBAL_POSE = "Global registration"
@@ -90,7 +91,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of the frames, their initial poses, the encoders and the other explainers."""
     frames = config["real_world"]
-    source = {"title": frames["title"], "stand_in": not frames["datasets"]}
+    source = {"title": frames["title"] or _title(config), "stand_in": not frames["datasets"]}
     poses = {REAL_WORLD: frames["initial_pose"]}
     poses |= {f"{REAL_WORLD}_{name}": entry for name, entry in conditions_of(config).items()}
     first_reduction = next(iter(frames["reductions"]))
@@ -108,6 +109,13 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],
         "backbone_reductions": list(frames["reductions"]),
     }
+
+
+def _title(config: Mapping[str, Any]) -> str:
+    """Return what the datasets of frames are called that this run has: optional ones may be absent."""
+    datasets = resolve_datasets(config["real_world"]["datasets"], config["data_dir"])
+    *others, last = [dataset_in_words(name) for name in datasets] or ["Table-top RGB-D"]
+    return f"{', '.join(others)} and {last} frames" if others else f"{last} frames"
 
 
 def reduced_backbones(frames: Mapping) -> list[str]:

@@ -34,6 +34,7 @@ class FrameDataset:
     optional: bool = False
     results: Place | Annotated[list[Place], Field(min_length=1)] | None = None
     errors: Place | None = None
+    models: Place | None = None
     most_frames: Count = 1
 
 
@@ -50,7 +51,7 @@ class VirtualFrames:
 class RealWorldSettings:
     """Registrations of depth frames, every backbone with every reduction."""
 
-    title: Text
+    title: Text | None
     scenes: SceneSettings
     datasets: dict[Name, FrameDataset] | None
     initial_pose: InitialPoseSettings

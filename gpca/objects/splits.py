@@ -1,0 +1,101 @@
+"""Which objects and scenes are alike, and which of them are tested together: read from files, or else drawn.
+
+Samples that show objects of one family of shapes, or one scene, form a *cluster*: a cluster is never in training and
+test at once where objects or scenes are unseen, and intervals are over clusters. The clusters of a source are dealt
+into *folds*; with a seed, those of one fold are unseen. A file with these columns says how:
+
+    objects: source, object, name, family, role, fold
+    scenes:  dataset, scene, role, fold
+
+The role is ``development`` (what settings are chosen by), ``evaluation`` or, of objects, ``unused``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.io.csv_file import read_csv
+from gpca.seeds import generator
+
+DRAWN = -1  # the fold of what no file deals into folds, and of scenes that only training sees
+DEVELOPMENT, EVALUATION, UNUSED = ROLES = ("development", "evaluation", "unused")
+
+
+class Place(NamedTuple):
+    """Where an object or a scene stands: its cluster, its role and its fold."""
+
+    cluster: str
+    role: str
+    fold: int
+
+
+def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
+    """Return the place of each object of a source by name; none where the file says nothing of the source.
+
+    Raises:
+        InputError: a damaged file, an object twice, an unknown role, a fold that is no whole number, a family in two
+            folds or in two roles.
+    """
+    rows = read_csv(path, ("source", "object", "name", "family", "role", "fold"), remedy="restore it")
+    of_source = rows[rows["source"] == source]
+    return _places(path, of_source["object"], of_source["family"], of_source["role"], of_source["fold"])
+
+
+def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
+    """Return the place of each scene of a dataset by number; none where the file says nothing of the dataset.
+
+    Raises:
+        InputError: as :func:`read_object_splits`.
+    """
+    rows = read_csv(path, ("dataset", "scene", "role", "fold"), remedy="restore it")
+    of_dataset = rows[rows["dataset"] == dataset]
+    clusters = [f"{dataset} {scene}" for scene in of_dataset["scene"]]
+    places = _places(path, of_dataset["scene"], clusters, of_dataset["role"], of_dataset["fold"])
+    return {int(scene): place for scene, place in places.items()}
+
+
+def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
+    places: dict[str, Place] = {}
+    of_cluster: dict[str, Place] = {}
+    for name, cluster, role, fold in zip(names, clusters, roles, folds, strict=True):
+        if name in places:
+            raise InputError(path, f"'{name}' occurs twice", "keep one of its rows")
+        if role not in ROLES:
+            raise InputError(path, f"'{name}' has the role '{role}'", f"choose one of {', '.join(ROLES)}")
+        if not fold.isdecimal() and role != UNUSED:
+            raise InputError(path, f"'{name}' has the fold '{fold}'", "number the folds from 0")
+        place = Place(cluster, role, int(fold) if role != UNUSED else DRAWN)
+        if place != of_cluster.setdefault(cluster, place):
+            raise InputError(path, f"'{cluster}' has two roles or is in two folds", "give all of it one of each")
+        places[name] = place
+    return places
+
+
+def place_of(name: str, places: Mapping[str, Place], path: str | Path) -> Place:
+    """Return an object's place; InputError where the file names others of its source, but not this one."""
+    if name not in places:
+        raise InputError(path, f"has no row for the object '{name}'", "add one, or set splits.objects: null")
+    return places[name]
+
+
+def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:
+    """Return which rows (N,) are unseen with a seed, by their folds; None where there are none.
+
+    The seeds take turns with the folds that a source has.
+    """
+    folds = np.unique(fold_N[fold_N != DRAWN])
+    if len(folds) < 2:
+        return None
+    return fold_N == folds[seed % len(folds)]
+
+
+def drawn(cluster_N: np.ndarray, share: float, *axes: object) -> np.ndarray:
+    """Return which rows (N,) are unseen, a share of the clusters drawn with the seed axes: at least one, never all."""
+    clusters = np.unique(cluster_N)
+    count = min(max(1, round(share * len(clusters))), len(clusters) - 1)
+    return np.isin(cluster_N, generator(*axes).permutation(clusters)[:count])
