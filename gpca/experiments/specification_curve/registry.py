@@ -95,5 +95,7 @@ GROUPS = {
         ("registrations", "poses", "predictions"),
         (),
     ),
-    "features": Group("Classic features", settings.ClassicFeatures, "features:run", ("registrations",), ("ycb",)),
+    "features": Group(
+        "Classic features", settings.ClassicFeatures, "learners:classic_features", ("registrations",), ("ycb",)
+    ),
 }

@@ -23,7 +23,7 @@ from gpca.experiments.specification_curve import (
     learners,
     severities,
 )
-from gpca.experiments.specification_curve.judged import accuracies
+from gpca.experiments.specification_curve.diagnostics import accuracies
 from gpca.experiments.specification_curve.settings import ReadingSizes
 from gpca.pairs.perturbation import CONCEPTS
 from tests.experiments.specification_curve.conftest import SECTIONS, rows_of
