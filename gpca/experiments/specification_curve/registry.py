@@ -53,7 +53,8 @@ class Group:
     @property
     def values(self) -> Any:
         """The type of its part of the config: one or more values of every choice."""
-        return Annotated[dict, Keys({name: Distinct[kind] for name, kind in self.choices.items()}, self.choices)]
+        several = {name: Distinct[kind] for name, kind in self.choices.items()}  # type: ignore[valid-type]
+        return Annotated[dict, Keys(several, required=several)]
 
     @property
     def module(self) -> str:
