@@ -135,7 +135,7 @@ def draw_transfer(intervals: pd.DataFrame, sources: Mapping[str, str], explainer
     """Draw a matrix for each explainer: rows are the sources that it learned from, columns those that it explains.
 
     Args:
-        intervals: What :func:`gpca.experiments.controls.intervals.collect` returned.
+        intervals: What :func:`gpca.experiments.controls.metrics.collect_intervals` returned.
     """
     accuracy = rows_where(intervals, metric="accuracy")
     moved = rows_where(accuracy, control=TRANSFER)

@@ -15,9 +15,9 @@ from gpca.causes.dataset import Causes
 from gpca.causes.labels import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.intervals import COLUMNS, rows_of
 from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by
 from gpca.experiments.diagnosis.measures import MEASURES, measure
+from gpca.experiments.diagnosis.metrics import COLUMNS, rows_of
 from gpca.frames.source import REAL_WORLD
 from gpca.io.csv_file import ANY, read_csv
 from gpca.seeds import generator, seed_of_file
@@ -35,10 +35,11 @@ KINDS = (*LABELS, GEOMETRY, BORDERLINE, "scenes", "objects")
 def collect(
     causes_files: Iterable[str | Path], sample_files: Iterable[str | Path], prediction_files: Iterable[str | Path]
 ) -> pd.DataFrame:
-    """Return rows as :func:`gpca.experiments.diagnosis.intervals.collect`, for explainers that learned from no frame.
+    """Return the intervals of the diagnosis for explainers that learned from no frame.
 
-    Beside its measures stand `STATE`, the mean of the shares of the nominal and of the failed that are called so, and
-    the number of `SAMPLES`; what has no value, as there are no samples for it, has no row.
+    The columns are those of :func:`gpca.experiments.diagnosis.metrics.collect_intervals`. Beside its measures
+    stand `STATE`, the mean of the shares of the nominal and of the failed that are called so, and the number of
+    `SAMPLES`; what has no value, as there are no samples for it, has no row.
     Intervals are over scenes, objects and seeds, which are drawn with replacement each. The counts of `KINDS` are those
     of all frames, and of each dataset alone, ``real_rgbd/{dataset}``.
 
