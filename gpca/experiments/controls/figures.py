@@ -163,7 +163,7 @@ def _matrix(accuracy: pd.DataFrame, sources: list[str]) -> np.ndarray:
     for row, trained_on in enumerate(sources):
         for column, tested in enumerate(sources):
             control = PAPER if row == column else TRANSFER
-            found = rows_where(accuracy, control=control, source=tested, trained_on=trained_on)
-            if len(found):
-                shares[row, column] = 100 * found["value"].iloc[0]
+            tests = rows_where(accuracy, control=control, source=tested, trained_on=trained_on)
+            if len(tests):
+                shares[row, column] = 100 * tests["value"].iloc[0]
     return shares

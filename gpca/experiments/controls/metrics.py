@@ -93,13 +93,13 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     judged = read_controls(prediction_files)
     for (control, source, trained_on, explainer, seed), rows in judged.groupby(list(KEYS), sort=False):
         concept = trained_on if control == TRANSFER else ALL
-        found = {"accuracy": rows["right"].mean(), "test_samples": len(rows)}
+        values = {"accuracy": rows["right"].mean(), "test_samples": len(rows)}
         one_1_N = np.ones((1, len(rows)))
         for metric, score in (("auroc_error", "entropy"), ("auroc_error_bald", "bald")):
-            found[metric] = auroc_error(rows, score, one_1_N)[0]
+            values[metric] = auroc_error(rows, score, one_1_N)[0]
         records += [
             (control, source, explainer, metric, concept, seed, float(value))
-            for metric, value in found.items()
+            for metric, value in values.items()
             if np.isfinite(value)
         ]
     return tidy(records, "controls")

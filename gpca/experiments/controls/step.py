@@ -47,11 +47,13 @@ def run(job: Job) -> None:
             backbone=encoder.backbone,
             uncertainty=UncertaintySettings(**runs, icp=icp),
             rivals=rivals,
-            embed=lambda asked, source: embed(model, asked, source, job.seed, encoder),
+            embed=lambda registrations_of_others, source: embed(
+                model, registrations_of_others, source, job.seed, encoder
+            ),
             embeddings=embeddings,
         )
-        asked = {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
-        rows = experiment.run(registrations, asked)
+        registrations_of_others = {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
+        rows = experiment.run(registrations, registrations_of_others)
         samples = sample_table(registrations, ObjectClouds.load(job.objects, job.source))
         write_csv(job.predictions, rows)
         write_csv(job.samples, samples)

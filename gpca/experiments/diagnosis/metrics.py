@@ -36,11 +36,11 @@ def collect(prediction_files: Iterable[str | Path], causes_files: Iterable[str |
     records = []
     for (source, explainer, seed), samples in with_pooled(read_judged(prediction_files, causes_files)).items():
         one_1_N = np.ones((1, len(samples)))
-        found = {metric: value_1[0] for metric, value_1 in measure(samples, one_1_N).items()}
-        found["test_samples"] = len(samples)
+        values = {metric: value_1[0] for metric, value_1 in measure(samples, one_1_N).items()}
+        values["test_samples"] = len(samples)
         records += [
             (TABLE, source, explainer, metric, ALL, seed, float(value))
-            for metric, value in found.items()
+            for metric, value in values.items()
             if np.isfinite(value)
         ]
         records += [(TABLE, source, explainer, *row[:2], seed, row[2]) for row in _confusion(samples)]
@@ -126,7 +126,11 @@ def rows_of(
     any_samples = next(iter(samples_of.values()))
     weights_B_N = np.vstack([np.ones(len(any_samples)), drawn_B_N])
     values = {
-        explainer: {metric: found for metric, found in measured(samples, weights_B_N).items() if np.isfinite(found[0])}
+        explainer: {
+            metric: of_explainer
+            for metric, of_explainer in measured(samples, weights_B_N).items()
+            if np.isfinite(of_explainer[0])
+        }
         for explainer, samples in samples_of.items()
     }
     seeds = len(set(any_samples.seed.tolist()))
@@ -136,12 +140,12 @@ def rows_of(
             (explainer for explainer in values if explainer != CEILING and metric in values[explainer]),
             key=lambda explainer: values[explainer][metric][0] * (1 if metric in SMALLER_IS_BETTER else -1),
         )
-        for explainer, found in values.items():
-            if metric not in found:
+        for explainer, of_explainer in values.items():
+            if metric not in of_explainer:
                 continue
             rival = next((name for name in ranked if name != explainer), "") if explainer != CEILING else ""
-            apart = found[metric] - values[rival][metric] if rival else np.full(len(weights_B_N), np.nan)
-            of_value, of_difference = bounds(found[metric][1:]), bounds(apart[1:])
+            apart = of_explainer[metric] - values[rival][metric] if rival else np.full(len(weights_B_N), np.nan)
+            of_value, of_difference = bounds(of_explainer[metric][1:]), bounds(apart[1:])
             own = (source, explainer, metric, counted(any_samples, metric), seeds)
-            rows.append((*own, found[metric][0], *of_value, rival, apart[0], *of_difference))
+            rows.append((*own, of_explainer[metric][0], *of_value, rival, apart[0], *of_difference))
     return rows

@@ -49,5 +49,5 @@ def run(job: Job) -> None:
             write_csv(out, exchange.run(Registrations.load(registrations_path, (job.source, seed)), judges))
 
 
-def _embedded(model, encoder: EncoderSettings, seed: int, asked: Registrations, source: str):
-    return embed(model, asked, source, seed, encoder)
+def _embedded(model, encoder: EncoderSettings, seed: int, registrations: Registrations, source: str):
+    return embed(model, registrations, source, seed, encoder)
