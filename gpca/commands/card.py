@@ -43,7 +43,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
         content: of that file.
         model, diagnoser: its parts.
         origin: of the model.
-        scores: what :func:`gpca.experiments.diagnosis.intervals.collect` returned for its run.
+        scores: what :func:`gpca.experiments.diagnosis.metrics.collect_intervals` returned for its run.
 
     Raises:
         InputError: no scores of a classifier as in the model, or settings of a run that are incomplete.

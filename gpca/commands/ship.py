@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from gpca.commands.card import card
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.intervals import read_intervals
+from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.io.files import require_outputs, whole_file
 from gpca.model.file import Model
 from gpca.model.origin import Origin

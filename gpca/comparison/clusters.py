@@ -1,4 +1,4 @@
-"""Intervals over clusters of samples and seeds of the shares that stand beside printed numbers, from predictions of single samples.
+"""Intervals over clusters of samples and seeds of the shares beside printed numbers, from single predictions.
 
 Seeds share objects, so that an interval over seeds does not say how much the choice of the objects matters; and objects
 of one family, or seen in one scene, are alike (:mod:`gpca.objects.splits`). Values of

@@ -73,7 +73,7 @@ class Dataset:
         return self.role == EVALUATION or self.places[frame.scene].role == self.role
 
     def fold(self, scene: int) -> int:
-        """Return the fold that a scene is tested with; `DRAWN` where no file says so, or where only training sees it."""
+        """Return the fold that a scene is tested with; `DRAWN` where no file says so, or for training alone."""
         place = self.places.get(scene)
         return place.fold if place is not None and place.role == self.role else DRAWN
 

@@ -1,5 +1,5 @@
 # Every table and figure of the registry, gpca/reporting/results.yaml: a rule of its name for each.
-from gpca.experiments.results import results_of
+from gpca.experiments.registry import results_of
 from gpca.reporting.registry import SUFFIXES
 
 RESULTS = results_of(NAMES)

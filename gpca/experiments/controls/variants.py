@@ -11,6 +11,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.encoders.settings import OF_ANY_SIZE
 from gpca.experiments.controls.settings import TRAININGS, UNSEEN, WRONG_LABELS, ControlSettings
 from gpca.objects.splits import unseen
+from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.reading import registered_backwards
@@ -22,9 +23,9 @@ FEWEST_OBJECTS = 5  # instances; with fewer, too few objects are left to learn f
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:
     """Return why these registrations, or the backbone of their encoder, do not admit a control; None where they do."""
     if control in (UNSEEN, *TRAININGS):
-        found = len(np.unique(registrations.cluster))
-        if found < FEWEST_OBJECTS:
-            return f"it needs at least {FEWEST_OBJECTS} objects, but there are {found}"
+        objects = len({instance_of(name) for name in registrations.object_name.tolist()})
+        if objects < FEWEST_OBJECTS:
+            return f"it needs at least {FEWEST_OBJECTS} objects, but there are {objects}"
     if control in ("density", "random_draws"):
         fewest, least = int(np.diff(registrations.offsets).min()), settings.draw_points[0]
         if fewest < least:
