@@ -35,7 +35,6 @@ class Source:
         url, urls, sha256: what is downloaded where the location is not there.
         views_per_instance: at most so many single views of one instance.
         stand_in: every title says that the objects are stand-ins.
-        local: keys that override the others where its own data is found below `data_dir`.
     """
 
     title: Text = ""
@@ -50,7 +49,6 @@ class Source:
     sha256: Checksums = None
     views_per_instance: Count = 1
     stand_in: bool = False
-    local: Source | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

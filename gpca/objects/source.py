@@ -30,39 +30,35 @@ OF_FILES = ("location", "files", "objects", "unit", "url", "urls", "sha256", "vi
 def resolve(entry: dict, data_dir: str | None) -> dict:
     """Decide where a source's data comes from; reads no data, so it is quick enough for the loading of a workflow.
 
-    What lies under `data_dir` comes first, then what the repository's own data holds: what the entry's `local` part names (its keys then override the others),
-    else what the entry itself names. A `location` counts as soon as it exists; without one, each pattern of `files`
-    must match below `data_dir`. Last comes its `url` or `urls`.
+    What lies under `data_dir` comes first, then the repository's own data, then the entry's `url` or `urls`. A
+    `location` counts as soon as it exists; without one, each pattern of `files` must match.
 
     Args:
         entry: the source's part of the config.
         data_dir: folder that relative locations start from, or None.
 
     Returns:
-        The entry without `local`, with `origin` "procedural", "local" or "download" and, when local, with the absolute
+        The entry with `origin` "procedural", "local" or "download" and, when local, with the absolute
         `location`. A download keeps the declared one: it says what a `data_dir` would have to hold.
 
     Raises:
         InputError: unknown kind, missing data_dir, location nowhere to be found and no url, checksums unlike the urls,
             and what the kind refuses of the entry.
     """
-    entry = dict(entry)
-    local = entry.pop("local", None)
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
     if data_dir is not None and not require_place(data_dir).is_dir():
         raise InputError(data_dir, "no such folder", "correct data_dir in the config")
-    for candidate in (entry, {**entry, **local}) if local else (entry,):
-        if candidate.get("kind") == "procedural":
-            if not candidate.get("family"):
-                raise InputError(subject, "names no family", "set family in the config")
-            procedural.require_family(candidate["family"])
-            return {name: value for name, value in candidate.items() if name not in OF_FILES} | {"origin": "procedural"}
-        module = _module_of(candidate.get("kind"))
-        if folder := _found(candidate, data_dir):
-            require_whole_if_ours(folder)
-            if require_entry := getattr(module, "require_entry", None):
-                require_entry(candidate, folder)
-            return {**candidate, "origin": "local", "location": os.path.abspath(folder)}
+    if entry.get("kind") == "procedural":
+        if not entry.get("family"):
+            raise InputError(subject, "names no family", "set family in the config")
+        procedural.require_family(entry["family"])
+        return {name: value for name, value in entry.items() if name not in OF_FILES} | {"origin": "procedural"}
+    module = _module_of(entry.get("kind"))
+    if folder := _found(entry, data_dir):
+        require_whole_if_ours(folder)
+        if require_entry := getattr(module, "require_entry", None):
+            require_entry(entry, folder)
+        return {**entry, "origin": "local", "location": os.path.abspath(folder)}
     urls, checksums = _as_list(entry.get("urls") or entry.get("url")), _as_list(entry.get("sha256"))
     if not urls:
         wanted = entry.get("location") or ", ".join(entry.get("files") or ["location"])
