@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from gpca.attribution.scores import Attribution
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
-from gpca.features.groups import MOTION
+from gpca.features.settings import MOTION
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -61,7 +61,7 @@ class Gate(ScoringExplainer):
     """An alarm by one of the numbers of the motion, times a sign.
 
     Args:
-        name: in :data:`gpca.features.groups.MOTION`.
+        name: in :data:`gpca.features.settings.MOTION`.
         sign: −1 where small values are bad.
     """
 

@@ -14,7 +14,7 @@ import numpy as np
 from baselines.gates import NominalThreshold
 from baselines.sensitivity import single_drops
 from baselines.shap_kl import shapley_values
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.shapley import ALL, SUBSETS
 from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached

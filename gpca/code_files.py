@@ -10,8 +10,7 @@ ROOT = Path(__file__).resolve().parent.parent  # the folder that holds both pack
 PACKAGES = ("gpca", "baselines")
 BESIDE = {  # what a module reads from its own folder
     "gpca.comparison.claims": "claims.yaml",
-    "gpca.comparison.published": "published.csv",
-    "gpca.comparison.reasons": "reasons.csv",
+    "gpca.comparison.published": "*.csv",
     "gpca.reporting.figures.style": "matplotlibrc",
     "gpca.page.page": "templates/*",
 }

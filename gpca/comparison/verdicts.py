@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.comparison.published import TIMES, Counterpart, Number
-from gpca.comparison.reasons import Reason, reason_of
+from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, deviation_interval, value_of_run
 from gpca.errors import InputError
 from gpca.objects.title import STAND_IN, title_of

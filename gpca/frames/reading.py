@@ -14,11 +14,17 @@ from scipy.spatial import cKDTree
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, without_background
-from gpca.frames.estimates import EstimatorErrors, choose_estimate, error_of, read_pose_errors
+from gpca.frames.estimates import (
+    EstimatorErrors,
+    PosesByObject,
+    choose_estimate,
+    error_of,
+    read_bop_results,
+    read_pose_errors,
+)
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
 from gpca.frames.instances import Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
-from gpca.frames.results_file import PosesByObject, read_bop_results
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_center
 from gpca.objects.surface import Surface

@@ -9,8 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.io.json_file import read_json
-from gpca.io.structured_text import load_own_yaml
+from gpca.io.structured_text import load_own_yaml, read_json
 from gpca.objects.canonical import ObjectClouds
 
 LICENSES = Path(__file__).with_name("licenses.yaml")

@@ -21,8 +21,8 @@ from typing import IO, Any
 
 from gpca.errors import InputError
 from gpca.io.files import sha256_of_file, whole_file, whole_folder
-from gpca.io.json_file import read_json
 from gpca.io.limits import LARGEST_FILE_BYTES, is_bounded, require_file
+from gpca.io.structured_text import read_json
 
 LARGEST_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
 LONGEST_HEADER = 2**20  # bytes of what comes before a member, such as its long name; tarfile reads it as a whole

@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.normals import estimate_normals
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations, ragged

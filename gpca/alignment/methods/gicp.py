@@ -15,9 +15,10 @@ from gpca.alignment.methods.interface import (
     MethodEntry,
     Outcome,
     Pair,
+    align_by_open3d,
     as_array,
+    failure_of_a_step,
 )
-from gpca.alignment.methods.local import align_by_open3d, failure_of_a_step
 
 LAST_STEP = 1e-4  # of small_gicp, radians and diameters
 

@@ -8,10 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from gpca.alignment.least_squares import best_motion, plane_step
-from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair
-from gpca.alignment.methods.local import failure_of_a_step
-from gpca.alignment.rigid import rotate, transform
+from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair, failure_of_a_step
+from gpca.alignment.rigid import best_motion, plane_step, rotate, transform
 
 Metric = Literal["point_to_point", "point_to_plane"]
 

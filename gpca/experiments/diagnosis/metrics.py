@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.metrics import ABSTAINED, ALL, PREDICTED_AS, confusion, tidy
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE
 from gpca.experiments.diagnosis.judged import POOLED, Judged, joined, read_judged
 from gpca.experiments.diagnosis.measures import measure

@@ -17,9 +17,8 @@ from gpca.active_learning.settings import (
     NewConceptSettings,
 )
 from gpca.alignment.icp import ICPSettings
-from gpca.causes.dataset import Causes
+from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.drawing import draw_geometry
-from gpca.causes.labels import LABELS, labels_of
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.encoders.settings import EncoderSettings
@@ -28,9 +27,8 @@ from gpca.encoders.weights import load_model
 from gpca.experiments.new_concepts.self_supervision import self_supervised
 from gpca.explainers.pair_classifier import NormalisedDescriptors
 from gpca.features.dataset import Descriptors, describe_all
-from gpca.features.groups import GROUPS
 from gpca.features.registered import describe_registrations
-from gpca.features.settings import DescriptorSettings
+from gpca.features.settings import GROUPS, DescriptorSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS

@@ -1,6 +1,6 @@
 import pytest
 
-from gpca.causes.labels import LABELS, labels_of
+from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, ceiling_of, read_judged
