@@ -1,7 +1,7 @@
 """Files of torch.save, read without trust: whole to the byte, no code, and only possible numbers.
 
-torch itself takes a file in which a bit has flipped for a whole one: it reads no checksum. Among them are the checkpoints by which a
-stopped training continues.
+torch itself takes a file in which a bit has flipped for a whole one: it reads no checksum. Checkpoints are
+such files; by them a stopped training continues.
 """
 
 from __future__ import annotations

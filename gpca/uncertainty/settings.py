@@ -1,6 +1,6 @@
-"""Settings of Monte-Carlo ICP, and the names of the conditions that each design runs, apart from the code that runs them.
+"""Settings of Monte-Carlo ICP, and the names of the conditions that each design runs.
 
-Nothing here needs compiled loops.
+They are kept apart from the code that runs them: nothing here needs compiled loops.
 """
 
 from __future__ import annotations

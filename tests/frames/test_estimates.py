@@ -14,7 +14,7 @@ from gpca.frames.initial_pose import InitialPoseSettings
 
 from .tiny import read
 
-HEAD = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
+ERRORS = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
 SEEN = {
     "points_m": np.array([[0.0, 0, 1], [0.01, 0, 1], [0, 0.01, 1]]),
     "pixels": np.array([[50, 50], [51, 50], [50, 51]]),
@@ -70,7 +70,7 @@ def test_an_error_takes_the_true_pose_to_the_estimated_one():
 
 def test_a_file_of_errors_is_read_in_metres_and_of_known_objects(tmp_path):
     path = tmp_path / "errors.csv"
-    path.write_text(f"{HEAD}\n48,1,1,x,0,0,{np.pi / 2},1.5,0,-20\n48,1,9,x,0,0,0,0,0,0\n")
+    path.write_text(f"{ERRORS}\n48,1,1,x,0,0,{np.pi / 2},1.5,0,-20\n48,1,9,x,0,0,0,0,0,0\n")
     [(number, T)] = read_pose_errors(path, [1])
     assert number == 1
     assert np.allclose(T[:3, 3], [0.0015, 0, -0.02])
@@ -88,7 +88,7 @@ def test_a_file_of_errors_is_read_in_metres_and_of_known_objects(tmp_path):
 )
 def test_a_faulty_file_of_errors_is_refused(tmp_path, row, expected):
     path = tmp_path / "errors.csv"
-    path.write_text(f"{HEAD}\n{row}\n")
+    path.write_text(f"{ERRORS}\n{row}\n")
     with pytest.raises(InputError, match=expected):
         read_pose_errors(path, [1])
 

@@ -149,7 +149,7 @@ def test_what_was_perturbed_is_hidden_from_all_but_the_oracle(registrations, mon
             shown.append(registrations)
             super().__init__(registrations, row)
 
-    monkeypatch.setattr(evaluation, "RegisteredRow", Recorded)
+    monkeypatch.setattr(designs, "RegisteredRow", Recorded)
     evaluate(design, registrations, registrations.rows("test")[:1])
     (given,) = shown
     told = given.concept[0] in CONCEPTS and np.isfinite(given.severity_noise[0])
