@@ -109,12 +109,12 @@ def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES)
     adjacent_n_n = adjacent_n_n & ~np.eye(len(adjacent_n_n), dtype=bool)
     order = np.argsort(-adjacent_n_n.sum(axis=1), kind="stable")  # colors are given to nodes of many neighbors first
     packed = np.packbits(adjacent_n_n[np.ix_(order, order)], axis=1, bitorder="little")
-    neighbours = [int.from_bytes(row.tobytes(), "little") for row in packed]
+    neighbors = [int.from_bytes(row.tobytes(), "little") for row in packed]
 
     best: list[int] = []
     path: list[int] = []  # the clique so far; for it and each of its beginnings, what may come next:
     candidates = [(1 << len(order)) - 1]
-    branches = [_colored(candidates[0], neighbours)]
+    branches = [_colored(candidates[0], neighbors)]
     tried = 0
     while branches:
         if not branches[-1] or len(path) + branches[-1][-1][1] <= len(best) or tried >= most_branches:
@@ -125,17 +125,17 @@ def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES)
         tried += 1
         node, _ = branches[-1].pop()
         candidates[-1] ^= 1 << node
-        further = candidates[-1] & neighbours[node]
+        further = candidates[-1] & neighbors[node]
         if further:
             path.append(node)
             candidates.append(further)
-            branches.append(_colored(further, neighbours))
+            branches.append(_colored(further, neighbors))
         elif len(path) >= len(best):
             best = [*path, node]
     return np.sort(order[best]), tried < most_branches
 
 
-def _colored(candidates: int, neighbours: list[int]) -> list[tuple[int, int]]:
+def _colored(candidates: int, neighbors: list[int]) -> list[tuple[int, int]]:
     """Give each candidate a color, no two neighbors the same, and list both by color.
 
     A clique among the candidates up to any place in the list has no more nodes than the color there.
@@ -146,7 +146,7 @@ def _colored(candidates: int, neighbours: list[int]) -> list[tuple[int, int]]:
         free = candidates
         while free:
             node = (free & -free).bit_length() - 1
-            free &= ~(neighbours[node] | 1 << node)
+            free &= ~(neighbors[node] | 1 << node)
             candidates ^= 1 << node
             colored.append((node, colour))
     return colored

@@ -16,14 +16,14 @@ RADIUS = 0.25  # diameters: five times the spacing of some 500 points on an obje
 MOST_NEIGHBORS = 100
 
 
-def estimate_normals(points_N_3: np.ndarray, neighbours: int = NEIGHBORS) -> np.ndarray:
+def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.ndarray:
     """Return unit normals (N, 3) that point away from the center of the cloud.
 
     The neighbors leave the sign open. Away from the center is outward on a convex object, and elsewhere at least the
     same side in two clouds of one object.
     """
     cloud = open3d_cloud(points_N_3)
-    cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(neighbours))
+    cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(neighbors))
     normals_N_3 = np.array(cloud.normals)
     outward_N_3 = points_N_3 - points_N_3.mean(axis=0)
     inward_N = np.einsum("ni,ni->n", normals_N_3, outward_N_3) < 0
@@ -39,8 +39,8 @@ def fpfh_of_pair(pair: Any, radius: float = RADIUS) -> tuple[list[Any], list[Any
 def fpfh(cloud: Any, radius: float = RADIUS) -> Any:
     """Return Open3D's features of a cloud with normals; `.data` is (33, N)."""
     o3d = require_open3d()
-    neighbours = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBORS)
-    return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbours)
+    neighbors = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBORS)
+    return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbors)
 
 
 def mutual_matches(source_N_d: np.ndarray, target_P_d: np.ndarray, most: int) -> np.ndarray:

@@ -209,8 +209,8 @@ def run(options: Namespace) -> None:
         model.save(written)
         content = written.read_bytes()
     if len(content) > LARGEST_BYTES:
-        found = f"has {len(content) / 1e6:.1f} MB, more than the {LARGEST_BYTES / 1e6:g} MB allowed in the package"
-        raise InputError(options.model, found, "lower causes.train, causes.test or real_world.train")
+        fault = f"has {len(content) / 1e6:.1f} MB, more than the {LARGEST_BYTES / 1e6:g} MB allowed in the package"
+        raise InputError(options.model, fault, "lower causes.train, causes.test or real_world.train")
     origin = Origin.of(options.model, model.title)
     text = card(options.out.name, content, model, model.diagnoser, origin, read_intervals(scores))
     with whole_file(options.out) as partial:

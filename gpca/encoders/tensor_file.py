@@ -57,10 +57,10 @@ def require_like(state: object, expected: Mapping[str, torch.Tensor], what: str)
     if not isinstance(state, Mapping) or set(state) != set(expected):
         raise ValueError(f"its {what} has different parts")
     for name, tensor in expected.items():
-        found = state[name]
-        if not isinstance(found, torch.Tensor) or found.shape != tensor.shape or found.dtype != tensor.dtype:
+        own = state[name]
+        if not isinstance(own, torch.Tensor) or own.shape != tensor.shape or own.dtype != tensor.dtype:
             raise ValueError(f"'{name}' of its {what} has a different shape or type")
-        if name.endswith("running_var") and (found < 0).any():
+        if name.endswith("running_var") and (own < 0).any():
             raise ValueError(f"'{name}' of its {what} contains negative variances")
 
 

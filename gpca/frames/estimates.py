@@ -51,7 +51,7 @@ def read_bop_results(
             another unit than millimeters.
     """
     rows = read_csv(path, RESULT_COLUMNS, others=ANY, remedy=REMEDY)
-    found: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
+    scored_poses: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
     ratios = []
     for number, row in enumerate(rows.to_dict("records"), start=2):
         subject = f"{path}: line {number}"
@@ -65,10 +65,10 @@ def read_bop_results(
         if annotated := distances_m[key[:2]]:
             ratios.append(float(np.linalg.norm(pose[:3, 3]) / np.median(annotated)))
             _require_unit(subject, ratios[-1], ONE_OFF)
-        found.setdefault(key, []).append((score, pose))
+        scored_poses.setdefault(key, []).append((score, pose))
     if ratios:
         _require_unit(path, float(np.median(ratios)), HALF_OFF)
-    return {key: [T for _, T in sorted(poses, key=lambda pose: -pose[0])] for key, poses in found.items()}
+    return {key: [T for _, T in sorted(poses, key=lambda pose: -pose[0])] for key, poses in scored_poses.items()}
 
 
 def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.ndarray) -> np.ndarray:

@@ -32,7 +32,10 @@ def datasets_of(
     entries = resolve_datasets(datasets, data_dir)
     if not entries:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
-    return {name: Dataset(name, tuple(folders(entry, downloads)), **_given(entry)) for name, entry in entries.items()}
+    return {
+        name: Dataset(name, tuple(folders(entry, downloads)), **_dataset_options(entry))
+        for name, entry in entries.items()
+    }
 
 
 def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredModel]]:
@@ -89,7 +92,7 @@ def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
     return Surface(surface.name, np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64))
 
 
-def _given(entry: dict) -> dict:
-    given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
+def _dataset_options(entry: dict) -> dict:
+    options = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
     errors = Path(entry["errors"]) if entry["errors"] else None
-    return given | {"results": tuple(map(Path, entry["results"])), "errors": errors}
+    return options | {"results": tuple(map(Path, entry["results"])), "errors": errors}

@@ -29,16 +29,16 @@ def read_images(path: Path) -> dict[int, Any]:
         InputError: what :func:`gpca.io.structured_text.read_json` refuses, a key that is no number, or the same
             number twice.
     """
-    found: dict[int, Any] = {}
+    images: dict[int, Any] = {}
     for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
         try:
             image = whole(key)
         except ValueError as fault:
             raise InputError(path, f"its key {key[:40]!r} is not an image number", REMEDY) from fault
-        if image in found:
+        if image in images:
             raise InputError(path, f"image {image} occurs twice", "keep one of the two")
-        found[image] = entry
-    return found
+        images[image] = entry
+    return images
 
 
 def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:

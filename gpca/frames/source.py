@@ -63,16 +63,16 @@ def _is_absent(entry: dict, data_dir: str | None) -> bool:
 
 
 def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
-    found = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
-    given = found.get("results") or []
-    named = [_below(data_dir, path) for path in ([given] if isinstance(given, str) else given)]
-    found["results"] = [str(path) for pattern in named for path in _matching(pattern)]
-    errors = _matching(_below(data_dir, found["errors"])) if found.get("errors") else []
-    found["errors"] = str(errors[0]) if errors else None
-    for path in (*found["results"], found["errors"]):
+    resolved = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
+    results = resolved.get("results") or []
+    named = [_below(data_dir, path) for path in ([results] if isinstance(results, str) else results)]
+    resolved["results"] = [str(path) for pattern in named for path in _matching(pattern)]
+    errors = _matching(_below(data_dir, resolved["errors"])) if resolved.get("errors") else []
+    resolved["errors"] = str(errors[0]) if errors else None
+    for path in (*resolved["results"], resolved["errors"]):
         if path and not Path(path).is_file():
             raise InputError(path, "no such results file", f"correct results and errors of dataset {name}")
-    return found
+    return resolved
 
 
 def _below(data_dir: str | None, path: str) -> Path:

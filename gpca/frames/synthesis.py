@@ -86,24 +86,26 @@ def _register_one(
 ) -> tuple[dict, str]:
     index = int(instances.object_index[i])
     diameter_m = float(objects.diameters_m[index])
-    given = settings.registration
+    registration = settings.registration
     T_init_camera = inverse(instances.T_camera_object_init[i])
-    rows = random.permutation(len(instances.cloud_m(i)))[: given.cloud_points]
-    target_rows = random.permutation(len(objects.points(index)))[: given.cloud_points]
+    rows = random.permutation(len(instances.cloud_m(i)))[: registration.cloud_points]
+    target_rows = random.permutation(len(objects.points(index)))[: registration.cloud_points]
     points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
     perturbed = None
     lost_to = ""
     if concept == "overlap":
         if random.random() < settings.occluders:
-            share = random.uniform(*given.severities.crop)
+            share = random.uniform(*registration.severities.crop)
             kept_P = occlude(instances, i, instances.pixels_of(i)[rows], share, random)
             if kept_P is not None:
                 perturbed = Perturbed(points[kept_P], severity={"crop": float(1 - kept_P.mean())})
         lost_to = HALF_SPACE if perturbed is None else OCCLUDER
-    perturbed = PERTURBATIONS[concept](points, given.severities, random) if perturbed is None else perturbed
+    perturbed = PERTURBATIONS[concept](points, registration.severities, random) if perturbed is None else perturbed
     T_object_init = inverse(instances.T_camera_object_true[i]) @ instances.T_camera_object_init[i]
     T_true = scale_translation(T_object_init, 1 / diameter_m) @ perturbed.T_target_source_true
-    return align_pair(replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, given.icp), lost_to
+    return align_pair(
+        replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, registration.icp
+    ), lost_to
 
 
 def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict, trained: set[int]) -> dict:

@@ -207,12 +207,12 @@ def finite_numbers(value: Any, count: int, subject: object, name: str, remedy: s
 
 
 def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    content: dict[str, Any] = {}
     for key, value in pairs:
-        if key in found:
+        if key in content:
             raise ValueError(f"key {key[:40]!r} appears twice")
-        found[key] = value
-    return found
+        content[key] = value
+    return content
 
 
 def _no_constant(name: str) -> NoReturn:

@@ -132,16 +132,16 @@ def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: F
         fitness: share of source points with a correspondence where the registration ended.
         familiar: ranges of the clouds of the training, if the model has them.
     """
-    found = []
+    voids = []
     if (matches := round(fitness * len(source))) < FEWEST_MATCHES:
         ended = f"only {matches} of the source's points" if matches else "no source point"
-        found.append(Void(f"{ended} ended near the target", "the initial pose and the unit"))
+        voids.append(Void(f"{ended} ended near the target", "the initial pose and the unit"))
     if familiar is not None and familiar.is_foreign(source, target, FOREIGN):
-        found.append(Void("source and target differ in scale", "the unit and scale of both"))
+        voids.append(Void("source and target differ in scale", "the unit and scale of both"))
     if (bulk := _bulk(target)) < SMALLEST_BULK:
         span = f"{BULK:.0%} of the target's points span {bulk:.2g} of its diameter"
-        found.append(Void(span, "the target for points far from the object"))
-    return found
+        voids.append(Void(span, "the target for points far from the object"))
+    return voids
 
 
 def _bulk(points: np.ndarray) -> float:

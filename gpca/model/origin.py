@@ -73,10 +73,10 @@ class Origin:
             InputError: provenance that is missing or incomplete, objects drawn by the package, data without a license.
         """
         record = _provenance(model)
-        found = [match.groups() for path in record["inputs_sha256"] if (match := _READ.search(f"/{path}"))]
-        if not found:
+        learned_from = [match.groups() for path in record["inputs_sha256"] if (match := _READ.search(f"/{path}"))]
+        if not learned_from:
             raise InputError(_beside(model), "lists nothing that a model learns from", REMEDY)
-        sources = (_source(model.parent, name, kind == "model_causes", title) for kind, name in found)
+        sources = (_source(model.parent, name, kind == "model_causes", title) for kind, name in learned_from)
         try:
             return cls(record, tuple(sources))
         except (LookupError, TypeError, AttributeError) as fault:

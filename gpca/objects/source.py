@@ -55,7 +55,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             procedural.require_family(candidate["family"])
             return {**candidate, "origin": "procedural"}
         module = _module_of(candidate.get("kind"))
-        if folder := _found(candidate, data_dir):
+        if folder := _local_data(candidate, data_dir):
             if require_entry := getattr(module, "require_entry", None):
                 require_entry(candidate, folder)
             return {**candidate, "origin": "local", "location": os.path.abspath(folder)}
@@ -110,8 +110,8 @@ def data_files(entry: dict) -> list[Path]:
     if entry["origin"] != "local":
         return []
     patterns = entry.get("files") or ["*", "models/*"]
-    found = {path for pattern in patterns for path in Path(entry["location"]).glob(pattern)}
-    return sorted(path for path in found if path.is_file())
+    matching = {path for pattern in patterns for path in Path(entry["location"]).glob(pattern)}
+    return sorted(path for path in matching if path.is_file())
 
 
 def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str, str]:
@@ -136,7 +136,7 @@ def _unpacked(file: Path) -> Path:
     return archive.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
 
 
-def _found(entry: dict, data_dir: str | None) -> Path | None:
+def _local_data(entry: dict, data_dir: str | None) -> Path | None:
     location, patterns = entry.get("location"), entry.get("files")
     folder = require_place(Path(data_dir or "", require_place(location or "")))
     for pattern in patterns or ():

@@ -49,7 +49,7 @@ def align_by_small_gicp(
     package.estimate_covariances(source, num_neighbors=neighbours, num_threads=1)
 
     def step(T_target_source: np.ndarray, iterations: int) -> np.ndarray:
-        found = package.align(
+        result = package.align(
             target,
             source,
             tree,
@@ -60,7 +60,7 @@ def align_by_small_gicp(
             rotation_epsilon=LAST_STEP,
             translation_epsilon=LAST_STEP,
         )
-        return as_array(found.T_target_source)
+        return as_array(result.T_target_source)
 
     T_found = step(pair.T_target_source_init, max_iterations)
     failure = failure_of_a_step(pair, T_found, step(T_found, 1), max_iterations)

@@ -157,12 +157,12 @@ def align_by_open3d(
     def icp(iterations: int) -> ICP:
         return ICP(pair.target, normals, ICPSettings(method, correspondence_distance, iterations), kernel)
 
-    found = icp(max_iterations).register(pair.source, pair.T_target_source_init)
-    if found.fitness == 0:
+    result = icp(max_iterations).register(pair.source, pair.T_target_source_init)
+    if result.fitness == 0:
         raise FailedRegistration(f"no source point has a target point within {correspondence_distance:g} diameters")
-    step = icp(1).register(pair.source, found.T_target_source)
-    failure = failure_of_a_step(pair, found.T_target_source, step.T_target_source, max_iterations)
-    return Outcome(found.T_target_source, found.fitness, found.inlier_rmse, failure)
+    step = icp(1).register(pair.source, result.T_target_source)
+    failure = failure_of_a_step(pair, result.T_target_source, step.T_target_source, max_iterations)
+    return Outcome(result.T_target_source, result.fitness, result.inlier_rmse, failure)
 
 
 def failure_of_a_step(pair: Pair, T_found: np.ndarray, T_further: np.ndarray, max_iterations: int) -> str:

@@ -25,7 +25,7 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
 from gpca.experiments.new_concepts.self_supervision import self_supervised
-from gpca.explainers.pair_classifier import NormalisedDescriptors
+from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.features.dataset import Descriptors, describe_all
 from gpca.features.registered import describe_registrations
 from gpca.features.settings import GROUPS, DescriptorSettings
@@ -137,7 +137,7 @@ class _Work:
 
 
 def _normalized(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) -> np.ndarray:
-    return NormalisedDescriptors(*axes, "new_concepts").fit(measured_S_F[train_S])(measured_S_F)
+    return NormalizedFeatures(*axes, "new_concepts").fit(measured_S_F[train_S])(measured_S_F)
 
 
 def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str | None = None) -> dict[str, Embedded]:
