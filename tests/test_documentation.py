@@ -15,7 +15,7 @@ import yaml
 
 from gpca.__main__ import COMMANDS
 from gpca.experiments.controls.settings import CONTROLS
-from gpca.experiments.results import registered
+from gpca.experiments.registry import registered
 from gpca.objects.entry import Source
 
 from .documents import PAGES, ROOT, anchor_of, commands, our_files, relative

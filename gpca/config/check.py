@@ -4,14 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gpca.config.checks import check_shared, resolve_sources
-from gpca.config.command_line import with_types
-from gpca.config.layers import with_defaults
+from gpca.causes.settings import CauseSettings
+from gpca.config.layers import with_defaults, with_types
 from gpca.config.leave_out import check_left_out, names_left_out, without_false
 from gpca.config.schema import whole_config
+from gpca.encoders.registry import require_backbone
+from gpca.encoders.settings import require_draws
+from gpca.errors import InputError, require_names, with_key
+from gpca.experiments.experiment import LeftOut
 from gpca.experiments.registry import experiments
+from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.frames.source import REAL_WORLD
 from gpca.io.structured_text import require_plain
+from gpca.objects.source import require_place, resolve
 from gpca.settings import read_settings
+
+# Folders of results/ that no run may take: reference runs are kept in one, logs beside all runs in the other.
+TAKEN = ("reference", "logs")
+BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32
+LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the paper's protocol take a thousandth
 
 
 def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:
@@ -57,3 +68,98 @@ def check(config: dict) -> dict[str, dict]:
     for experiment in experiments():
         experiment.check(whole, left_out)
     return resolve_sources(whole)
+
+
+def check_shared(config: dict, left_out: LeftOut) -> None:
+    """Check all sections that are no experiment's own, but the sources.
+
+    Raises:
+        InputError: a value that no run can use; the line names its key.
+    """
+    _check_places(config)
+    _check_registrations(config)
+    _check_encoders(config, left_out)
+    _check_explainers(config, left_out)
+    _check_model(config, left_out)
+
+
+def _check_places(config: dict) -> None:
+    """Check the run's name, and the folders that data comes from and downloads go to; reads no data."""
+    if config["run"].lower() in TAKEN:
+        raise InputError("config key run", f"results/{config['run']} is reserved", "choose another name")
+    if config["data_dir"] is not None:
+        with_key("data_dir", require_place, config["data_dir"])
+    folder = with_key("downloads", require_place, config["downloads"])
+    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    if not existing.is_dir():
+        raise InputError("config key downloads", f"{existing} is not a folder", "name a folder; it need not exist")
+
+
+def _check_registrations(config: dict) -> None:
+    """Check that settings agree with each other, and that the samples of one file can be held in memory."""
+    if (method := config["registrations"]["icp"]["method"]) != "point_to_point":
+        fault = f"is '{method}', but uncertainty and causes are measured by reruns of point-to-point ICP"
+        remedy = "use point_to_point; exchange.methods puts other methods beneath the explainers"
+        raise InputError("config key registrations.icp.method", fault, remedy)
+    for key, causes in {"causes": {}, "model.causes": config["model"]["causes"]}.items():
+        with_key(key, CauseSettings.from_dict, config["causes"] | causes, config["registrations"]["icp"])
+    cloud_points = "registrations.cloud_points", config["registrations"]["cloud_points"]
+    for section, (key, points) in {
+        "registrations": cloud_points,
+        "real_world": cloud_points,
+        "causes": ("causes.points", config["causes"]["points"][1]),
+    }.items():
+        samples = config[section]["train"] + config[section]["test"]
+        size = samples * points * BYTES_PER_POINT
+        if size > LARGEST_BYTES:
+            fault = f"{samples} samples take {size / 2**30:.0f} GiB of points, all held by one job"
+            raise InputError(f"config key {section}.train", fault, f"use fewer or lower {key}")
+
+
+def _check_encoders(config: dict, left_out: LeftOut) -> None:
+    """Check the backbones and their draws, and the encoder whose embeddings are explained.
+
+    How many points a depth frame has of an object is not known here, and clouds of fewer points than a draw repeat
+    some; so draws from those are not checked.
+    """
+    for name, encoder in config["encoders"].items():
+        with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
+        require_draws(
+            f"encoders.{name}", encoder, config["registrations"]["cloud_points"], "registrations.cloud_points"
+        )
+    encoders = config["encoders"]
+    require_names("embedding.encoder", [config["embedding"]["encoder"]], encoders, "encoder", left_out("encoders"))
+
+
+def _check_explainers(config: dict, left_out: LeftOut) -> None:
+    """Check that every explainer exists, takes its settings, and finds the uncertainty and the points that it reads."""
+    points = config["registrations"]["cloud_points"]
+    for name, settings in config["explainers"].items():
+        key = f"explainers.{name}"
+        with_key(key, require_settings, name, settings or {})
+        if design := explainer_entry(name).design:
+            require_names(key, [design], config["uncertainty"], "uncertainty", left_out("uncertainty"))
+        if (neighbors := (settings or {}).get("neighbours", 0)) > points:
+            fault = f"{neighbors} neighbors are too many for {points} points of a cloud"
+            raise InputError(f"config key {key}.neighbours", fault, "lower it, or raise registrations.cloud_points")
+
+
+def _check_model(config: dict, left_out: LeftOut) -> None:
+    """Check the names that the figures of one registration, and the model, depend on."""
+    model, sources = config["model"], config["sources"]
+    require_names("figures.source", [config["figures"]["source"]], sources, "source", left_out("sources"))
+    require_names("model.source", [model["source"]], (*sources, REAL_WORLD), "source", left_out("sources"))
+    require_names("model.encoder", [model["encoder"]], config["encoders"], "encoder", left_out("encoders"))
+
+
+def resolve_sources(config: dict) -> dict[str, dict]:
+    """Return the resolved entry of every source, by name, with ``stand_in`` set.
+
+    Raises:
+        InputError: an unknown kind or family; data that is neither in its folder nor downloadable.
+    """
+    return {
+        name: {"stand_in": entry["kind"] == "procedural"}
+        | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
+        for name, entry in config["sources"].items()
+    }

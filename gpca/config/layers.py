@@ -1,4 +1,4 @@
-"""Configs laid over each other: the defaults of the suite, and files of a user's own over them."""
+"""Configs laid over each other: the defaults of the suite, files of a user's own, the values of ``--config``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from gpca.code_files import ROOT
 from gpca.errors import InputError
-from gpca.io.structured_text import read_mapping
+from gpca.io.structured_text import read_mapping, read_scalar
 
 DEFAULTS = tuple(ROOT / "config" / name for name in ("sources.yaml", "readings.yaml", "config.yaml"))
 TEMPLATE = "__use_yte__"  # lets Snakemake run code that stands in a config
@@ -50,3 +50,33 @@ def _laid_over(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, 
         merged = isinstance(value, Mapping) and isinstance(below, Mapping)
         whole[key] = _laid_over(below or {}, value) if merged else value
     return whole
+
+
+def with_types(config: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the config with the command line's values read as in a config file: numbers, booleans, null.
+
+    Snakemake reads those inside lists and mappings as text, whatever they are.
+
+    Args:
+        config: of the run, in which values from the command line are laid over the others.
+        given: of the command line alone, as Snakemake parsed it. Only what is the same in the config is read anew: a
+            workflow that uses this one as a module may have a config of its own.
+    """
+    return {
+        name: _typed(value, given[name]) if isinstance(given, Mapping) and name in given else value
+        for name, value in config.items()
+    }
+
+
+def _typed(value: Any, given: Any) -> Any:
+    if isinstance(value, Mapping) and isinstance(given, Mapping):
+        return with_types(value, given)
+    return _read(value) if value == given else value
+
+
+def _read(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _read(entry) for name, entry in value.items()}
+    if isinstance(value, list):
+        return [_read(entry) for entry in value]
+    return read_scalar(value) if isinstance(value, str) else value

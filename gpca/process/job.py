@@ -1,4 +1,4 @@
-"""A job of the workflow: what its rule gives a step, and how the step runs and ends."""
+"""A job of the workflow: what its rule gives a step or a script, and how that runs and ends."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from gpca.errors import InputError
@@ -69,15 +71,13 @@ def run_step(snakemake: Any) -> None:
     names = {"threads": snakemake.threads} | dict(snakemake.wildcards.items()) | dict(snakemake.params.items())
     prepare(names["threads"])  # before NumPy, torch and numba are loaded
     keep_freed_memory()
-    if snakemake.log:
-        log = os.open(snakemake.log[0], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
-        os.dup2(log, sys.stderr.fileno())
+    _print_to(snakemake.log)
     module = names.pop("step")
     names |= {"seed": int(names["seed"])} if "seed" in names else {}
     names["settings"] = json.loads(names.get("settings", "{}"))
     folders = names.pop("folders", {})
     names |= {"data_dir": folders.get("data_dir"), "downloads": Path(folders.get("downloads") or "")}
-    job = Job(**names, **_paths(snakemake.input), **_paths(snakemake.output))
+    job = Job(**names, **files_by_name(snakemake.input), **files_by_name(snakemake.output))
     sys.exit(as_process(module, lambda: call(module, job)))
 
 
@@ -89,7 +89,29 @@ def call(step: str, job: Job) -> None:
     module.run(job)
 
 
-def _paths(files: Any) -> dict[str, Path | list[Path]]:
+@contextmanager
+def workflow_script(snakemake: Any) -> Iterator[None]:
+    """Run the block as a script of the workflow: stderr in the rule's log, provenance beside the outputs.
+
+    A fault of the input ends as one line in the log and status 2.
+
+    Args:
+        snakemake: the object that Snakemake gives a script; the input ``code`` is no data.
+    """
+    from gpca.process.provenance import record_provenance
+
+    _print_to(snakemake.log)
+    lists = (paths if isinstance(paths, list) else [paths] for paths in files_by_name(snakemake.input).values())
+    data = [path for paths in lists for path in paths]
+    parameters = {name: value for name, value in snakemake.params.items() if isinstance(name, str)}
+    with _as_process() as process, record_provenance(list(snakemake.output), data, parameters):
+        yield
+    if process.status:
+        sys.exit(process.status)
+
+
+def files_by_name(files: Any) -> dict[str, Path | list[Path]]:
+    """Return the inputs or outputs of a rule by name, a path or a list of them each, without ``code``."""
     return {
         name: Path(value) if isinstance(value, str) else [Path(path) for path in value]
         for name, value in files.items()
@@ -97,23 +119,38 @@ def _paths(files: Any) -> dict[str, Path | list[Path]]:
     }
 
 
+def _print_to(logs: Any) -> None:
+    """Let what the process and its libraries print to stderr go to the rule's log, if it has one."""
+    if logs:
+        os.dup2(os.open(logs[0], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666), sys.stderr.fileno())
+
+
 def as_process(name: str, function: Callable[[], int | None]) -> int:
     """Call a function and return the status of the process: 0, or what the function returns.
 
     A fault of the input ends as one line on stderr and status 2, Ctrl-C as status 130.
     """
+    with _as_process(f"{name}: ") as process:
+        process.status = function() or 0
+    return process.status
+
+
+@contextmanager
+def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
+    """Give the block a `status` to set; the faults that end in one line set it themselves."""
+    process = SimpleNamespace(status=0)
     try:
         with certain_interrupts(), standard_streams():
-            return function() or 0
+            yield process
     except (InputError, OSError) as fault:
-        say(f"{name}: {fault}")
-        return 2
+        say(f"{prefix}{fault}")
+        process.status = 2
     except MemoryError:
-        say(f"{name}: this machine ran out of memory; use smaller settings or another machine")
-        return 2
+        say(f"{prefix}this machine ran out of memory; use smaller settings or another machine")
+        process.status = 2
     except KeyboardInterrupt:
-        say(f"{name}: stopped; repeat the command to continue")
-        return 130
+        say(f"{prefix}stopped; repeat the command to continue")
+        process.status = 130
 
 
 def keep_freed_memory() -> None:

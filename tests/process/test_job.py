@@ -1,4 +1,5 @@
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -88,3 +89,49 @@ def test_a_script_of_the_workflow_runs_a_step_with_what_its_rule_gives(tmp_path,
         "some": ["a", "b"],
         "out": "out.json", "data_dir": "data", "downloads": ".",
     }  # fmt: skip
+
+
+SCRIPT = """
+import sys
+from snakemake.iocontainers import InputFiles, Log, OutputFiles, Params
+from types import SimpleNamespace
+from gpca.errors import InputError
+from gpca.process.job import workflow_script
+snakemake = SimpleNamespace(
+    input=InputFiles(fromdict={"predictions": ["predictions.csv"], "code": ["module.py"]}),
+    output=OutputFiles(toclone=["table.md"]),
+    params=Params(fromdict={"title": "A title"}),
+    log=Log(toclone=["log.txt"]),
+)
+with workflow_script(snakemake):
+    print("working", file=sys.stderr)
+"""
+
+
+def run_script(folder, body):
+    (folder / "predictions.csv").write_text("sample\n")
+    (folder / "module.py").write_text("")
+    environment = {"PYTHONPATH": str(ROOT), "PATH": os.environ["PATH"]}
+    command = [sys.executable, "-c", f"{SCRIPT}    {body}\n"]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("", "")
+    return done.returncode, (folder / "log.txt").read_text()
+
+
+def test_a_fault_in_a_script_is_one_line_in_the_log_and_status_2(tmp_path):
+    status, log = run_script(tmp_path, 'raise InputError("metrics.csv", "is empty", "regenerate it")')
+    assert (status, log) == (2, "working\nmetrics.csv: is empty; regenerate it\n")
+    assert not list(tmp_path.glob("*.provenance.json"))
+
+
+def test_the_provenance_of_a_scripts_outputs_names_data_and_parameters_but_not_code(tmp_path):
+    assert run_script(tmp_path, 'open("table.md", "w").write("a table")') == (0, "working\n")
+    record = json.loads((tmp_path / "table.md.provenance.json").read_text())
+    assert list(record["inputs_sha256"]) == ["predictions.csv"]
+    assert record["settings"] == {"title": "A title"}
+
+
+def test_another_error_of_a_script_keeps_its_traceback(tmp_path):
+    status, log = run_script(tmp_path, "1 / 0")
+    assert status == 1
+    assert "ZeroDivisionError" in log

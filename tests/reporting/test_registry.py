@@ -3,8 +3,8 @@ import json
 
 import pytest
 
-from gpca.experiments import results as registry
-from gpca.experiments.results import registered, results_of
+from gpca.experiments import registry
+from gpca.experiments.registry import registered, results_of
 from gpca.page.page import rendered_caption
 from gpca.registry import load
 from gpca.reporting.registry import Input, Result, build, by_section, targets, unknown_target

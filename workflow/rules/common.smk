@@ -71,7 +71,7 @@ def shapes_code(families):
 
 
 def collector_code(function):
-    return code_files(function.split(":")[0], "gpca.reporting.script")
+    return code_files(function.split(":")[0], "gpca.process.job")
 
 
 def read_by(cause_explainer):

@@ -61,7 +61,7 @@ rule comparison:
             "gpca.comparison.clusters",
             "gpca.comparison.readings",
             "gpca.reporting.tables.comparison",
-            "gpca.reporting.script",
+            "gpca.process.job",
         ),
     output:
         csv="<results>/comparison.csv",
@@ -99,7 +99,7 @@ rule page:
             f"<results>/uncertainty/{{source}}/causal/seed{SEEDS[0]}.csv",
             source=UNCERTAIN,
         ),
-        code=code_files("gpca.page.page", "gpca.page.crate", "gpca.reporting.script"),
+        code=code_files("gpca.page.page", "gpca.page.crate", "gpca.process.job"),
     output:
         page="<results>/index.html",
         crate="<results>/ro-crate-metadata.json",

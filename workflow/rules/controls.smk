@@ -23,7 +23,7 @@ rule train_control:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
         code=code_files(
-            "gpca.experiments.controls.train_step", encoder_module(CONTROL_ENCODER)
+            "gpca.experiments.controls.encoding", encoder_module(CONTROL_ENCODER)
         ),
     output:
         embeddings="<results>/control_embeddings/{control}/{source}/seed{seed}.npz",
@@ -38,7 +38,7 @@ rule train_control:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.controls.train_step",
+        step="gpca.experiments.controls.encoding",
         settings=lambda wildcards: control_settings(wildcards),
     script:
         "../scripts/step.py"

@@ -71,7 +71,7 @@ rule fit_learners:
     input:
         sets=collect("<results>/shifted/{{source}}/seed{seed}.npz", seed=SEEDS),
         code=code_files(
-            "gpca.experiments.out_of_distribution.learners_step",
+            "gpca.experiments.out_of_distribution.learners",
             *map(explainer_module, LEARNER_SETTINGS),
         ),
     output:
@@ -88,7 +88,7 @@ rule fit_learners:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.out_of_distribution.learners_step",
+        step="gpca.experiments.out_of_distribution.learners",
         settings=as_json(LEARNER_SETTINGS),
         learners=list(LEARNER_SETTINGS),
         seeds=SEEDS,

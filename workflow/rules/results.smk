@@ -1,5 +1,5 @@
 # Every table and figure of the registry, gpca/reporting/results.yaml: a rule of its name for each.
-from gpca.experiments.results import results_of
+from gpca.experiments.registry import results_of
 from gpca.reporting.registry import SUFFIXES
 
 RESULTS = results_of(NAMES)
@@ -28,7 +28,7 @@ for result in RESULTS:
             result.name
         input:
             **below_results(result.files(NAMES)),
-            code=code_files(*result.modules, "gpca.reporting.script"),
+            code=code_files(*result.modules, "gpca.process.job"),
         output:
             **outputs(result),
         log:

@@ -10,10 +10,10 @@ from gpca.comparison.values import measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
 from gpca.io.csv_file import write_csv
 from gpca.io.files import whole_file
-from gpca.reporting.script import job
+from gpca.process.job import workflow_script
 from gpca.reporting.tables.comparison import comparison_markdown
 
-with job(snakemake):
+with workflow_script(snakemake):
     given, params = snakemake.input, snakemake.params
     numbers = read_published()
     tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in params.tolerances.items()}

@@ -5,9 +5,9 @@ from pathlib import Path
 from gpca.page.crate import write_crate
 from gpca.page.findings import Titles
 from gpca.page.page import Run, Shown, write_page
-from gpca.reporting.script import job
+from gpca.process.job import workflow_script
 
-with job(snakemake):
+with workflow_script(snakemake):
     given, files = snakemake.params, snakemake.input
     samples = {
         source: {"registrations": registrations, "predictions": predictions}

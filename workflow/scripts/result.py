@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
+from gpca.process.job import files_by_name, workflow_script
 from gpca.reporting.figures.style import save_figure
 from gpca.reporting.registry import build
-from gpca.reporting.script import data_of, job
 
-with job(snakemake):
+with workflow_script(snakemake):
     entry, out = snakemake.params, snakemake.output
-    made = build(entry.builder, entry.readers, data_of(snakemake.input), entry.arguments)
+    made = build(entry.builder, entry.readers, files_by_name(snakemake.input), entry.arguments)
     if entry.kind == "tables":
         made.write(Path(out.csv).with_suffix(""))
     else:

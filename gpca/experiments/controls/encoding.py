@@ -1,17 +1,25 @@
-"""Encoders that are trained under a control, and the embeddings that explainers read there."""
+"""Step ``train_control``: registrations -> embeddings by an encoder that is trained under a control."""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.controls.settings import ControlSettings
-from gpca.experiments.controls.variants import of_unseen_objects
+from gpca.experiments.controls.variants import left_out, of_unseen_objects
+from gpca.io.arrays import save_arrays
+from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations
+from gpca.process.job import Job
+from gpca.process.provenance import record_provenance
+
+CURVE = ("epoch", "learning_rate", "loss", "accuracy")
 
 
 def encode(
@@ -50,3 +58,20 @@ def nothing() -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
     """Return the result for a control that is left out: arrays without samples, and no epoch."""
     empty = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
     return {**empty, "sample": np.zeros(0, int), "split": np.zeros(0, "U5")}, []
+
+
+def run(job: Job) -> None:
+    """Train, keeping a checkpoint, and embed every sample; none where the registrations do not admit the control."""
+    settings, encoder = ControlSettings.from_dict(job.section("controls")), EncoderSettings(**job.section("encoder"))
+    checkpoint = job.embeddings.with_suffix(".checkpoint")
+    with record_provenance([job.embeddings, job.curve], [job.registrations], job.settings, seed=job.seed):
+        registrations = Registrations.load(job.registrations, (job.source, job.seed))
+        if why := left_out(job.control, registrations, settings, encoder.backbone):
+            print(f"control '{job.control}' of {job.source} is skipped: {why}", file=sys.stderr)
+            arrays, curve = nothing()
+        else:
+            axes = (job.source, job.seed, settings, encoder, checkpoint)
+            arrays, curve = encode(job.control, registrations, *axes)
+        save_arrays(job.embeddings, arrays, registrations.axes)
+        write_csv(job.curve, pd.DataFrame(curve, columns=list(CURVE)), form="%.6g")
+        checkpoint.unlink(missing_ok=True)

@@ -11,7 +11,7 @@ import numpy as np
 from gpca.causes.truth import FAILED
 from gpca.errors import InputError
 from gpca.experiments.method.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
-from gpca.experiments.recovery.policy_figure import short_action
+from gpca.experiments.recovery.figures import short_action
 from gpca.reporting.figures.cloud_views import draw_clouds
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.style import (

@@ -1,4 +1,4 @@
-"""Turns the actions of the policies into metrics of every policy, cause and seed, in one tidy table."""
+"""Turns the actions of the policies, and the labels of queued cases, into metrics over causes and seeds."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import ALL, tidy
 from gpca.errors import InputError
-from gpca.io.csv_file import numbers, read_csv
+from gpca.io.csv_file import numbers, read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import NOTHING, QUEUE
 from gpca.seeds import seed_of_file
@@ -21,6 +22,8 @@ RECOVERY_COLUMNS = ("episode", "cause", "policy", "step", "action", "failed", "r
 _OTHERS = ("object", "symmetric", "concept", "score_*", "bald", "error_before", "error_after")
 SECONDS = ("explanation_seconds", "action_seconds")
 FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
+DOUBTED, DRAWN = "queued", "random"  # which cases are labeled next: those in doubt, or any
+QUEUE_COLUMNS = ("policy", "order", "draw", "labels", "failures", "unsolved")
 
 
 def collect_recovery(
@@ -115,3 +118,26 @@ def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = A
         return None
     weight_R = count_R[share_R.index]
     return float((share_R * weight_R).sum() / weight_R.sum()), int(weight_R.sum())
+
+
+def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return ``policy, order, labels, failures, error, low, high``: shares of the failures of all seeds.
+
+    Only numbers of labels that every seed has are kept. Of random orders it is the mean; the bounds are Wilson's, as if
+    each failure were judged once.
+
+    Raises:
+        InputError: a missing column, or no rows.
+    """
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        rows = read_numbers(path, QUEUE_COLUMNS, QUEUE_COLUMNS[2:])
+        mean = rows.groupby(["policy", "order", "labels"], sort=False)[["failures", "unsolved"]].mean()
+        parts.append(mean.reset_index())
+    grouped = pd.concat(parts).groupby(["policy", "order", "labels"], sort=False)
+    together = grouped[["failures", "unsolved"]].sum()[grouped.size() == len(parts)].reset_index()
+    shares = [wilson_interval(row.unsolved, int(row.failures)) for row in together.itertuples()]
+    together[["low", "high"]] = pd.DataFrame(shares, index=together.index)
+    return together.assign(error=together["unsolved"] / together["failures"]).drop(columns="unsolved")

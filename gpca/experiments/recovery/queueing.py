@@ -15,7 +15,7 @@ import numpy as np
 from gpca.experiments.recovery.answers import answers_of, starts_of
 from gpca.experiments.recovery.episodes import Episode
 from gpca.experiments.recovery.loop_explainers import LoopExplainers
-from gpca.experiments.recovery.queue_file import DOUBTED, DRAWN, QUEUE_COLUMNS
+from gpca.experiments.recovery.metrics import DOUBTED, DRAWN, QUEUE_COLUMNS
 from gpca.experiments.recovery.rehearsal import Rehearsal, known
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

@@ -22,7 +22,7 @@ class Section(ReadingSizes):
     """
 
     frame_seeds: Annotated[int, Bounds(minimum=0)]
-    groups: Annotated[dict, Keys({name: group.choices for name, group in GROUPS.items()})]
+    groups: Annotated[dict, Keys({name: group.values for name, group in GROUPS.items()})]
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from gpca.attribution.metrics import ALL
 from gpca.attribution.predictions import read_predictions
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.experiments.specification_curve.judged import Values, accuracies_of_named
+from gpca.experiments.specification_curve.diagnostics import Values, accuracies_of_named
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations

@@ -19,7 +19,7 @@ from gpca.classifier.covariances import make_covariance
 from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import SparseGPs
-from gpca.experiments.specification_curve.judged import accuracies, table5
+from gpca.experiments.specification_curve.diagnostics import accuracies, table5
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.perturbation import CONCEPTS

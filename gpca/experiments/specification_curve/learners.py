@@ -1,4 +1,4 @@
-"""Table V's learners under other readings: the GPC's kernel, which linear SVM, which head trained the encoder."""
+"""Table V's learners under other readings: the kernel, the linear SVM, the encoder's head; and classic features."""
 
 from __future__ import annotations
 
@@ -13,15 +13,24 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.experiments.specification_curve.judged import accuracies, table5
+from gpca.experiments.specification_curve.diagnostics import accuracies, table5
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
+from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.concept_classifier import PAPERS_RANDOM_STATE
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
 FOREST, SVM = "learner_forest", "learner_linear_svm"
+# Columns of the features: the residual first, the ratio of the point counts last.
+FEATURES = {
+    "all": slice(None),
+    "no_counts": slice(None, -1),
+    "no_residual": slice(1, None),
+    "residual": slice(0, 1),
+    "counts": slice(-1, None),
+}
 
 
 def kernel(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
@@ -97,3 +106,18 @@ def encoder_head(run_files: RunFiles, readings: Sequence[Reading], sizes: Readin
                 for method, scores_S_C in {**of_head, SVM: svm_S_C}.items():
                     for (metric, concept), value in accuracies(test.concept, scores_S_C).items():
                         yield reading, source, method, metric, concept, seed, value
+
+
+def classic_features(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+    """Yield the accuracies of the paper's GPC on each choice of features."""
+    for (source, seed), path in run_files.registrations.items():
+        registrations = Registrations.load(path, (source, seed))
+        features_S_F = analytical_features(registrations, source, seed, "analytical")
+        train, test = (registrations.rows(split) for split in ("train", "test"))
+        for reading in readings:
+            chosen_S_F = features_S_F[:, FEATURES[reading["features"]]]
+            gpc = GPC(CONCEPTS, GPCSettings(**run_files.section("gpca_paper")), source, seed)
+            gpc.fit(chosen_S_F[train], registrations.concept[train])
+            scores_S_C, _, _ = gpc.attribute(chosen_S_F[test])
+            for (metric, concept), value in accuracies(registrations.concept[test], scores_S_C).items():
+                yield reading, source, "analytical_gpc", metric, concept, seed, value

@@ -1,15 +1,28 @@
-"""The groups of readings by name: the choice, the files and the function of each."""
+"""The groups of readings by name: the choices that the paper leaves open, the files and the function of each.
+
+``config/readings.yaml`` holds the values that are tried, with a comment on each.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
-from gpca.experiments.specification_curve import settings
+from gpca.classifier.settings import Kernel, LearningRate
+from gpca.pairs.reading import Reading as ReadAs
 from gpca.registry import load
+from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
 FRAME_INPUT = "frame_input"  # the group that trains an encoder of frames for each of its readings
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
+AtLeastTwo = Annotated[int, Bounds(minimum=2)]
+Divergence = Literal["divergence", "divergence_reversed", "log_determinant"]
+Quantity = Literal[Divergence, "trace", "residual", "inlier_rmse", "inlier_rmse_of_one"]
+ShiftedSet = Literal["in_distribution", "severity", "source", "objects"]
+JoinedSets = Literal["in_distribution+severity", "in_distribution+source", "seen_objects+objects"]
+Distance = Literal["knn_analytical", "mahalanobis_analytical", "knn_embedding", "mahalanobis_embedding"]
+ShownObjects = Literal["all", "seen", "unseen"]
 
 
 @dataclass(frozen=True)
@@ -18,7 +31,7 @@ class Group:
 
     Attributes:
         title: the open question in words.
-        choices: the class of its choices.
+        choices: the type of a value of each.
         run: ``module:function`` beside this module, of the files given, the readings and their sizes, that
             yields reading, source, method, metric, concept, seed and value, named as in published.csv.
         reads: kinds of files, fields of :class:`gpca.experiments.specification_curve.run_files.RunFiles`.
@@ -29,13 +42,19 @@ class Group:
     """
 
     title: str
-    choices: type
+    choices: Mapping[str, Any]
     run: str
     reads: tuple[str, ...]
     sources: tuple[str, ...] = ALL_SOURCES
     methods: tuple[str, ...] = ()
     explainers: tuple[str, ...] = ()
     costly: bool = False
+
+    @property
+    def values(self) -> Any:
+        """The type of its part of the config: one or more values of every choice."""
+        several = {name: Distinct[kind] for name, kind in self.choices.items()}  # type: ignore[valid-type]
+        return Annotated[dict, Keys(several, required=several)]
 
     @property
     def module(self) -> str:
@@ -47,25 +66,64 @@ class Group:
         return load(f"gpca.experiments.specification_curve.{self.run}")
 
 
-_LEARNERS = ("gpca_paper", "learner_forest", "learner_linear_svm")
 GROUPS = {
-    "sensitivity": Group("What SA differentiates", settings.Sensitivity, "knobs:sensitivity", ("registrations",)),
-    "shap": Group("What SHAP's uncertainty is of", settings.Shap, "knobs:shap", ("registrations",)),
+    "sensitivity": Group(
+        "What SA differentiates",
+        {
+            "quantity": Quantity,
+            "sign": Literal["signed", "absolute", "lowest"],
+            "unit": Literal["range", "own"],
+            "step": Literal["small", "middle"],
+        },
+        "knobs:sensitivity",
+        ("registrations",),
+    ),
+    "shap": Group(
+        "What SHAP's uncertainty is of",
+        {
+            "starts": AtLeastTwo,
+            "background": Literal["observed", "clean"],
+            "quantity": Divergence,
+            "floor": Positive,
+            "sign": Literal["signed", "absolute"],
+        },
+        "knobs:shap",
+        ("registrations",),
+    ),
     "severities": Group(
         "How strong the perturbations are",
-        settings.TestSeverities,
+        {"part": Literal["all", "weakest", "middle", "strongest"], "classifier": Literal["paper", "converged"]},
         "severities:run",
         ("registrations", "predictions"),
         methods=("gpca_paper", "gpca"),
     ),
     "gpc_start": Group(
-        "How the GPC starts", settings.GPCStart, "gpc_start:run", ("sets",), ("ycb", "linemod"), costly=True
+        "How the GPC starts",
+        {
+            "inputs": Literal["standardised", "unit_norm", "raw"],
+            "inducing": Literal["kmeans", "random"],
+            "lengthscale": Literal["median", "default"],
+            "batch": Literal["full", "minibatch"],
+        },
+        "gpc_start:run",
+        ("sets",),
+        ("ycb", "linemod"),
+        costly=True,
     ),
-    "kernel": Group("Kernel of Table V's GPC", settings.TableKernel, "learners:kernel", ("sets",)),
-    "linear_svm": Group("Which linear SVM", settings.LinearSVM, "learners:linear_svm", ("sets",)),
+    "kernel": Group("Kernel of Table V's GPC", {"kernel": Kernel, "iterations": Count}, "learners:kernel", ("sets",)),
+    "linear_svm": Group(
+        "Which linear SVM",
+        {
+            "machine": Literal["svc", "linear_svc"],
+            "inputs": Literal["standardised", "raw"],
+            "probability": Literal["platt", "softmax"],
+        },
+        "learners:linear_svm",
+        ("sets",),
+    ),
     "encoder_head": Group(
         "Head that trains the encoder",
-        settings.EncoderHead,
+        {"head": Literal["linear", "two_layer"], "inputs": Literal["standardised", "raw"]},
         "learners:encoder_head",
         ("registrations", "sets"),
         ("linemod",),
@@ -73,27 +131,48 @@ GROUPS = {
     ),
     "diagnostics": Group(
         "Set, distance, score and area of ρ, AUC and ECE",
-        settings.Diagnostics,
+        {
+            "set": Literal[ShiftedSet, JoinedSets],
+            "distance": Distance,
+            "score": Literal["max_score", "entropy", "bald"],
+            "area": Literal["aurc", "auroc_error"],
+        },
         "diagnostics:run",
         ("sets", "predictions"),
         ("ycb",),
-        _LEARNERS,
+        ("gpca_paper", "learner_forest", "learner_linear_svm"),
     ),
-    "pool": Group("Pool, batch and start of active learning", settings.LabelPool, "labels:pool", ("sets",)),
-    "epochs": Group("What an epoch is", settings.Epochs, "labels:epochs", ("sets",)),
+    "pool": Group(
+        "Pool, batch and start of active learning",
+        {"new_share": OpenShare, "batch": Count, "initial": AtLeastTwo},
+        "labels:pool",
+        ("sets",),
+    ),
+    "epochs": Group(
+        "What an epoch is",
+        {"learning_rate": LearningRate, "labels": Literal["at_target", "all"]},
+        "labels:epochs",
+        ("sets",),
+    ),
     "frames": Group(
         "What varies on depth frames",
-        settings.FrameRepeats,
+        {"repeats": Literal["everything", "classifiers", "samples"], "objects": ShownObjects},
         "frames:run",
         ("registrations", "predictions", "embeddings"),
         (),
     ),
     FRAME_INPUT: Group(
         "What the encoder sees on depth frames",
-        settings.FrameInput,
+        {"input": ReadAs, "objects": ShownObjects},
         "frame_input:run",
         ("registrations", "poses", "predictions"),
         (),
     ),
-    "features": Group("Classic features", settings.ClassicFeatures, "features:run", ("registrations",), ("ycb",)),
+    "features": Group(
+        "Classic features",
+        {"features": Literal["all", "no_counts", "no_residual", "residual", "counts"]},
+        "learners:classic_features",
+        ("registrations",),
+        ("ycb",),
+    ),
 }

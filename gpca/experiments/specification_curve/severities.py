@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from gpca.attribution.predictions import read_predictions
-from gpca.experiments.specification_curve.judged import accuracies_of_named
+from gpca.experiments.specification_curve.diagnostics import accuracies_of_named
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations

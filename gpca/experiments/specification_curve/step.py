@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any
 
 import pandas as pd
 
@@ -33,7 +33,7 @@ def run(job: Job) -> None:
     inputs = [path for of_kind in files.values() for path in of_kind.values()]
     with record_provenance([job.out], inputs, job.settings):
         run_files = RunFiles(**files, settings=job.settings)
-        readings = readings_of({name: choices[name] for name in get_type_hints(group.choices)})
+        readings = readings_of({name: choices[name] for name in group.choices})
         rows = group.function()(run_files, readings, ReadingSizes(**job.section("sizes")))
         records = [(name_of(job.group, reading), *value) for reading, *value in rows]
         if not records:

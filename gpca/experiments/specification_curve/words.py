@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 from gpca.experiments.specification_curve.registry import GROUPS
 
 _INPUTS = {"standardised": "standardized inputs", "unit_norm": "inputs of unit norm", "raw": "raw inputs"}
@@ -89,7 +87,7 @@ def reading_in_words(group: str, reading: str) -> str:
     Unknown values stay as they are.
     """
     values = reading.split("/")
-    names = [field.name for field in fields(GROUPS[group].choices)] if group in GROUPS else []
+    names = list(GROUPS[group].choices) if group in GROUPS else []
     if len(names) != len(values):
         return ", ".join(values)
     return ", ".join(_words(name, value) for name, value in zip(names, values, strict=True))

@@ -9,8 +9,7 @@ from typing import Any
 from gpca.alignment.methods.registry import installed, left_out, method_entry
 from gpca.errors import require_names, with_key
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Tidy
-from gpca.experiments.explained import require_explained, titles
-from gpca.experiments.substitution.asked import require_exchangeable
+from gpca.experiments.explained import require_exchangeable, require_explained, titles
 from gpca.experiments.substitution.settings import ExchangeSettings
 from gpca.explainers.registry import explainer_entry
 from gpca.settings import Distinct

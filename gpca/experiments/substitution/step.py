@@ -8,8 +8,8 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
 from gpca.experiments.controls.rivals import make_rivals
+from gpca.experiments.explained import require_exchangeable
 from gpca.experiments.judge import Judges
-from gpca.experiments.substitution.asked import require_exchangeable
 from gpca.experiments.substitution.exchange import Exchange
 from gpca.experiments.substitution.settings import ExchangeSettings
 from gpca.io.csv_file import write_csv

@@ -5,11 +5,10 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
+from gpca.experiments.controls.figures import SUCCEEDS, draw_severity_curves, draw_transfer
 from gpca.experiments.controls.intervals import COLUMNS as INTERVALS
 from gpca.experiments.controls.severity import COLUMNS as SEVERITIES
 from gpca.experiments.controls.severity import REGISTRATION
-from gpca.experiments.controls.severity_figure import SUCCEEDS, draw_severity_curves
-from gpca.experiments.controls.transfer_figure import draw_transfer
 
 EXPLAINERS = {"good": "Good", "poor": "Poor (forest)"}
 SOURCES = {"ycb": "YCB", "cups": "Cups"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.encoders.settings import EncoderSettings
-from gpca.experiments.new_concepts.self_supervision import self_supervised
+from gpca.experiments.new_concepts.step import self_supervised
 
 SETTINGS = EncoderSettings(draw_points=64, draws=1, epochs=30, batch_size=12, options={"k": 8, "point_features": 16})
 

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.metrics import TIDY_COLUMNS
-from gpca.experiments.out_of_distribution.selection import RHO, SHIFTED
+from gpca.experiments.out_of_distribution.tables import RHO, SHIFTED
 
 VALUES = {  # learner -> accuracy, ρ, area, ECE over three seeds
     "gpca": ([0.95, 0.96, 0.97], [0.50, 0.52, 0.54], 0.004, 0.05),

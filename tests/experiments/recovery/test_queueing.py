@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.recovery.queue_file import DOUBTED, DRAWN, read_queues
+from gpca.experiments.recovery.metrics import DOUBTED, DRAWN, read_queues
 from gpca.experiments.recovery.queueing import BATCH, DRAWS, ChancesLearner, error_by_labels
 from gpca.experiments.recovery.rehearsal import Rehearsal
 from gpca.io.csv_file import write_csv

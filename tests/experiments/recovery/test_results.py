@@ -10,9 +10,7 @@ from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
 from gpca.experiments.recovery.example_figure import draw_recovery_example
-from gpca.experiments.recovery.policy_figure import draw_mitigation
-from gpca.experiments.recovery.queue_figure import draw_queued_labels
-from gpca.experiments.recovery.rates_figure import draw_recovery_rates
+from gpca.experiments.recovery.figures import draw_mitigation, draw_queued_labels, draw_recovery_rates
 from gpca.experiments.recovery.tables import table8_recovery
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS

@@ -5,7 +5,7 @@ from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.experiments.runtime.runtime import measure
+from gpca.experiments.runtime.step import measure
 from gpca.io.csv_file import write_csv
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS, read_runtime
 

@@ -15,7 +15,6 @@ from gpca.errors import InputError
 from gpca.experiments.out_of_distribution.metrics import read_learner_predictions
 from gpca.experiments.specification_curve import (
     diagnostics,
-    features,
     frame_input,
     frames,
     gpc_start,
@@ -23,7 +22,7 @@ from gpca.experiments.specification_curve import (
     learners,
     severities,
 )
-from gpca.experiments.specification_curve.judged import accuracies
+from gpca.experiments.specification_curve.diagnostics import accuracies
 from gpca.experiments.specification_curve.settings import ReadingSizes
 from gpca.pairs.perturbation import CONCEPTS
 from tests.experiments.specification_curve.conftest import SECTIONS, rows_of
@@ -163,7 +162,7 @@ def test_repeats_on_frames_vary_in_what_they_say(run_files, embedded, tmp_path):
 
 
 def test_features_are_chosen_by_name(run_files):
-    found = rows_of(features.run, run_files, {"features": ["all", "counts", "residual"]})
+    found = rows_of(learners.classic_features, run_files, {"features": ["all", "counts", "residual"]})
     counts = {reading[0]: v for (reading, _, _, concept), v in found.items() if concept == "overlap"}
     assert counts["counts"] == 1  # a cropped cloud has fewer points
     assert counts["residual"] < 1

@@ -16,8 +16,8 @@ from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
 from gpca.experiments.controls.rivals import Rival
 from gpca.experiments.estimators.examples import true_twist
+from gpca.experiments.explained import require_exchangeable
 from gpca.experiments.judge import Judges
-from gpca.experiments.substitution.asked import require_exchangeable
 from gpca.experiments.substitution.estimated import OBSERVED, KnobbedRegistrar
 from gpca.experiments.substitution.exchange import UNTAUGHT, Exchange
 from gpca.experiments.substitution.registered import registered_by

@@ -1,13 +1,19 @@
-"""Draws which concept GP-CA takes each for on depth frames, by backbone, with the numbers of samples."""
+"""Draws how GP-CA confuses concepts on depth frames, and whether its confidence can be believed, by backbone."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from gpca.attribution.diagnostics import BINS
+from gpca.attribution.metrics import source_method_seed
+from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.experiments.concept_attribution.confusions import counts_and_shares, pooled_confusions
+from gpca.experiments.diagnosis.reliability import reliability_figure
 from gpca.experiments.real_world.metrics import read_together
 from gpca.experiments.real_world.tables import encoder_title
 from gpca.reporting.figures.panels import draw_percentages, panels
@@ -38,3 +44,26 @@ def draw_real_world_confusions(metrics_csv: str | Path, title: str, methods: Seq
     figure.supxlabel("attributed to", fontsize=8)
     write_title(figure, title)
     return figure
+
+
+def draw_frame_reliability(prediction_files: Iterable[str | Path], methods: Mapping[str, str], title: str) -> Figure:
+    """Draw accuracy over confidence on the test samples of depth frames, all seeds together.
+
+    Args:
+        prediction_files: named ``…/{source}/{method}/seed{seed}.csv``, of one source.
+    """
+    parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for path in prediction_files:
+        rows = read_predictions(path)
+        rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
+        scores_N_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy(float)
+        hit_N = (rows["concept_predicted"] == rows["concept_true"]).to_numpy()
+        parts.setdefault(source_method_seed(path)[1], []).append((scores_N_C.max(axis=1), hit_N))
+    shown = [method for method in methods if method in parts]
+    if not shown:
+        raise InputError("predictions on depth frames", "cover none of these methods", "run them first")
+    samples = {}
+    for method in shown:
+        confidence_N, hit_N = (np.concatenate(columns) for columns in zip(*parts[method], strict=True))
+        samples[methods[method]] = confidence_N, hit_N
+    return reliability_figure(samples, title, BINS, least=1 / 3)
