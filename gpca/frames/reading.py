@@ -169,10 +169,8 @@ def read_instances(
     # Results last: they are measured against poses that fit what was seen.
     find = _from_results(datasets, seen) if settings.form == "results" else None
     rows = []
-    for catalog, frame, n, row in progress(seen, "initial poses"):
-        init_from, T_init = (
-            find(catalog, frame, n, row) if find else (settings.form, catalog.initial_pose(frame, n, row))
-        )
+    for own, frame, n, row in progress(seen, "initial poses"):
+        init_from, T_init = find(own, frame, n, row) if find else (settings.form, own.initial_pose(frame, n, row))
         rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
     for fault in left_out:
         print(f"skipped: {fault}", file=sys.stderr)
@@ -186,9 +184,8 @@ def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], see
     """Return a function to initial poses: an estimator's if one found the object, else the truth with an error."""
     estimators = {name: _estimators(dataset) for name, (dataset, _, _) in datasets.items()}
     estimates: dict[int, tuple[str, np.ndarray]] = {}
-    errors = EstimatorErrors(
-        {(catalog.name, number) for catalog, _, _, _ in seen for number in catalog.symmetric_ids()}
-    )
+    symmetric = {(catalog.name, number) for catalog, _, _, _ in seen for number in catalog.symmetric_ids()}
+    errors = EstimatorErrors(symmetric)
     for name, (dataset, _, models) in datasets.items():
         for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
             errors.add((name, number), T_error)
