@@ -139,28 +139,28 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
         raise _input_error(fault.errors(), settings, adapter, subject) from None
 
 
-def require_arguments(subject: str, function: Callable, given: int, settings: Mapping[str, object]) -> None:
+def require_arguments(subject: str, function: Callable, leading: int, settings: Mapping[str, object]) -> None:
     """Check settings that a function takes by the names of its arguments.
 
     A number without a range is one from 0 on where its default is.
 
     Args:
         subject: what has the settings, for the message.
-        function: what takes them, after `given` other arguments.
+        function: what takes them, after `leading` other arguments.
 
     Raises:
         InputError: what :func:`read_settings` raises.
     """
-    read_settings(_settings_of_arguments(function, given), settings, f"{subject}: setting")
+    read_settings(_settings_of_arguments(function, leading), settings, f"{subject}: setting")
 
 
 @cache
-def _settings_of_arguments(function: Callable, given: int) -> Any:
-    kinds, required, closed = _arguments(function, given)
+def _settings_of_arguments(function: Callable, leading: int) -> Any:
+    kinds, required, closed = _arguments(function, leading)
     return Annotated[dict, Keys(kinds, required, closed)]
 
 
-def _arguments(function: Callable, given: int) -> tuple[dict[str, Any], set[str], bool]:
+def _arguments(function: Callable, leading: int) -> tuple[dict[str, Any], set[str], bool]:
     """Return the types of the arguments after the first, those without a default, and whether these are all."""
     plain = function.func if isinstance(function, partial) else function
     made = isclass(plain) and not is_dataclass(plain)
@@ -168,7 +168,7 @@ def _arguments(function: Callable, given: int) -> tuple[dict[str, Any], set[str]
     kinds: dict[str, Any] = {}
     others: dict[str, Any] = {}
     required, closed = set(), True
-    for parameter in list(signature(function).parameters.values())[given:]:
+    for parameter in list(signature(function).parameters.values())[leading:]:
         hint, default = hints.get(parameter.name, type(parameter.default)), parameter.default
         if parameter.kind is Parameter.VAR_KEYWORD:
             source = next((note for note in getattr(hint, "__metadata__", ()) if isinstance(note, ArgumentsOf)), None)

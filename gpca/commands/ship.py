@@ -15,9 +15,9 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.intervals import read_intervals
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.measures import RECALL
+from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.io.files import require_outputs, whole_file
 from gpca.model.diagnoser import Diagnoser
 from gpca.model.file import VERSION, Model
@@ -52,7 +52,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
         content: of that file.
         model, diagnoser: its parts.
         origin: of the model.
-        scores: what :func:`gpca.experiments.diagnosis.intervals.collect` returned for its run.
+        scores: what :func:`gpca.experiments.diagnosis.metrics.collect_intervals` returned for its run.
 
     Raises:
         InputError: no scores of a classifier as in the model, or settings of a run that are incomplete.

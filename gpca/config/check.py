@@ -38,9 +38,9 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
     Raises:
         InputError: what :func:`check` raises.
     """
-    given = with_types(with_defaults(config) if of_module else config, command_line)
-    sources = check(given)
-    return without_false(given), sources
+    whole = with_types(with_defaults(config) if of_module else config, command_line)
+    sources = check(whole)
+    return without_false(whole), sources
 
 
 def check(config: dict) -> dict[str, dict]:

@@ -52,26 +52,26 @@ def _laid_over(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, 
     return whole
 
 
-def with_types(config: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+def with_types(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> dict[str, Any]:
     """Return the config with the command line's values read as in a config file: numbers, booleans, null.
 
     Snakemake reads those inside lists and mappings as text, whatever they are.
 
     Args:
         config: of the run, in which values from the command line are laid over the others.
-        given: of the command line alone, as Snakemake parsed it. Only what is the same in the config is read anew: a
+        command_line: its values alone, as Snakemake parsed them. Only what is the same in the config is read anew: a
             workflow that uses this one as a module may have a config of its own.
     """
     return {
-        name: _typed(value, given[name]) if isinstance(given, Mapping) and name in given else value
+        name: _typed(value, command_line[name]) if isinstance(command_line, Mapping) and name in command_line else value
         for name, value in config.items()
     }
 
 
-def _typed(value: Any, given: Any) -> Any:
-    if isinstance(value, Mapping) and isinstance(given, Mapping):
-        return with_types(value, given)
-    return _read(value) if value == given else value
+def _typed(value: Any, command_line: Any) -> Any:
+    if isinstance(value, Mapping) and isinstance(command_line, Mapping):
+        return with_types(value, command_line)
+    return _read(value) if value == command_line else value
 
 
 def _read(value: Any) -> Any:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.metrics import ALL, read_metrics
-from gpca.experiments.diagnosis.intervals import read_intervals
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.experiments.real_world.metrics import read_together
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.pairs.perturbation import CONCEPTS

@@ -15,8 +15,8 @@ from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.uncertainty.conditions import CONDITIONS
 from gpca.uncertainty.outcomes import Outcomes, read_seconds
-from gpca.uncertainty.settings import CONDITIONS
 
 
 def run(job: Job) -> None:

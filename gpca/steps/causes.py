@@ -12,8 +12,8 @@ from gpca.process.provenance import record_provenance
 
 def run(job: Job) -> None:
     """Draw candidates, measure their causes, keep a balanced set."""
-    given, icp = job.settings_and_icp()
-    settings = CauseSettings.from_dict(given, icp)
+    own, icp = job.settings_and_icp()
+    settings = CauseSettings.from_dict(own, icp)
     objects = ObjectClouds.load(job.objects, job.source)
     outputs = [job.causes, job.candidates, job.timings]
     with record_provenance(outputs, [job.objects], job.settings, seed=job.seed):

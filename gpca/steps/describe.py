@@ -13,12 +13,12 @@ from gpca.process.provenance import record_provenance
 
 def run(job: Job) -> None:
     """Describe every pair."""
-    given, icp = job.settings_and_icp()
+    own, icp = job.settings_and_icp()
     outputs = [job.descriptors, job.timings]
     with record_provenance(outputs, [job.causes, job.causes_timings], job.settings, seed=job.seed):
         causes = Causes.load(job.causes, (job.source, job.seed))
         seconds_S, icp_seconds_S = read_timings(job.causes_timings, causes.registrations)
-        settings = DescriptorSettings(**given)
+        settings = DescriptorSettings(**own)
         described, own_S, own_icp_S = describe_all(causes, job.source, job.seed, settings, ICPSettings(**icp))
         described.save(job.descriptors)
         write_timings(job.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)

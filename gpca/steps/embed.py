@@ -18,8 +18,8 @@ from gpca.process.provenance import record_provenance
 
 def run(job: Job) -> None:
     """Embed every cloud."""
-    given, of_icp = job.settings_and_icp()
-    settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
+    of_encoder, of_icp = job.settings_and_icp()
+    settings, icp = EncoderSettings(**of_encoder), ICPSettings(**of_icp)
     inputs, axes = [job.registrations, job.encoder], (job.source, job.seed)
     with record_provenance([job.embeddings, job.timings], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)

@@ -17,9 +17,9 @@ from gpca.process.provenance import record_provenance
 
 def run(job: Job) -> None:
     """Perturb and align."""
-    given = dict(job.settings)
-    own = {name: given.pop(name) for name in ("test_share", "occluders") if name in given}
-    settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(given))
+    of_registrations = dict(job.settings)
+    own = {name: of_registrations.pop(name) for name in ("test_share", "occluders") if name in of_registrations}
+    settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(of_registrations))
     inputs, name = [job.instances, job.objects], job.get("name", job.source)
     with record_provenance([job.registrations, job.poses, job.timings], inputs, job.settings, seed=job.seed):
         instances = Instances.load(job.instances, name)

@@ -18,9 +18,9 @@ from gpca.process.provenance import record_provenance
 
 def run(job: Job) -> None:
     """Lay the tables, render them and write the frames."""
-    given = dict(job.settings)
-    datasets = given.pop("datasets", None)
-    settings = SceneSettings.from_dict(given)
+    sections = dict(job.settings)
+    datasets = sections.pop("datasets", None)
+    settings = SceneSettings.from_dict(sections)
     inputs = files_behind(datasets, job.data_dir, None) if datasets else []
     with record_provenance([job.out], inputs, job.settings, folders=True):
         if datasets:
@@ -39,8 +39,8 @@ def _models(job: Job, datasets: dict[str, dict]) -> list[Surface]:
         InputError: none is left.
     """
     models = []
-    found = datasets_of(datasets, job.data_dir, job.downloads, None)
-    for surface in distinct_surfaces(models_of(found)):
+    frames = datasets_of(datasets, job.data_dir, job.downloads, None)
+    for surface in distinct_surfaces(models_of(frames)):
         try:
             model = simplified(surface)
             stable_poses(model)

@@ -23,8 +23,8 @@ from gpca.process.provenance import record_provenance
 
 def run(job: Job) -> None:
     """Train, keeping a checkpoint beside the weights until they are written."""
-    given, of_icp = job.settings_and_icp()
-    settings, icp = EncoderSettings(**given), ICPSettings(**of_icp)
+    of_encoder, of_icp = job.settings_and_icp()
+    settings, icp = EncoderSettings(**of_encoder), ICPSettings(**of_icp)
     poses, weights = job.get("poses"), job.get("start")
     files = job.files("registrations")
     sources = job.get("registrations_of", [job.source])

@@ -13,9 +13,9 @@ from gpca.uncertainty.settings import UncertaintySettings
 
 def run(job: Job) -> None:
     """Run the design's conditions for the registrations that it covers, seed by seed."""
-    given, icp = job.settings_and_icp()
-    samples = given.pop("samples", None)
-    settings = UncertaintySettings(**given, icp=ICPSettings(**icp))
+    own, icp = job.settings_and_icp()
+    samples = own.pop("samples", None)
+    settings = UncertaintySettings(**own, icp=ICPSettings(**icp))
     for seed, registrations_path, out, table, timings in job.per_seed("registrations", "outcomes", "tables", "timings"):
         with record_provenance([out, table, timings], [registrations_path], job.settings, seed=seed):
             registrations = Registrations.load(registrations_path, (job.source, seed))

@@ -18,10 +18,11 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
+from gpca.uncertainty.conditions import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
 from gpca.uncertainty.outcomes import Outcomes
 from gpca.uncertainty.remedies import RemedyRuns
-from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies, UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Spread, divergence
 
 STEP = 0.1  # a local derivative takes this step, in the knob's range

@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import transform
-from gpca.uncertainty.settings import Remedies, UncertaintySettings
+from gpca.uncertainty.conditions import Remedies
+from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_runs
 
 NEIGHBORS = 24  # so many span the plane that a point is moved to

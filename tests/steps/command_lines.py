@@ -53,6 +53,7 @@ STEP_OPTIONS = {
         "--settings": {
             "estimator_pairs": {
                 "methods": {"point_to_point": 2}, "train": 8, "train_starts": 7, "points": 64, "starts": 20,
+                "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6, "failed": 0.03,
             },
             "estimators": {"brossard": {}, "cello": {"steps": 2}},
         },
@@ -71,7 +72,10 @@ STEP_OPTIONS = {
         "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
     },
     "register_methods": COMMON | {
-        "--settings": {"method_pairs": {"samples": 3, "points": 64}, "methods": {"point_to_point": {}, "fgr": {}}},
+        "--settings": {
+            "method_pairs": {"samples": 3, "points": 64, "success": 0.02, "global_start": "fgr"},
+            "methods": {"point_to_point": {}, "fgr": {}},
+        },
         "--seeds": 0, "--methods": ["point_to_point", "fgr"], "--objects": "objects.npz",
         "--registrations": "registrations.npz", "--rows": ["point_trials.csv", "fgr_trials.csv"],
         "--timings": ["point_seconds.csv", "fgr_seconds.csv"],

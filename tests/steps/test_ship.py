@@ -12,7 +12,7 @@ import yaml
 
 from gpca.code_files import ROOT
 from gpca.commands import ship
-from gpca.experiments.diagnosis.intervals import COLUMNS
+from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.model.origin import licenses_of

@@ -6,8 +6,9 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.twist import exp
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.uncertainty import remedies
+from gpca.uncertainty.conditions import CORNERS
 from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbors, denoise, trim
-from gpca.uncertainty.settings import CORNERS, UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Runs
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=100)

@@ -1,4 +1,4 @@
-# Canonical clouds -> registrations whose causes of failure are measured -> what explainers say of them.
+# Canonical clouds -> registrations whose causes of failure are measured -> what explainers of them read.
 DIAGNOSIS = config["diagnosis"]
 ICP = {"icp": config["registrations"]["icp"]}
 
@@ -6,16 +6,6 @@ ICP = {"icp": config["registrations"]["icp"]}
 rule causes:
     input:
         collect("<results>/causes/{source}/seed{seed}.npz", source=SOURCES, seed=SEEDS),
-
-
-rule diagnoses:
-    input:
-        collect(
-            "<results>/diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
-            source=SOURCES,
-            cause_explainer=DIAGNOSIS["explainers"],
-            seed=SEEDS,
-        ),
 
 
 rule sample_causes:
@@ -84,46 +74,5 @@ rule train_on_causes:
     params:
         step="gpca.steps.train_on_causes",
         settings=as_json(DIAGNOSIS["encoder"]),
-    script:
-        "../scripts/step.py"
-
-
-rule diagnose:
-    input:
-        causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
-        read=lambda wildcards: collect(
-            f"<results>/{read_by(wildcards.cause_explainer)}/{wildcards.source}/seed{{seed}}.npz",
-            seed=SEEDS,
-        ),
-        read_timings=lambda wildcards: collect(
-            f"<results>/timings/{wildcards.source}/{read_by(wildcards.cause_explainer)}/seed{{seed}}.csv",
-            seed=SEEDS,
-        ),
-        code=lambda wildcards: code_files(
-            "gpca.experiments.diagnosis.step",
-            explainer_module(wildcards.cause_explainer, CAUSES),
-        ),
-    output:
-        predictions=collect(
-            "<results>/diagnoses/{{source}}/{{cause_explainer}}/seed{seed}.csv",
-            seed=SEEDS,
-        ),
-        timings=collect(
-            "<results>/timings/{{source}}/diagnoses_{{cause_explainer}}/seed{seed}.csv",
-            seed=SEEDS,
-        ),
-    log:
-        "<logs>/diagnoses/{source}/{cause_explainer}.log",
-    benchmark:
-        "<benchmarks>/diagnoses/{source}/{cause_explainer}.tsv"
-    conda:
-        "../envs/gpca.yaml"
-    params:
-        step="gpca.experiments.diagnosis.step",
-        explainer=lambda wildcards: wildcards.cause_explainer,
-        settings=lambda wildcards: as_json(
-            DIAGNOSIS["explainers"][wildcards.cause_explainer] or {}
-        ),
-        seeds=SEEDS,
     script:
         "../scripts/step.py"

@@ -74,36 +74,6 @@ def collector_code(function):
     return code_files(function.split(":")[0], "gpca.process.job")
 
 
-def read_by(cause_explainer):
-    """Return the folder of what an explainer of causes reads."""
-    entry = explainer_entry(cause_explainer, CAUSES)
-    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"
-
-
-def other_sources(wildcards):
-    """Return the sources that explainers of this one are asked about besides, where there is transfer."""
-    return [name for name in NAMES["transfer_source"] if name != wildcards.source]
-
-
-def encoders_of_others(wildcards):
-    """Return encoders that saw other samples: those of the next seed, and of the next source, where there are any."""
-    seeds, sources = [str(seed) for seed in SEEDS], list(SOURCES)
-    own = (wildcards.source, wildcards.seed)
-    following = {
-        "other_samples": (wildcards.source, following_one(seeds, wildcards.seed)),
-        "other_source": (following_one(sources, wildcards.source), wildcards.seed),
-    }
-    return {
-        name: f"<results>/encoders/{source}/{config['embedding']['encoder']}/seed{seed}.pt"
-        for name, (source, seed) in following.items()
-        if name in config["new_concepts"]["embeddings"] and (source, seed) != own
-    }
-
-
-def following_one(names, name):
-    return names[(names.index(name) + 1) % len(names)]
-
-
 def below_results(files):
     """Return the files of each input below the folder of the run."""
     return {

@@ -145,8 +145,8 @@ def _different_samples(metrics: pd.DataFrame, explainers: Mapping[str, Mapping],
     names: dict[str, list[str]] = {}
     for explainer, values in of_test.groupby("method", sort=False)["value"]:
         names.setdefault(span(values), []).append(explainers[explainer]["title"])
-    told = "; ".join(f"{samples} by {', '.join(titles)}" for samples, titles in names.items())
-    return [f"Test samples explained: {told}."] if len(names) > 1 else []
+    explained = "; ".join(f"{samples} by {', '.join(titles)}" for samples, titles in names.items())
+    return [f"Test samples explained: {explained}."] if len(names) > 1 else []
 
 
 def _test_samples(metrics: pd.DataFrame, explainers: Iterable[str]) -> pd.DataFrame:

@@ -18,6 +18,7 @@ from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
 
 CURVE = ("epoch", "learning_rate", "loss", "accuracy")
 
@@ -62,7 +63,8 @@ def nothing() -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
 
 def run(job: Job) -> None:
     """Train, keeping a checkpoint, and embed every sample; none where the registrations do not admit the control."""
-    settings, encoder = ControlSettings.from_dict(job.section("controls")), EncoderSettings(**job.section("encoder"))
+    settings = read_settings(ControlSettings, job.section("controls"))
+    encoder = EncoderSettings(**job.section("encoder"))
     checkpoint = job.embeddings.with_suffix(".checkpoint")
     with record_provenance([job.embeddings, job.curve], [job.registrations], job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, (job.source, job.seed))

@@ -69,7 +69,11 @@ EXPERIMENT = Experiment(
             {"prediction_files": CONTROLLED},
             rule="control_metrics",
         ),
-        Tidy("control_intervals.csv", "gpca.experiments.controls.intervals:collect", {"prediction_files": CONTROLLED}),
+        Tidy(
+            "control_intervals.csv",
+            "gpca.experiments.controls.metrics:collect_intervals",
+            {"prediction_files": CONTROLLED},
+        ),
         Tidy(
             "control_severities.csv",
             "gpca.experiments.controls.severity:collect",

@@ -135,7 +135,7 @@ def draw_transfer(intervals: pd.DataFrame, sources: Mapping[str, str], explainer
     """Draw a matrix for each explainer: rows are the sources that it learned from, columns those that it explains.
 
     Args:
-        intervals: What :func:`gpca.experiments.controls.intervals.collect` returned.
+        intervals: What :func:`gpca.experiments.controls.metrics.collect_intervals` returned.
     """
     accuracy = rows_where(intervals, metric="accuracy")
     moved = rows_where(accuracy, control=TRANSFER)
@@ -163,7 +163,7 @@ def _matrix(accuracy: pd.DataFrame, sources: list[str]) -> np.ndarray:
     for row, trained_on in enumerate(sources):
         for column, tested in enumerate(sources):
             control = PAPER if row == column else TRANSFER
-            found = rows_where(accuracy, control=control, source=tested, trained_on=trained_on)
-            if len(found):
-                shares[row, column] = 100 * found["value"].iloc[0]
+            tests = rows_where(accuracy, control=control, source=tested, trained_on=trained_on)
+            if len(tests):
+                shares[row, column] = 100 * tests["value"].iloc[0]
     return shares

@@ -179,14 +179,14 @@ class ControlRun:
         rivals: Mapping[str, Rival],
     ) -> Iterator[pd.DataFrame]:
         """Yield each explainer's predictions for the test samples after it has learned from the training samples."""
-        for train, asked in self._lessons(control, learned.subset(learned.rows("train")), tests):
+        for train, of_lesson in self._lessons(control, learned.subset(learned.rows("train")), tests):
             for name, rival in rivals.items():
                 explainer = rival.make()
                 if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
                     continue
                 with self.costs.learning(control, name):
                     explainer.fit(train)
-                for of_test, test in asked.items():
+                for of_test, test in of_lesson.items():
                     attribution = explainer.explain(test.without_labels())
                     self.costs.explained(of_test[0], name, attribution.seconds_N)
                     frame = prediction_frame(test, attribution)
@@ -214,7 +214,7 @@ class ControlRun:
 
 
 def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Registrations:
-    return reduce(lambda found, embed: embed(found), embeds.values(), registrations)
+    return reduce(lambda registered, embed: embed(registered), embeds.values(), registrations)
 
 
 def _dealt(registrations: Registrations, part: int, parts: int) -> Registrations:

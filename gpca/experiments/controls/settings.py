@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 from gpca.errors import InputError
 from gpca.settings import Bounds, Count, Different, Distinct, PositiveShare
@@ -60,14 +60,6 @@ class ControlSettings:
         if self.draw_points[0] > self.draw_points[1]:
             fault = f"{list(self.draw_points)} is in descending order"
             raise InputError("setting draw_points of controls", fault, "swap the two")
-
-    @classmethod
-    def from_dict(cls, settings: dict) -> ControlSettings:
-        """Build from the config's section ``controls``; its explainers are not among the settings."""
-        given: dict[str, Any] = {name: value for name, value in settings.items() if name != "explainers"}
-        for name in {"controls", "encoders", "draw_points"} & set(given):
-            given[name] = tuple(given[name])
-        return cls(**given)
 
 
 def trained_otherwise(explainer: str, way: str) -> str:

@@ -53,11 +53,13 @@ def collect(
         own = read_samples(path).assign(source=source, seed=seed)
         samples.append(_with_bins(own, ranges, bins))
     table = pd.concat(samples, ignore_index=True)
-    found = judged.merge(table, on=["source", "seed", "sample"], suffixes=("", "_of_sample"), validate="many_to_one")
-    if len(found) != len(judged):
+    with_severity = judged.merge(
+        table, on=["source", "seed", "sample"], suffixes=("", "_of_sample"), validate="many_to_one"
+    )
+    if len(with_severity) != len(judged):
         raise InputError("samples of the controls", "lack test samples of the predictions", "regenerate both")
     outcomes = table.assign(explainer=REGISTRATION, right=table["error"] < success)
-    everything = pd.concat([outcomes, found[outcomes.columns]])
+    everything = pd.concat([outcomes, with_severity[outcomes.columns]])
     records = []
     for concept, names in OF_CONCEPT.items():
         of_concept = everything[everything["concept"] == concept]
@@ -65,8 +67,8 @@ def collect(
             edges = [_edges(ranges, name, bins)[i : i + 2] for name, i in zip(names, places, strict=True)]
             bounds = np.concatenate([*edges, [np.nan] * 2])[:4]
             records.append((concept, method, *bounds, len(rows), float(rows["right"].mean())))
-    found = pd.DataFrame(records, columns=list(COLUMNS))
-    return found.sort_values(list(COLUMNS[:6]), kind="stable", ignore_index=True)
+    with_severity = pd.DataFrame(records, columns=list(COLUMNS))
+    return with_severity.sort_values(list(COLUMNS[:6]), kind="stable", ignore_index=True)
 
 
 def read_severities(path: str | Path) -> pd.DataFrame:

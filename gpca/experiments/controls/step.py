@@ -16,13 +16,15 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
 from gpca.uncertainty.settings import UncertaintySettings
 
 
 def run(job: Job) -> None:
     """Let every explainer learn and explain under the paper's protocol and under each control."""
     rivals = make_rivals(job.section("explainers"), job.source, job.seed)
-    settings, encoder = ControlSettings.from_dict(job.section("controls")), EncoderSettings(**job.section("encoder"))
+    settings = read_settings(ControlSettings, job.section("controls"))
+    encoder = EncoderSettings(**job.section("encoder"))
     icp = ICPSettings(**job.section("icp"))
     runs = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
     retrained = dict(zip(job.retrained, job.retrained_embeddings, strict=True))
@@ -45,11 +47,13 @@ def run(job: Job) -> None:
             backbone=encoder.backbone,
             uncertainty=UncertaintySettings(**runs, icp=icp),
             rivals=rivals,
-            embed=lambda asked, source: embed(model, asked, source, job.seed, encoder),
+            embed=lambda registrations_of_others, source: embed(
+                model, registrations_of_others, source, job.seed, encoder
+            ),
             embeddings=embeddings,
         )
-        asked = {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
-        rows = experiment.run(registrations, asked)
+        registrations_of_others = {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
+        rows = experiment.run(registrations, registrations_of_others)
         samples = sample_table(registrations, ObjectClouds.load(job.objects, job.source))
         write_csv(job.predictions, rows)
         write_csv(job.samples, samples)

@@ -40,7 +40,7 @@ def table10_controls(
     """Return accuracy under every control with its change against the paper's protocol, pooled and by source.
 
     Args:
-        intervals: What :func:`gpca.experiments.controls.intervals.collect` returned.
+        intervals: What :func:`gpca.experiments.controls.metrics.collect_intervals` returned.
         controls: The names of those that were run.
     """
     table = TableBuilder("table10_controls", {"source": "Dataset", "explainer": "Explainer"})

@@ -22,9 +22,9 @@ FEWEST_OBJECTS = 5  # instances; with fewer, too few objects are left to learn f
 def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:
     """Return why these registrations, or the backbone of their encoder, do not admit a control; None where they do."""
     if control in (UNSEEN, *TRAININGS):
-        found = len(set(instances(registrations)))
-        if found < FEWEST_OBJECTS:
-            return f"it needs at least {FEWEST_OBJECTS} objects, but there are {found}"
+        objects = len(set(instances(registrations)))
+        if objects < FEWEST_OBJECTS:
+            return f"it needs at least {FEWEST_OBJECTS} objects, but there are {objects}"
     if control in ("density", "random_draws"):
         fewest, least = int(np.diff(registrations.offsets).min()), settings.draw_points[0]
         if fewest < least:

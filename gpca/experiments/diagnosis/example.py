@@ -58,8 +58,8 @@ def draw_causes_example(
     causes = Causes.load(causes_npz)
     row = choose_sample(causes, causes_npz)
     source, seed = Path(causes_npz).parent.name, seed_of_file(causes_npz)
-    given = dict(settings)
-    own = CauseSettings.from_dict({k: v for k, v in given.items() if k != "icp"}, given.get("icp"))
+    sections = dict(settings)
+    own = CauseSettings.from_dict({k: v for k, v in sections.items() if k != "icp"}, sections.get("icp"))
     shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
     names, scores_R_4 = _scores(causes, row, predictions_csv, explainers)
     rows_in = 0.35 + ROW_IN * (len(names) + GAP)
@@ -107,9 +107,9 @@ def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: M
         of_sample = (rows["split"] == registrations.split[row]) & (rows["sample"] == str(registrations.sample[row]))
         if of_sample.sum() != 1:
             raise InputError(path, "lacks the sample that is shown", "regenerate it from the same config")
-        said = rows[of_sample].iloc[0]
-        if not said["abstained"]:
-            by_name[name] = [said[f"score_{label}"] for label in LABELS]
+        prediction = rows[of_sample].iloc[0]
+        if not prediction["abstained"]:
+            by_name[name] = [prediction[f"score_{label}"] for label in LABELS]
     named = [name for name in explainers if name in by_name]
     shares = [0.0, *(phi / max(phi.sum(), 1e-9))]
     return [TRUTH, *(explainers[name] for name in named)], np.array([shares, *(by_name[name] for name in named)], float)

@@ -52,7 +52,7 @@ EXPERIMENT = Experiment(
     name="diagnosis",
     tidy=(
         Tidy("causes.csv", "gpca.experiments.diagnosis.metrics:collect", DIAGNOSED, rule="cause_metrics"),
-        Tidy("cause_intervals.csv", "gpca.experiments.diagnosis.intervals:collect", DIAGNOSED),
+        Tidy("cause_intervals.csv", "gpca.experiments.diagnosis.metrics:collect_intervals", DIAGNOSED),
     ),
     sections={"diagnosis": Section},
     names=names,

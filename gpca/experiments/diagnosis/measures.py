@@ -82,11 +82,11 @@ def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) ->
 
 
 def _of_alarm(alarm_N: np.ndarray, failed_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    found = ranking(alarm_N, failed_N, weights_B_N)
+    ranked = ranking(alarm_N, failed_N, weights_B_N)
     return {
-        "auroc_failed": found["area"],
-        "auprc_failed": found["precision"],
-        "false_alarm_rate": found["false_alarms"],
+        "auroc_failed": ranked["area"],
+        "auprc_failed": ranked["precision"],
+        "false_alarm_rate": ranked["false_alarms"],
     }
 
 

@@ -49,7 +49,7 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
     """Return every measure of every explainer, by source and pooled, the ceiling last.
 
     Args:
-        intervals: What :func:`gpca.experiments.diagnosis.intervals.collect` returned.
+        intervals: What :func:`gpca.experiments.diagnosis.metrics.collect_intervals` returned.
     """
     stand_ins = any(entry["stand_in"] for entry in sources.values())
     titles = titles_of(sources) | {POOLED: "All together"}

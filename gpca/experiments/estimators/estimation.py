@@ -85,7 +85,7 @@ def try_estimators(
         make = _Maker(causes, judges, method, axes, settings)
         learning = any(estimator_entry(name).learn for name in estimators)
         examples = [make.example(row) for row in _spaced(causes.rows("train"), settings.train)] if learning else []
-        made = {name: make_estimator(name, given, examples) for name, given in estimators.items()}
+        made = {name: make_estimator(name, entry, examples) for name, entry in estimators.items()}
         rows = _spaced(causes.rows("test"), wanted)
         if not len(rows):
             raise InputError(f"causes of {source}", "have no test samples", "raise causes.test")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
 from gpca.alignment.methods.registry import method_entry, methods, require_local
 from gpca.errors import InputError, with_key
 from gpca.experiments.estimators.covariances import REFERENCE
 from gpca.experiments.estimators.settings import EstimatorPairSettings
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
-from gpca.settings import part_of
 from gpca.uncertainty.estimators.registry import estimator_entry, estimators, require_estimator_settings
 
 
@@ -41,7 +40,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 EXPERIMENT = Experiment(
     name="estimators",
-    sections={"estimators": ByName, "estimator_pairs": Annotated[dict, part_of(EstimatorPairSettings)]},
+    sections={"estimators": ByName, "estimator_pairs": EstimatorPairSettings},
     tidy=(
         Tidy(
             "estimators.csv",

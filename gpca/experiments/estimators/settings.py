@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -26,17 +26,15 @@ class EstimatorPairSettings:
         failed: error from which a registration has failed, ADD or ADD-S in diameters.
     """
 
-    methods: dict[str, Annotated[int, Bounds(minimum=1, maximum=100_000)]] = field(
-        default_factory=lambda: {"point_to_point": 30}
-    )
-    train: Annotated[int, Bounds(minimum=8)] = 300
-    train_starts: Annotated[int, Bounds(minimum=7, maximum=1000)] = 13
-    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 256
-    starts: Annotated[int, Bounds(minimum=20, maximum=100_000)] = 1000
-    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 10.0
-    start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.05
-    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-6
-    failed: PositiveShare = 0.03
+    methods: dict[str, Annotated[int, Bounds(minimum=1, maximum=100_000)]]
+    train: Annotated[int, Bounds(minimum=8)]
+    train_starts: Annotated[int, Bounds(minimum=7, maximum=1000)]
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)]
+    starts: Annotated[int, Bounds(minimum=20, maximum=100_000)]
+    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]
+    start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)]
+    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]
+    failed: PositiveShare
 
     def deviation_6(self) -> np.ndarray:
         """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""

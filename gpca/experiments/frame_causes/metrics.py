@@ -14,9 +14,9 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.intervals import COLUMNS, rows_of
 from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by
 from gpca.experiments.diagnosis.measures import MEASURES, measure
+from gpca.experiments.diagnosis.metrics import COLUMNS, rows_of
 from gpca.frames.source import REAL_WORLD
 from gpca.io.csv_file import ANY, read_csv
 from gpca.seeds import generator, seed_of_file
@@ -34,10 +34,11 @@ KINDS = (*LABELS, GEOMETRY, BORDERLINE, "scenes", "objects")
 def collect(
     causes_files: Iterable[str | Path], sample_files: Iterable[str | Path], prediction_files: Iterable[str | Path]
 ) -> pd.DataFrame:
-    """Return rows as :func:`gpca.experiments.diagnosis.intervals.collect`, for explainers that learned from no frame.
+    """Return the intervals of the diagnosis for explainers that learned from no frame.
 
-    Beside its measures stand `STATE`, the mean of the shares of the nominal and of the failed that are called so, and
-    the number of `SAMPLES`; what has no value, as there are no samples for it, has no row.
+    The columns are those of :func:`gpca.experiments.diagnosis.metrics.collect_intervals`. Beside its measures
+    stand `STATE`, the mean of the shares of the nominal and of the failed that are called so, and the number of
+    `SAMPLES`; what has no value, as there are no samples for it, has no row.
     Intervals are over scenes, objects and seeds, which are drawn with replacement each. The counts of `KINDS` are those
     of all frames, and of each dataset alone, ``real_rgbd/{dataset}``.
 
@@ -51,8 +52,8 @@ def collect(
 
     samples_of: dict[str, list[Judged]] = {}
     seen: list[pd.DataFrame] = []
-    for seed, causes, samples, said in _seeds(causes_files, sample_files, prediction_files):
-        for explainer, rows in said.groupby("explainer", sort=False):
+    for seed, causes, samples, predictions in _seeds(causes_files, sample_files, prediction_files):
+        for explainer, rows in predictions.groupby("explainer", sort=False):
             samples_of.setdefault(str(explainer), []).append(judged_by(rows, causes, seed))
         samples_of.setdefault(CEILING, []).append(ceiling_of(causes, seed))
         truth = causes.truth
@@ -70,27 +71,28 @@ def collect(
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _seeds(*given: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataFrame, pd.DataFrame]]:
-    files = [list(paths) for paths in given]
+def _seeds(*file_lists: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataFrame, pd.DataFrame]]:
+    files = [list(paths) for paths in file_lists]
     if not files[0] or len({len(paths) for paths in files}) > 1:
         raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
     for causes_file, sample_file, prediction_file in zip(*files, strict=True):
         causes = Causes.load(causes_file)
         numbers = [str(number) for number in causes.registrations.sample]
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
-        said = read_predictions(prediction_file, labels=("explainer",))
-        for path, of_path in ((sample_file, [samples]), (prediction_file, [r for _, r in said.groupby("explainer")])):
+        predictions = read_predictions(prediction_file, labels=("explainer",))
+        of_explainers = [rows for _, rows in predictions.groupby("explainer")]
+        for path, of_path in ((sample_file, [samples]), (prediction_file, of_explainers)):
             if any(rows["sample"].tolist() != numbers for rows in of_path):
                 raise InputError(
                     path, "its samples differ from those of the causes", "regenerate both from the same config"
                 )
-        yield seed_of_file(causes_file), causes, samples[list(SAMPLE_COLUMNS)], said
+        yield seed_of_file(causes_file), causes, samples[list(SAMPLE_COLUMNS)], predictions
 
 
 def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    found = {STATE: _state_accuracy(samples, weights_B_N), **measure(samples, weights_B_N)}
-    found[SAMPLES] = np.full(len(weights_B_N), float(len(samples)))  # also where nothing else can be measured
-    return found
+    measures = {STATE: _state_accuracy(samples, weights_B_N), **measure(samples, weights_B_N)}
+    measures[SAMPLES] = np.full(len(weights_B_N), float(len(samples)))  # also where nothing else can be measured
+    return measures
 
 
 def _state_accuracy(samples: Judged, weights_B_N: np.ndarray) -> np.ndarray:
@@ -105,8 +107,8 @@ def _state_accuracy(samples: Judged, weights_B_N: np.ndarray) -> np.ndarray:
 
 def _counts(source: str, rows: pd.DataFrame) -> list[tuple]:
     """Return how many there are of each kind, with no interval and no rival."""
-    found = Counter(rows["kind"].tolist())
-    found["scenes"] = len(set(zip(rows["dataset"], rows["scene"], strict=True)))
-    found["objects"] = rows["object"].nunique()
+    counts = Counter(rows["kind"].tolist())
+    counts["scenes"] = len(set(zip(rows["dataset"], rows["scene"], strict=True)))
+    counts["objects"] = rows["object"].nunique()
     own, nothing = (len(rows), rows["seed"].nunique()), (np.nan, np.nan, "", np.nan, np.nan, np.nan)
-    return [(source, TRUTH, f"count_{kind}", *own, float(found[kind]), *nothing) for kind in KINDS]
+    return [(source, TRUTH, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in KINDS]

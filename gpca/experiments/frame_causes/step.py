@@ -49,10 +49,10 @@ def run(job: Job) -> None:
         axes = (job.source, job.seed)
         icp = ICPSettings(**job.section("icp"))
         described, _, _ = describe_all(causes, *axes, DescriptorSettings(**job.section("descriptors")), icp)
-        said = _Asked(causes, described, EncoderSettings(**job.section("encoder")), axes, lessons)
+        explained = _FramesToExplain(causes, described, EncoderSettings(**job.section("encoder")), axes, lessons)
         said_of: list[pd.DataFrame] = []
         for name, settings in job.section("explainers").items():
-            attribution = said.attribution(name, settings or {})
+            attribution = explained.attribution(name, settings or {})
             said_of.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
         causes.save(job.frame_causes)
         write_csv(job.samples, samples)
@@ -70,7 +70,7 @@ def _measure(job: Job) -> tuple[Causes, pd.DataFrame]:
     return measure_frames(instances, rows, objects, meshes, job.source, job.seed, settings, chosen.points)
 
 
-class _Asked:
+class _FramesToExplain:
     """Registrations of frames to be explained, and the training data of the explainers."""
 
     def __init__(
@@ -90,13 +90,15 @@ class _Asked:
         Descriptors of all sources are learned together; embeddings are by an encoder for each source.
         """
         entry = explainer_entry(name, CAUSES)
-        said = []
-        for lessons, asked in self._pairs_by_embedding() if entry.reads == "embeddings" else self._pairs_described():
+        attributions = []
+        for lessons, explained in (
+            self._pairs_by_embedding() if entry.reads == "embeddings" else self._pairs_described()
+        ):
             explainer = entry.make(*self._axes, **settings)
             explainer.fit(lessons)
-            said.append(explainer.explain(asked))
-        abstained_N = np.all([each.abstained_N for each in said], axis=0)
-        scores_N_4 = np.mean([each.scores_N_C for each in said], axis=0)
+            attributions.append(explainer.explain(explained))
+        abstained_N = np.all([each.abstained_N for each in attributions], axis=0)
+        scores_N_4 = np.mean([each.scores_N_C for each in attributions], axis=0)
         return Attribution.of_scores(LABELS, scores_N_4, seconds=0.0, abstained_N=abstained_N)
 
     def _pairs_described(self) -> list[tuple[Registrations, Registrations]]:
@@ -106,8 +108,8 @@ class _Asked:
             for causes, descriptors, _, _ in self._lessons:
                 registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, descriptors)
                 parts.append(registrations.subset(training_rows(registrations, causes)))
-            asked = self._with(self._described.groups)
-            self._of_descriptors = [(_joined(parts), asked)]
+            explained = self._with(self._described.groups)
+            self._of_descriptors = [(_joined(parts), explained)]
         return self._of_descriptors
 
     def _pairs_by_embedding(self) -> list[tuple[Registrations, Registrations]]:

@@ -31,8 +31,8 @@ def collect(
     """Return the tidy metrics of the depth frames and, below them, of :func:`collect_labels`."""
     import pandas as pd
 
-    said = metrics.collect(prediction_files, pose_files, one_encoder_files)
-    return pd.concat([said, *collect_labels(label_files, curve_files, targets)], ignore_index=True)
+    of_explanations = metrics.collect(prediction_files, pose_files, one_encoder_files)
+    return pd.concat([of_explanations, *collect_labels(label_files, curve_files, targets)], ignore_index=True)
 
 
 def collect_labels(
@@ -56,14 +56,14 @@ def collect_labels(
     """
     files = list(label_files)
     by_target = {in_percent(target): collect_curves(files, target) for target in targets}
-    parts = [_of_target(found, percent) for percent, found in by_target.items()]
+    parts = [_of_target(curves, percent) for percent, curves in by_target.items()]
     whole = next(iter(by_target.values()))
     whole = whole[~whole["metric"].isin(TO_TARGET)]
     validated = _validation_accuracies(curve_files)
     chosen = chosen_backbone(_means(validated), _embeddings(whole))
-    found = [part for of in (whole, *parts) for part in (of, _repeated(of, chosen))]
+    curves = [part for of in (whole, *parts) for part in (of, _repeated(of, chosen))]
     records = [(VALIDATION, *key[:2], "accuracy", ALL, key[2], value) for key, value in validated.items()]
-    return [tidy(records, VALIDATION), *found] if records else found
+    return [tidy(records, VALIDATION), *curves] if records else curves
 
 
 def chosen_backbone(accuracies: Mapping[str, float], embeddings: Iterable[str]) -> str:
@@ -82,30 +82,30 @@ def chosen_backbone(accuracies: Mapping[str, float], embeddings: Iterable[str]) 
     return max(backbones, key=lambda name: accuracies.get(name, 0.0))
 
 
-def _of_target(found: pd.DataFrame, percent: str) -> pd.DataFrame:
-    of_target = found[found["metric"].isin(TO_TARGET)]
+def _of_target(curves: pd.DataFrame, percent: str) -> pd.DataFrame:
+    of_target = curves[curves["metric"].isin(TO_TARGET)]
     return of_target.assign(table=of_target["table"] + f"/{percent}")
 
 
-def _repeated(found: pd.DataFrame, embedding: str) -> pd.DataFrame:
+def _repeated(curves: pd.DataFrame, embedding: str) -> pd.DataFrame:
     """Return the rows of an embedding, renamed as those of the chosen one."""
-    rows = found[found["table"].str.split("/").str[1] == embedding]
+    rows = curves[curves["table"].str.split("/").str[1] == embedding]
     return rows.assign(table=rows["table"].str.replace(f"{TABLE}{embedding}", f"{TABLE}{CHOSEN}", regex=False))
 
 
-def _embeddings(found: pd.DataFrame) -> list[str]:
-    return list(dict.fromkeys(found["table"].str.removeprefix(TABLE)))
+def _embeddings(curves: pd.DataFrame) -> list[str]:
+    return list(dict.fromkeys(curves["table"].str.removeprefix(TABLE)))
 
 
 def _validation_accuracies(curve_files: Iterable[str | Path]) -> dict[tuple[str, str, int], float]:
     """Return (source, backbone, seed) -> accuracy of the epoch with the smallest validation loss."""
-    found = {}
+    accuracies = {}
     for path in curve_files:
         curve = read_csv(path, ("epoch", "loss"), others=("learning_rate", "accuracy", "validation_*"))
         if "validation_loss" in curve:
             best = numbers(path, curve, "validation_loss").idxmin()
-            found[source_method_seed(path)] = float(numbers(path, curve, "validation_accuracy")[best])
-    return found
+            accuracies[source_method_seed(path)] = float(numbers(path, curve, "validation_accuracy")[best])
+    return accuracies
 
 
 def _means(validated: Mapping[tuple[str, str, int], float]) -> dict[str, float]:

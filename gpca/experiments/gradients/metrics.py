@@ -34,10 +34,10 @@ def collect(deletion_files: Iterable[str | Path], tcav_files: Iterable[str | Pat
         means = rows.groupby(["order", "deleted"], sort=False)[["drop", "changed"]].mean()
         for (order, deleted), row in means.iterrows():
             key = (SALIENCY, source, order)
-            found = {"drop": row["drop"], "changed": row["changed"]}
+            means_of_order = {"drop": row["drop"], "changed": row["changed"]}
             if order != RANDOM and (RANDOM, deleted) in means.index:
-                found["excess"] = row["drop"] - means.loc[(RANDOM, deleted), "drop"]
-            records += [(*key, f"{name}_{percent(deleted)}", ALL, seed, float(v)) for name, v in found.items()]
+                means_of_order["excess"] = row["drop"] - means.loc[(RANDOM, deleted), "drop"]
+            records += [(*key, f"{name}_{percent(deleted)}", ALL, seed, float(v)) for name, v in means_of_order.items()]
         records += [
             (SALIENCY, source, order, "test_samples", ALL, seed, float(part["sample"].nunique()))
             for order, part in rows.groupby("order", sort=False)

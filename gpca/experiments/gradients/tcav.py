@@ -61,10 +61,10 @@ def tcav(
     rows = []
     for tested, shown_N in examples.items():
         size = max(2, min(int(shown_N.sum()), int((~shown_N).sum())) // 2)
-        found = [_vector(scaled_N_d, shown_N, size, *axes, tested, v) for v in range(settings.vectors)]
+        probes = [_vector(scaled_N_d, shown_N, size, *axes, tested, v) for v in range(settings.vectors)]
         drawn = [_vector(scaled_N_d, None, size, *axes, tested, v) for v in range(settings.vectors)]
         for concept, gradient_N_d in gradients.items():
-            score_V, chance_V = ([_score(gradient_N_d, vector_d) for vector_d, _ in of] for of in (found, drawn))
+            score_V, chance_V = ([_score(gradient_N_d, vector_d) for vector_d, _ in of] for of in (probes, drawn))
             p = two_sided_p(score_V, chance_V)
             rows.append(
                 {
@@ -74,7 +74,7 @@ def tcav(
                     "chance": np.mean(chance_V),
                     "p": p,
                     "significant": int(p < settings.level / (len(examples) * len(gradients))),
-                    "probe": np.mean([accuracy for _, accuracy in found]),
+                    "probe": np.mean([accuracy for _, accuracy in probes]),
                 }
             )
     return pd.DataFrame(rows)

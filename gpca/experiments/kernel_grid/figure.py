@@ -87,9 +87,9 @@ def draw_kernel_curves(grid: pd.DataFrame, sources: Mapping[str, str], numbers: 
 
 def printed_accuracies(numbers: Iterable[Number], source: str) -> dict[tuple[str, float, int], float]:
     """Return the accuracies of Table IV for a source, in %, by kernel, learning rate and iterations."""
-    found = {}
+    printed = {}
     for number in numbers:
         if number.table == "IV" and number.counterpart and source in number.counterpart.sources:
             kernel, rate, iterations = number.counterpart.methods[0].split("-")
-            found[kernel, float(rate), int(iterations)] = number.value
-    return found
+            printed[kernel, float(rate), int(iterations)] = number.value
+    return printed

@@ -67,12 +67,12 @@ def draw_pipeline(
     files = list(curve_files)
     new, curves = _curves(files)
     source, _, seed = source_method_seed(files[0])
-    asked = first_round(stages, new, ActiveLearningSettings.from_dict(dict(active_learning)), source, seed)
+    labeling = first_round(stages, new, ActiveLearningSettings.from_dict(dict(active_learning)), source, seed)
     canvas = Canvas(TEXT_WIDTH_IN, 3.5)
     canvas.box(0.03, 1.9, 7.1, 1.4, color=LIGHT_GRAY)
     canvas.box(0.03, 0.03, 7.1, 1.6, color=LIGHT_GRAY)
-    _draw_inference(canvas, stages, row, encoder, asked)
-    _draw_active_learning(canvas, stages, asked, new, curves)
+    _draw_inference(canvas, stages, row, encoder, labeling)
+    _draw_active_learning(canvas, stages, labeling, new, curves)
     canvas.arrow((6.4, 1.97), (6.4, 1.63))
     canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
@@ -92,7 +92,7 @@ def _curves(files: list[str | Path]) -> tuple[str, dict[str, pd.DataFrame]]:
     raise InputError("active learning", f"has no curve of {' or '.join(TITLES)}", "run one of these strategies")
 
 
-def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, asked: Round) -> None:
+def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, labeling: Round) -> None:
     sample = stages.predictions.iloc[row]
     middle_in = 2.66
     captions_in = 2.17
@@ -115,7 +115,7 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, aske
     canvas.arrow((3.86, middle_in), (4.02, middle_in))
     canvas.box(4.02, 2.0, 1.2, 1.22, color=BLUE)
     canvas.text(4.62, 3.19, "multi-class GP classifier", va="top")
-    _draw_labeled(canvas.panel(4.07, 2.17, 1.1, 0.88), stages, row, asked)
+    _draw_labeled(canvas.panel(4.07, 2.17, 1.1, 0.88), stages, row, labeling)
     canvas.text(4.62, 2.03, "★ this sample", va="bottom")
     canvas.arrow((5.22, middle_in), (5.58, middle_in))
     draw_scores_with_numbers(canvas.panel(5.96, 2.42, 0.62, 0.62), sample)
@@ -124,18 +124,18 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, aske
     )
 
 
-def _draw_labeled(axes, stages: Stages, row: int, asked: Round) -> None:
+def _draw_labeled(axes, stages: Stages, row: int, labeling: Round) -> None:
     """Scatter the training samples by concept, and the sample that is shown."""
     of = stages.registrations
     for concept in CONCEPTS:
         rows = of.rows("train")[of.concept[of.rows("train")] == concept]
         look = {"marker": CONCEPT_MARKERS[concept], "color": CONCEPT_COLORS[concept], "alpha": 0.6, "linewidths": 0}
-        axes.scatter(*asked.map_S_2[rows].T, s=5, **look)
-    axes.scatter(*asked.map_S_2[row], s=45, marker="*", color=BLACK, zorder=5)
+        axes.scatter(*labeling.map_S_2[rows].T, s=5, **look)
+    axes.scatter(*labeling.map_S_2[row], s=45, marker="*", color=BLACK, zorder=5)
     axes.set_axis_off()
 
 
-def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str, curves: Mapping) -> None:
+def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: str, curves: Mapping) -> None:
     """Draw pool, score, diversify, annotate, retrain from right to left: the way back of the loop."""
     heads_in = 1.58
     captions_in = 0.08
@@ -143,43 +143,43 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, asked: Round, new: str
     canvas.text(0.1, heads_in, "Active learning", ha="left", va="top", fontweight="bold")
 
     canvas.text(6.4, heads_in, r"Unlabeled pool $\mathcal{D}_U$", va="top")
-    canvas.text(6.4, captions_in, f"{len(asked.rows_N)} training samples", va="bottom")
-    for place, of_pool in enumerate(thinned(asked.rows_N, THUMBNAILS)):
+    canvas.text(6.4, captions_in, f"{len(labeling.rows_N)} training samples", va="bottom")
+    for place, of_pool in enumerate(thinned(labeling.rows_N, THUMBNAILS)):
         corner = (5.9 + 0.36 * (place % 3), 0.86 - 0.56 * (place // 3))
         _draw_thumbnail(canvas.panel(*corner, 0.34, 0.5), stages, of_pool)
     canvas.arrow((5.84, middle_in), (5.62, middle_in))
 
     canvas.text(5.04, heads_in, "Score: BALD", va="top")
     panel = canvas.panel(4.5, 0.36, 1.08, 1.02)
-    bald_N = asked.bald_N
-    points_N_2 = asked.map_S_2[asked.rows_N]
+    bald_N = labeling.bald_N
+    points_N_2 = labeling.map_S_2[labeling.rows_N]
     order = np.argsort(bald_N, kind="stable")
-    panel.scatter(*asked.map_S_2[asked.labeled].T, s=5, marker="x", color=GRAY, linewidths=0.5)
+    panel.scatter(*labeling.map_S_2[labeling.labeled].T, s=5, marker="x", color=GRAY, linewidths=0.5)
     panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GRAY, linewidths=0.3)
-    panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
+    panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
     panel.set_axis_off()
     canvas.text(
         5.04,
         captions_in,
-        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(asked.candidates)}\nringed; ×: labeled before",
+        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(labeling.candidates)}\nringed; ×: labeled before",
         va="bottom",
     )
     canvas.arrow((4.46, middle_in), (4.24, middle_in))
 
     canvas.text(3.66, heads_in, "Diversify: $k$-means", va="top")
     panel = canvas.panel(3.12, 0.36, 1.08, 1.02)
-    panel.scatter(*points_N_2[asked.candidates].T, s=26, facecolors="white", edgecolors=BLACK, linewidths=0.7)
-    panel.scatter(*points_N_2[asked.chosen].T, s=26, facecolors=BLUE, edgecolors=BLACK, linewidths=0.7)
+    panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="white", edgecolors=BLACK, linewidths=0.7)
+    panel.scatter(*points_N_2[labeling.chosen].T, s=26, facecolors=BLUE, edgecolors=BLACK, linewidths=0.7)
     panel.margins(0.12)
     panel.set_axis_off()
-    canvas.text(3.66, captions_in, f"$B$ = {len(asked.chosen)} kept,\none of each cluster", va="bottom")
+    canvas.text(3.66, captions_in, f"$B$ = {len(labeling.chosen)} kept,\none of each cluster", va="bottom")
     canvas.arrow((3.08, middle_in), (2.88, middle_in))
 
     canvas.text(2.4, heads_in, "Annotate", va="top")
-    for place, i in enumerate(asked.chosen[:4]):
+    for place, i in enumerate(labeling.chosen[:4]):
         corner = (1.98 + 0.44 * (place % 2), 0.94 - 0.6 * (place // 2))
-        _draw_thumbnail(canvas.panel(*corner, 0.4, 0.46), stages, asked.rows_N[i])
-        concept = stages.predictions["concept_true"][asked.rows_N[i]]
+        _draw_thumbnail(canvas.panel(*corner, 0.4, 0.46), stages, labeling.rows_N[i])
+        concept = stages.predictions["concept_true"][labeling.rows_N[i]]
         canvas.text(corner[0] + 0.2, corner[1] - 0.01, concept, va="top")
     canvas.arrow((1.92, middle_in), (1.72, middle_in))
 

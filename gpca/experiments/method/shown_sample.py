@@ -102,9 +102,9 @@ class Stages:
 
     def _uncertain_failures(self, concept: str) -> pd.DataFrame:
         rows = self.predictions
-        found = rows[(rows["split"] == "test") & (rows["concept_true"] == concept) & (self.u_S > self.u_clean)]
-        found = found[found["concept_predicted"] == concept]
-        return found[[self.state(row) == FAILED for row in found.index]]
+        uncertain = rows[(rows["split"] == "test") & (rows["concept_true"] == concept) & (self.u_S > self.u_clean)]
+        uncertain = uncertain[uncertain["concept_predicted"] == concept]
+        return uncertain[[self.state(row) == FAILED for row in uncertain.index]]
 
     def error(self, row: int) -> float:
         """Return how far off a row is after ICP, in diameters."""

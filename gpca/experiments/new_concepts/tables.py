@@ -129,12 +129,12 @@ def tests_of_causes(conditions: Mapping) -> dict[str, int]:
 def _fewer(table: TableBuilder) -> str:
     """Return the words on the datasets with fewer seeds of Geometry than of the rest, if there are any."""
     most = table.most_seeds()
-    told = {
+    seeds_of = {
         table.rows[row][0][1]: plural(cell.seeds, "seed")
         for (row, key), cell in table.cells.items()
         if key == GEOMETRY and cell.seeds < most
     }
-    return f" ({', '.join(f'{title}: {seeds}' for title, seeds in told.items())})" if told else ""
+    return f" ({', '.join(f'{title}: {seeds}' for title, seeds in seeds_of.items())})" if seeds_of else ""
 
 
 def _within(metrics: pd.DataFrame, test: int) -> Cell | None:

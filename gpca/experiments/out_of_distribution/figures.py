@@ -170,5 +170,5 @@ def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[st
 
 def _of(learned: Mapping, source: str, learner: str, of_set: str) -> list:
     """Return the rows of a set, seed by seed."""
-    found = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
-    return [rows for rows in found if len(rows)]
+    parts = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
+    return [rows for rows in parts if len(rows)]

@@ -59,8 +59,8 @@ def predict_sets(make: Callable[[], ConceptExplainer], sets: ShiftedSets) -> pd.
             continue
         learner = make()
         learner.fit(sets.registrations(sets.rows(home, "train")))
-        asked = sets.registrations(rows)
-        frame = prediction_frame(asked, learner.explain(asked.without_labels()))
+        test = sets.registrations(rows)
+        frame = prediction_frame(test, learner.explain(test.without_labels()))
         frame.insert(0, "set", sets.set[rows])
         frames.append(frame)
     return pd.concat(frames, ignore_index=True)

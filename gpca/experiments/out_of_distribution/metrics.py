@@ -55,7 +55,7 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     for path in set_files:
         _, source, seed = source_method_seed(path)
         distances[source, seed] = (path, _distances(ShiftedSets.load(path)))
-    found = {}
+    predictions = {}
     for path in prediction_files:
         source, learner, seed = source_method_seed(path)
         rows = read_predictions(path, ("set",))
@@ -69,8 +69,8 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
             if not keys.isin(measured.index).all():
                 raise InputError(other, f"lacks samples of {path}", "regenerate both from the same config")
             rows = rows.join(measured.loc[keys].set_axis(rows.index))
-        found[source, learner, seed] = rows
-    return found
+        predictions[source, learner, seed] = rows
+    return predictions
 
 
 def collect_diagnostics(prediction_files: Iterable[str | Path], set_files: Iterable[str | Path]) -> pd.DataFrame:
@@ -159,11 +159,11 @@ def scores_of(rows: pd.DataFrame) -> list[str]:
 
 
 def _uncertainties(path, rows: pd.DataFrame, p_S_C: np.ndarray) -> dict[str, np.ndarray]:
-    found = {"max_score": 1 - p_S_C.max(axis=1), "entropy": numbers(path, rows, "entropy")}
+    uncertainties = {"max_score": 1 - p_S_C.max(axis=1), "entropy": numbers(path, rows, "entropy")}
     variances = [name for name in rows.columns if name.startswith("variance_")]
     if variances and (rows["bald"] != "").all():
-        found |= {"bald": numbers(path, rows, "bald"), "variance": rows[variances].sum(axis=1)}
-    return found
+        uncertainties |= {"bald": numbers(path, rows, "bald"), "variance": rows[variances].sum(axis=1)}
+    return uncertainties
 
 
 def _distances(sets: ShiftedSets) -> pd.DataFrame:

@@ -81,17 +81,17 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
     episodes: list[Episode] = []
     tries: dict[str, int] = {}
     for cause in CONCEPTS:
-        found: dict[bool, list[tuple[Situation, Attempt]]] = {True: [], False: []}
+        cases: dict[bool, list[tuple[Situation, Attempt]]] = {True: [], False: []}
         tries[cause] = 0
         for number in progress(range(settings.tries), f"failures by {cause}"):
-            if len(found[True]) == settings.failures:
+            if len(cases[True]) == settings.failures:
                 break
-            misplaced = 1 if number % 2 and len(found[False]) < settings.failures else MISPLACED
+            misplaced = 1 if number % 2 and len(cases[False]) < settings.failures else MISPLACED
             case, tried = _try_situation(situations, cause, number, settings, misplaced)
             tries[cause] += tried
-            if case and len(of_kind := found[not is_right(case[1])]) < settings.failures:
+            if case and len(of_kind := cases[not is_right(case[1])]) < settings.failures:
                 of_kind.append(case)
-        for situation, start in (*found[True], *found[False]):
+        for situation, start in (*cases[True], *cases[False]):
             episodes.append(Episode(len(episodes), situation, start, tries[cause]))
     if not any(episode.failed for episode in episodes):
         counts = ", ".join(f"{n} of {cause}" for cause, n in tries.items())

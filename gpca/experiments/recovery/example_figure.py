@@ -51,30 +51,32 @@ def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = ""
     Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
     object's name in words follows from its `dataset` of the BOP benchmark.
     """
-    found = load_arrays(example_npz, SHAPES)
+    example = load_arrays(example_npz, SHAPES)
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 2.0), layout="constrained")
     polar = {"c": {"projection": "polar"}}
     axes = figure.subplot_mosaic("abcd", width_ratios=(2.2, 1.3, 1.6, 2.2), per_subplot_kw=polar)
     for letter, view in (("a", "first"), ("d", "next")):
-        silhouettes = (found[f"{name}_{view}"].astype(bool) for name in SILHOUETTES)
-        _draw_view(axes[letter], found[f"image_{view}"], *silhouettes)
-    shown = found["scores"]
-    draw_score_bars(axes["b"], shown.tolist(), str(found["cause"]))
+        silhouettes = (example[f"{name}_{view}"].astype(bool) for name in SILHOUETTES)
+        _draw_view(axes[letter], example[f"image_{view}"], *silhouettes)
+    shown = example["scores"]
+    draw_score_bars(axes["b"], shown.tolist(), str(example["cause"]))
     axes["b"].set(xlim=(min(0, shown.min()), max(1, shown.max())), box_aspect=1)
-    _draw_viewpoints(figure, axes["c"], found)
-    before, after = (100 * error for error in found["errors"])
+    _draw_viewpoints(figure, axes["c"], example)
+    before, after = (100 * error for error in example["errors"])
     solved = "solved" if after <= 100 * CORRECT else "not solved"
-    chosen, first = (100 * share for share in (found["surface_n"][int(found["chosen"])], found["surface_first"]))
+    chosen, first = (100 * share for share in (example["surface_n"][int(example["chosen"])], example["surface_first"]))
     captions = (
-        f"(a) Occluded: pose {before:.0f} % $d$ off" if str(found["cause"]) == "overlap" else f"(a) {before:.0f} % off",
-        f"(b) Score: {CONCEPTS[int(np.argmax(shown))]} leads{_instead(str(found['action']))}",
+        f"(a) Occluded: pose {before:.0f} % $d$ off"
+        if str(example["cause"]) == "overlap"
+        else f"(a) {before:.0f} % off",
+        f"(b) Score: {CONCEPTS[int(np.argmax(shown))]} leads{_instead(str(example['action']))}",
         f"(c) Surface seen: {first:.0f} % $\\to$ {chosen:.0f} %",
         f"(d) New view: {after:.1f} % $d$ off, {solved}",
     )
     for letter, caption in zip("acd", (captions[0], *captions[2:]), strict=True):
         write_below(axes[letter], caption)
     axes["b"].set_xlabel(captions[1], labelpad=1)
-    name = object_in_words(found["object"], dataset)
+    name = object_in_words(example["object"], dataset)
     write_title(figure, f"{title}: {name}; outlines: where it is (yellow), where ICP put it (red)")
     return figure
 
@@ -95,14 +97,14 @@ def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, pla
     panel.set_axis_off()
 
 
-def _draw_viewpoints(figure, panel, found: Mapping[str, np.ndarray]) -> None:
+def _draw_viewpoints(figure, panel, example: Mapping[str, np.ndarray]) -> None:
     """Show the viewpoints from above: the darker, the more surface should be seen after it; the chosen is ringed."""
-    towards = found["viewpoints_n_3"]
+    towards = example["viewpoints_n_3"]
     azimuth, zenith_deg = np.arctan2(towards[:, 1], towards[:, 0]), _zenith_deg(towards)
     look = {"cmap": blues(), "vmin": 0, "vmax": 1, "edgecolors": BLACK}
-    widths = np.where(np.arange(len(towards)) == int(found["chosen"]), 1.6, 0.3)
-    dots = panel.scatter(azimuth, zenith_deg, c=found["surface_n"], s=24, linewidths=widths, **look)
-    first = found["viewpoint_first"]
+    widths = np.where(np.arange(len(towards)) == int(example["chosen"]), 1.6, 0.3)
+    dots = panel.scatter(azimuth, zenith_deg, c=example["surface_n"], s=24, linewidths=widths, **look)
+    first = example["viewpoint_first"]
     panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=TARGET_COLOR)
     panel.set(rlim=(0, 90), xticks=[], yticks=[30, 60, 90])
     panel.set_yticklabels([])

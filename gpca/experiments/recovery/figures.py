@@ -85,8 +85,8 @@ def draw_recovery_rates(metrics: pd.DataFrame, title: str, policies: Mapping[str
 
 def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: Mapping[str, str]) -> None:
     """Draw the rates of one kind, a little above or below the middle of each policy's row, with their intervals."""
-    found = {row: pool_share(metrics, name, metric, concept) for row, name in enumerate(shown)}
-    rates = {row: rate for row, rate in found.items() if rate is not None}
+    rates_or_none = {row: pool_share(metrics, name, metric, concept) for row, name in enumerate(shown)}
+    rates = {row: rate for row, rate in rates_or_none.items() if rate is not None}
     for row, (share, trials) in rates.items():
         low, high = wilson_interval(share * trials, trials)
         axes.plot([100 * low, 100 * high], [row + offset] * 2, color=look["color"], linewidth=0.8)

@@ -33,7 +33,7 @@ def run(job: Job) -> None:
     recovery = settings.section
     loop = settings.loop
     objects = resolve(dict(settings.objects), job.data_dir)
-    actions = {name: action_of(name, given or {}) for name, given in recovery["actions"].items()}
+    actions = {name: action_of(name, of_action or {}) for name, of_action in recovery["actions"].items()}
     entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
     outputs = [job.rows, job.timings, job.queue, job.policy, job.example]
     axes = (SOURCE, job.seed)

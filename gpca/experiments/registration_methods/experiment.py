@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
 from gpca.alignment.methods.registry import (
     installed,
@@ -16,7 +16,6 @@ from gpca.alignment.methods.registry import (
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.registration_methods.settings import PairSettings
-from gpca.settings import part_of
 
 
 def check(config: dict, names_left_out: LeftOut) -> None:
@@ -48,7 +47,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 EXPERIMENT = Experiment(
     name="registration_methods",
-    sections={"method_pairs": Annotated[dict, part_of(PairSettings)], "methods": ByName},
+    sections={"method_pairs": PairSettings, "methods": ByName},
     tidy=(
         Tidy(
             "registration_methods.csv",

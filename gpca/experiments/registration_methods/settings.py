@@ -19,7 +19,7 @@ class PairSettings:
         global_start: the global method at whose pose local methods start a second time.
     """
 
-    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 60
-    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 512
-    success: PositiveShare = 0.02
-    global_start: str = "fgr"
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)]
+    success: PositiveShare
+    global_start: str

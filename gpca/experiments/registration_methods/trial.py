@@ -51,7 +51,7 @@ def try_methods(
     """
     import pandas as pd
 
-    made = {name: make_method(name, given) for name, given in methods.items()}
+    made = {name: make_method(name, entry) for name, entry in methods.items()}
     start = settings.global_start
     require_global(start)
     if start not in made:
@@ -74,14 +74,14 @@ def try_methods(
             **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
             "symmetric": judge.symmetric,
         }
-        found = _timed(made[start], pair)
+        coarse = _timed(made[start], pair)
         for name, method in made.items():
-            for started_at, outcome, seconds in _attempts(name, method, pair, start, found):
+            for started_at, outcome, seconds in _attempts(name, method, pair, start, coarse):
                 errors = judge(outcome.T_target_source, T_true)
                 success = outcome.converged and errors["add_relative"] < settings.success
                 of_outcome = {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
-                told = known | {"start": started_at, "success": success} | errors | of_outcome
-                records[name].append(told | {"seconds": seconds})
+                row_of_trial = known | {"start": started_at, "success": success} | errors | of_outcome
+                records[name].append(row_of_trial | {"seconds": seconds})
     return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
 
 
@@ -99,10 +99,10 @@ def pair_to_register(registrations: Registrations, row: int, source: str, seed: 
 
 
 def _attempts(
-    name: str, method: Method, pair: Pair, start: str, found: tuple[Outcome, float]
+    name: str, method: Method, pair: Pair, start: str, coarse_and_seconds: tuple[Outcome, float]
 ) -> Iterator[tuple[str, Outcome, float]]:
-    """Yield start, outcome and seconds of each run of a method; `found` is what the global method `start` found."""
-    coarse, coarse_seconds = found
+    """Yield start, outcome and seconds of each run of a method; those of the global method `start` are known."""
+    coarse, coarse_seconds = coarse_and_seconds
     if name == start:
         yield NO_START, coarse, coarse_seconds
     elif method_entry(name).is_global:

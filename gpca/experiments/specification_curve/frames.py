@@ -68,12 +68,12 @@ def of_objects(registrations: Registrations, which: str) -> np.ndarray:
 
 def values(true_S: np.ndarray, named_S: np.ndarray) -> Values:
     """Return the accuracies, and how often pose errors and missing overlap are taken for each other."""
-    found = accuracies_of_named(true_S, named_S)
+    metrics = accuracies_of_named(true_S, named_S)
     for concept, other in (("pose", "overlap"), ("overlap", "pose")):
         of_concept_S = true_S == concept
-        found["test_samples", concept] = float(of_concept_S.sum())
-        found[f"predicted_as_{other}", concept] = float((named_S[of_concept_S] == other).sum())
-    return found | {("test_samples", ALL): float(len(true_S))}
+        metrics["test_samples", concept] = float(of_concept_S.sum())
+        metrics[f"predicted_as_{other}", concept] = float((named_S[of_concept_S] == other).sum())
+    return metrics | {("test_samples", ALL): float(len(true_S))}
 
 
 def _predicted(run_files: RunFiles, source: str, method: str, seed: int) -> np.ndarray:

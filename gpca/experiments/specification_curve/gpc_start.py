@@ -69,7 +69,7 @@ def scores(
         "unit_norm": normalize,
         "raw": np.asarray,
     }[reading["inputs"]]
-    inputs_N_d, asked = (torch.from_numpy(scale(h).astype(np.float32)) for h in (h_N_d, asked_S_d))
+    inputs_N_d, test_S_d = (torch.from_numpy(scale(h).astype(np.float32)) for h in (h_N_d, asked_S_d))
     targets_N = torch.tensor([CONCEPTS.index(concept) for concept in concept_N])
     lengthscale = DEFAULT_LENGTHSCALE
     if reading["lengthscale"] == "median":
@@ -88,7 +88,7 @@ def scores(
             (-model.elbo(inputs_N_d[rows], targets_N[rows]) - too_much).backward()
         optimizer.step()
     normal_M_C = generator(*axes, "draws").normal(size=(settings.draws, len(CONCEPTS)))
-    return summarize_marginals(*model.latents().marginals(Prior.of(model).project(asked)), normal_M_C)[0]
+    return summarize_marginals(*model.latents().marginals(Prior.of(model).project(test_S_d)), normal_M_C)[0]
 
 
 def _inducing(inputs_N_d: torch.Tensor, start: str, most: int, axes: tuple, random: torch.Generator) -> torch.Tensor:

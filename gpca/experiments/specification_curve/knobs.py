@@ -16,9 +16,10 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
+from gpca.uncertainty.conditions import CORNERS
 from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow, design_rows
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
-from gpca.uncertainty.settings import CORNERS, UncertaintySettings
+from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence, log_determinant, log_residual
 
 # Step from the untouched pair, of each knob.
@@ -29,8 +30,8 @@ def sensitivity(run_files: RunFiles, readings: Sequence[Reading], sizes: Reading
     """Yield the accuracies of local sensitivity analysis under each reading."""
     settings = run_files.uncertainty()
     for source, seed, pairs in _pairs(run_files, sizes, settings, settings.starts, "sensitivity"):
-        found = [(concept, _steps(runs["observed"], settings)) for concept, runs in pairs]
-        concept_S, measured = zip(*found, strict=True)
+        steps = [(concept, _steps(runs["observed"], settings)) for concept, runs in pairs]
+        concept_S, measured = zip(*steps, strict=True)
         for reading in readings:
             step_3 = STEPS[reading["step"]]
             values_S_K = np.array([of_sample[reading["quantity"]] for of_sample in measured])
@@ -88,20 +89,20 @@ def _steps(pair: tuple, settings: UncertaintySettings) -> dict[str, np.ndarray]:
     (_, target, _, T_ref), knob_runs = pair
     untouched = np.array(UNTOUCHED)
     conditions = [untouched] + [untouched + step_3 * knob for step_3 in STEPS.values() for knob in np.eye(3)]
-    found = [knob_runs.runs(Knobs(*condition)) for condition in conditions]
-    spread_K = np.array([runs.covariance(T_ref) for runs, _ in found])
+    moved = [knob_runs.runs(Knobs(*condition)) for condition in conditions]
+    spread_K = np.array([runs.covariance(T_ref) for runs, _ in moved])
     distance = settings.icp.correspondence_distance
-    best = [runs.T_target_source_n[runs.cost_n(distance).argmin()] for runs, _ in found]
+    best = [runs.T_target_source_n[runs.cost_n(distance).argmin()] for runs, _ in moved]
     return {quantity: _worth(spread_K, quantity, settings.floor) for quantity in WORTHS} | {
         "trace": np.trace(spread_K, axis1=1, axis2=2),
         "residual": np.array(
             [
                 log_residual(transform(inverse(T), target), cKDTree(source))
-                for T, (_, source) in zip(best, found, strict=True)
+                for T, (_, source) in zip(best, moved, strict=True)
             ]
         ),
-        "inlier_rmse": np.array([runs.inlier_rmse_n.mean() for runs, _ in found]),
-        "inlier_rmse_of_one": np.array([runs.inlier_rmse_n[0] for runs, _ in found]),
+        "inlier_rmse": np.array([runs.inlier_rmse_n.mean() for runs, _ in moved]),
+        "inlier_rmse_of_one": np.array([runs.inlier_rmse_n[0] for runs, _ in moved]),
     }
 
 

@@ -27,7 +27,7 @@ def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes)
     base, target = _base(run_files)
     for source, seed, _, registrations in run_files.in_distribution():
         started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
-        found: dict[tuple, dict[str, float]] = {}
+        labeled: dict[tuple, dict[str, float]] = {}
         for reading in progress(readings, f"pools of {source}, seed {seed}"):
             start = (reading["new_share"], reading["initial"])
             settings = replace(base, initial=reading["initial"])
@@ -45,15 +45,15 @@ def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes)
                 "random": (RANDOM_BATCH, len(begun[0].pool)),
             }
             for strategy, (batch, budgeted) in rounds_of.items():
-                if (key := (*start, strategy, batch)) not in found:
+                if (key := (*start, strategy, batch)) not in labeled:
                     budget = replace(settings, batch=batch, labels=budgeted)
                     steps, _ = until(target, *begun, strategy, budget, source, seed)
-                    found[key] = {
+                    labeled[key] = {
                         "labels_to_target": steps[-1]["labels"],
                         "epochs_to_target": sum(step["epochs"] for step in steps),
                         "reached": float(steps[-1]["accuracy"] >= target),
                     }
-                for metric, value in found[key].items():
+                for metric, value in labeled[key].items():
                     yield reading, source, strategy, metric, NEW, seed, float(value)
 
 

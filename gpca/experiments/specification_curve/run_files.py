@@ -70,10 +70,10 @@ def by_method(paths: Iterable[Path]) -> dict[tuple[str, str, int], Path]:
 
 def by_backbone(paths: Iterable[Path]) -> dict[tuple[str, str, int], Path]:
     """Return files named ``…/{source}/{backbone}/{reduction}/seed{seed}.npz`` by source, method and seed."""
-    found = {}
+    files = {}
     for path in paths:
         backbone, reduction, seed = source_method_seed(path)
         if len(path.parts) < 4:
             raise InputError(path, "is not named …/{source}/{backbone}/{reduction}/seed{number}.npz", "rename it")
-        found[path.parts[-4], f"{backbone}-{reduction}", seed] = path
-    return found
+        files[path.parts[-4], f"{backbone}-{reduction}", seed] = path
+    return files

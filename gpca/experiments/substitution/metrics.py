@@ -56,8 +56,8 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 def _of_estimators(rows: pd.DataFrame) -> Iterator[tuple[str, str, dict[str, float]]]:
-    said = rows.set_index(["asked_of", "split", "sample"])["concept_predicted"]
-    usual = said.loc[MONTE_CARLO] if MONTE_CARLO in set(rows["asked_of"]) else None
+    named_by = rows.set_index(["asked_of", "split", "sample"])["concept_predicted"]
+    usual = named_by.loc[MONTE_CARLO] if MONTE_CARLO in set(rows["asked_of"]) else None
     for estimator, of_estimator in rows.groupby("asked_of", sort=False):
         for concept in (ALL, *of_estimator["concept_true"].unique()):
             chosen = of_estimator if concept == ALL else of_estimator[of_estimator["concept_true"] == concept]
@@ -66,7 +66,7 @@ def _of_estimators(rows: pd.DataFrame) -> Iterator[tuple[str, str, dict[str, flo
                 untold = chosen[FAILURE] != ""
                 metrics |= {"no_estimate": untold.mean(), "abstained": (chosen["abstained"] & ~untold).mean()}
                 if usual is not None:
-                    own = said.loc[estimator]
+                    own = named_by.loc[estimator]
                     metrics["agreement"] = (own == usual.reindex(own.index)).mean()
             yield estimator, concept, metrics
 

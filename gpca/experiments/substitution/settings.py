@@ -36,11 +36,3 @@ class ExchangeSettings:
     estimators: Distinct[str] = ("monte_carlo",)
     estimated_train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 24
     estimated_test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 9
-
-    @classmethod
-    def from_dict(cls, settings: dict) -> ExchangeSettings:
-        """Build from the config's section ``exchange``; sources and explainers are not among the settings."""
-        given = {name: value for name, value in settings.items() if name not in ("sources", "explainers")}
-        for name in {"methods", "estimators"} & set(given):
-            given[name] = tuple(given[name])
-        return cls(**given)

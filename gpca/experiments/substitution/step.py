@@ -17,6 +17,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
 from gpca.uncertainty.settings import UncertaintySettings
 
 
@@ -24,7 +25,8 @@ def run(job: Job) -> None:
     """Let every explainer learn and explain with each method and each estimator beneath it, seed by seed."""
     for name in job.section("explainers"):
         require_exchangeable(name)
-    settings, encoder = ExchangeSettings.from_dict(job.section("exchange")), EncoderSettings(**job.section("encoder"))
+    settings = read_settings(ExchangeSettings, job.section("exchange"))
+    encoder = EncoderSettings(**job.section("encoder"))
     methods = job.by_name("methods", settings.methods)
     estimators = job.by_name("estimators", settings.estimators)
     runs = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
@@ -47,5 +49,5 @@ def run(job: Job) -> None:
             write_csv(out, exchange.run(Registrations.load(registrations_path, (job.source, seed)), judges))
 
 
-def _embedded(model, encoder: EncoderSettings, seed: int, asked: Registrations, source: str):
-    return embed(model, asked, source, seed, encoder)
+def _embedded(model, encoder: EncoderSettings, seed: int, registrations: Registrations, source: str):
+    return embed(model, registrations, source, seed, encoder)

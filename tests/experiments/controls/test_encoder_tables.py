@@ -4,7 +4,7 @@ import pytest
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
 from gpca.experiments.controls.encoder_tables import table10_costs, table10_encoders
-from gpca.experiments.controls.intervals import COLUMNS
+from gpca.experiments.controls.metrics import COLUMNS
 from gpca.experiments.diagnosis.judged import POOLED
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": False}}

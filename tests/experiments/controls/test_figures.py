@@ -6,7 +6,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.experiments.controls.figures import SUCCEEDS, draw_severity_curves, draw_transfer
-from gpca.experiments.controls.intervals import COLUMNS as INTERVALS
+from gpca.experiments.controls.metrics import COLUMNS as INTERVALS
 from gpca.experiments.controls.severity import COLUMNS as SEVERITIES
 from gpca.experiments.controls.severity import REGISTRATION
 

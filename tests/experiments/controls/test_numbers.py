@@ -9,9 +9,7 @@ import pytest
 from gpca.attribution.metrics import write_metrics
 from gpca.errors import InputError
 from gpca.experiments.controls.costs import collect_costs
-from gpca.experiments.controls.intervals import collect as collect_intervals
-from gpca.experiments.controls.intervals import read_intervals
-from gpca.experiments.controls.metrics import collect, read_controls
+from gpca.experiments.controls.metrics import collect, collect_intervals, read_controls, read_intervals
 from gpca.experiments.controls.protocol import LABELS
 from gpca.experiments.controls.samples import sample_table
 from gpca.experiments.controls.severity import REGISTRATION, read_severities

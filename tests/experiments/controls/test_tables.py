@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.controls.intervals import COLUMNS
+from gpca.experiments.controls.metrics import COLUMNS
 from gpca.experiments.controls.tables import table10_controls, table10_transfer
 from gpca.experiments.diagnosis.judged import POOLED
 

@@ -101,4 +101,4 @@ def test_what_a_source_does_not_admit_is_said(six, registrations):
 
 def test_a_range_that_runs_downwards_is_refused():
     with pytest.raises(InputError, match=r"\[64, 32\] is in descending order"):
-        ControlSettings.from_dict({"draw_points": [64, 32], "explainers": {}})
+        ControlSettings(draw_points=(64, 32))

@@ -3,8 +3,8 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.intervals import COLUMNS
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.experiments.diagnosis.tables import table9_causes, table9_frames
 from gpca.experiments.frame_causes.metrics import KINDS, TRUTH
 

@@ -15,7 +15,8 @@ from gpca.experiments.judge import Judges
 from gpca.uncertainty.spread import divergence
 
 SETTINGS = EstimatorPairSettings(
-    methods={"point_to_point": 4, "point_to_plane": 2}, train=8, train_starts=7, points=64, starts=40
+    **{"methods": {"point_to_point": 4, "point_to_plane": 2}, "train": 8, "train_starts": 7, "points": 64},
+    **{"starts": 40, "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6, "failed": 0.03},
 )
 ESTIMATORS = {"censi": {}, "brossard": {}, "cello": {"steps": 2}}
 

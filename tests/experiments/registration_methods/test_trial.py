@@ -10,7 +10,7 @@ from gpca.errors import InputError
 from gpca.experiments.registration_methods.settings import PairSettings
 from gpca.experiments.registration_methods.trial import pair_to_register, try_methods
 
-SETTINGS = PairSettings(samples=6, points=100)
+SETTINGS = PairSettings(samples=6, points=100, success=0.02, global_start="fgr")
 METHODS = {"point_to_point": {}, "fgr": {}, "point_to_plane": {"max_iterations": 1}}
 
 

@@ -19,8 +19,7 @@ from gpca.experiments.estimators.examples import true_twist
 from gpca.experiments.explained import require_exchangeable
 from gpca.experiments.judge import Judges
 from gpca.experiments.substitution.estimated import OBSERVED, KnobbedRegistrar
-from gpca.experiments.substitution.exchange import UNTAUGHT, Exchange
-from gpca.experiments.substitution.registered import registered_by
+from gpca.experiments.substitution.exchange import UNTAUGHT, Exchange, registered_by
 from gpca.experiments.substitution.settings import ExchangeSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator

@@ -1,0 +1,58 @@
+# Registrations with measured causes -> what explainers say of them.
+
+
+def read_by(cause_explainer):
+    """Return the folder of what an explainer of causes reads."""
+    entry = explainer_entry(cause_explainer, CAUSES)
+    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"
+
+
+rule diagnoses:
+    input:
+        collect(
+            "<results>/diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
+            source=SOURCES,
+            cause_explainer=DIAGNOSIS["explainers"],
+            seed=SEEDS,
+        ),
+
+
+rule diagnose:
+    input:
+        causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
+        read=lambda wildcards: collect(
+            f"<results>/{read_by(wildcards.cause_explainer)}/{wildcards.source}/seed{{seed}}.npz",
+            seed=SEEDS,
+        ),
+        read_timings=lambda wildcards: collect(
+            f"<results>/timings/{wildcards.source}/{read_by(wildcards.cause_explainer)}/seed{{seed}}.csv",
+            seed=SEEDS,
+        ),
+        code=lambda wildcards: code_files(
+            "gpca.experiments.diagnosis.step",
+            explainer_module(wildcards.cause_explainer, CAUSES),
+        ),
+    output:
+        predictions=collect(
+            "<results>/diagnoses/{{source}}/{{cause_explainer}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/diagnoses_{{cause_explainer}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/diagnoses/{source}/{cause_explainer}.log",
+    benchmark:
+        "<benchmarks>/diagnoses/{source}/{cause_explainer}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.experiments.diagnosis.step",
+        explainer=lambda wildcards: wildcards.cause_explainer,
+        settings=lambda wildcards: as_json(
+            DIAGNOSIS["explainers"][wildcards.cause_explainer] or {}
+        ),
+        seeds=SEEDS,
+    script:
+        "../scripts/step.py"
