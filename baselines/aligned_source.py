@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from baselines.concept_vectors import ConceptVectors
 from baselines.softmax_head import SoftmaxHead
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry
 

@@ -50,7 +50,7 @@ class AnalyticalGPC(GPCA):
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the features, the point-count ratio last, unless they are attached already."""
-        measure = partial(analytical_features, shape_points=self._shape_points, neighbours=self._neighbors)
+        measure = partial(analytical_features, shape_points=self._shape_points, neighbors=self._neighbors)
         return measured(registrations, self._prefix, lambda: {"features": measure(registrations, *self._axes)})
 
     def features(self, registrations: Registrations) -> np.ndarray:

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.descriptors import DescriptorClassifier, boosted_trees, joined, randomized_trees
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.settings import GPCArguments
 from gpca.explainers.concept_classifier import known_concepts
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, ScoringExplainer, attached
-from gpca.features.groups import GROUPS
+from gpca.features.settings import GROUPS
 from gpca.pairs.dataset import Registrations
 
 

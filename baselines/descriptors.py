@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.classifier.settings import LearningRate
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ExplainerEntry, attached
-from gpca.features.groups import DENSITIES, GROUPS, RESIDUALS
+from gpca.features.settings import DENSITIES, GROUPS, RESIDUALS
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
@@ -25,7 +25,7 @@ class DescriptorClassifier(ClassifierExplainer):
 
     Args:
         classifier: an unfitted classifier with ``predict_proba``.
-        groups: names in :data:`gpca.features.groups.GROUPS`.
+        groups: names in :data:`gpca.features.settings.GROUPS`.
         columns: of all of them together, those that it reads; None for all.
     """
 

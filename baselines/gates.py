@@ -6,14 +6,15 @@ Below the best threshold of an alarm nothing is wrong: so a method that has no c
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from gpca.attribution.scores import Attribution
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
-from gpca.features.groups import MOTION
+from gpca.features.settings import MOTION
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -58,18 +59,18 @@ assert LABELS[0] == NOMINAL  # scores have its column first
 
 
 class Gate(ScoringExplainer):
-    """An alarm by one of the numbers of the motion, times a sign.
+    """An alarm by one of the numbers of the motion.
 
     Args:
-        name: in :data:`gpca.features.groups.MOTION`.
-        sign: −1 where small values are bad.
+        name: in :data:`gpca.features.settings.MOTION`.
+        source, seed: not used; nothing is drawn.
     """
 
     labels = LABELS
 
-    def __init__(self, name: str, sign: int = 1) -> None:
+    def __init__(self, name: str, source: str, seed: int) -> None:
         self._column = MOTION.index(name)
-        self._sign = sign
+        self._sign = -1 if name == "fitness" else 1  # of the others, large values are bad
 
     def fit(self, registrations: Registrations) -> None:
         """Learn the threshold."""
@@ -88,23 +89,9 @@ class Gate(ScoringExplainer):
         return self._sign * attached(registrations, "motion")[:, self._column]
 
 
-def gate_rmse(source: str, seed: int) -> Gate:
-    """Make the gate on ICP's inlier RMSE."""
-    return Gate("inlier_rmse")
-
-
-def gate_fitness(source: str, seed: int) -> Gate:
-    """Make the gate on ICP's fitness, the share of points with a partner."""
-    return Gate("fitness", sign=-1)
-
-
-def gate_spread(source: str, seed: int) -> Gate:
-    """Make the gate on the log-determinant of the covariance over other starts, which needs no clean run."""
-    return Gate("log_determinant")
-
-
 CAUSE_EXPLAINERS = {
-    "gate_rmse": ExplainerEntry("Inlier RMSE (gate)", gate_rmse, reads="descriptors"),
-    "gate_fitness": ExplainerEntry("Fitness (gate)", gate_fitness, reads="descriptors"),
-    "gate_spread": ExplainerEntry("Spread of the runs (gate)", gate_spread, reads="descriptors"),
+    "gate_rmse": ExplainerEntry("Inlier RMSE (gate)", partial(Gate, "inlier_rmse"), reads="descriptors"),
+    "gate_fitness": ExplainerEntry("Fitness (gate)", partial(Gate, "fitness"), reads="descriptors"),
+    # The determinant of the covariance over other starts needs no clean run.
+    "gate_spread": ExplainerEntry("Spread of the runs (gate)", partial(Gate, "log_determinant"), reads="descriptors"),
 }

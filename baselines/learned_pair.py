@@ -54,8 +54,8 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
         draw = PairDraw(self._prefix + "points", self._prefix + "motion")
 
-        def seen(asked: Registrations) -> Registrations:
-            described = self.describe(asked)
+        def seen(pairs: Registrations) -> Registrations:
+            described = self.describe(pairs)
             motion = self.features(described)[:, -MOTION:]
             return replace(described, attached={**described.attached, draw.motion: motion})
 
@@ -63,8 +63,8 @@ class LearnedPairGPCA(PairDescription, GPCA):
         settings = EncoderSettings(self._encoder, draw_points, draws=2, epochs=epochs, learning_rate=learning_rate)
         encoder = learn_pair_encoder(seen(registrations), settings, draw, *self._axes)
 
-        def embed(asked: Registrations) -> Registrations:
-            described = self.describe(asked)
+        def embed(pairs: Registrations) -> Registrations:
+            described = self.describe(pairs)
             return replace(described, attached={**described.attached, self._embedding: encoder(seen(described))})
 
         return embed

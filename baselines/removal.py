@@ -8,13 +8,14 @@ all causes left alone, v̂ is the alarm that tells whether anything is wrong.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from baselines.gates import NominalThreshold
 from baselines.sensitivity import single_drops
 from baselines.shap_kl import shapley_values
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.shapley import ALL, SUBSETS
 from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
@@ -24,11 +25,16 @@ SMALLEST = 1e-4  # diameters: what a remedy moves less is rounding and chance
 
 
 class RemovalValues(ScoringExplainer):
-    """Values (N, 3) of the remedies by v̂ of the eight subsets."""
+    """Values (N, 3) of the remedies by v̂ of the eight subsets.
+
+    Args:
+        values: v̂ (N, 8) -> the values.
+        source, seed: not used; nothing is drawn.
+    """
 
     labels = LABELS
 
-    def __init__(self, values: Callable[[np.ndarray], np.ndarray]) -> None:
+    def __init__(self, values: Callable[[np.ndarray], np.ndarray], source: str, seed: int) -> None:
         self._values = values
 
     def fit(self, registrations: Registrations) -> None:
@@ -57,17 +63,12 @@ def _alarm(errors_N_8: np.ndarray) -> np.ndarray:
     return np.log(np.maximum(errors_N_8[:, ALL], SMALLEST))
 
 
-def shap_removal(source: str, seed: int) -> RemovalValues:
-    """Make the explainer with exact Shapley values."""
-    return RemovalValues(shapley_values)
-
-
-def sa_removal(source: str, seed: int) -> RemovalValues:
-    """Make the explainer that applies one remedy at a time."""
-    return RemovalValues(lambda errors_N_8: single_drops(-errors_N_8[:, ::-1]))
+def _single_remedies(errors_N_8: np.ndarray) -> np.ndarray:
+    """Return the change that each remedy makes alone (N, 3)."""
+    return single_drops(-errors_N_8[:, ::-1])
 
 
 CAUSE_EXPLAINERS = {
-    "shap_removal": ExplainerEntry("SHAP, remedies", shap_removal, reads="descriptors"),
-    "sa_removal": ExplainerEntry("SA, remedies", sa_removal, reads="descriptors"),
+    "shap_removal": ExplainerEntry("SHAP, remedies", partial(RemovalValues, shapley_values), reads="descriptors"),
+    "sa_removal": ExplainerEntry("SA, remedies", partial(RemovalValues, _single_remedies), reads="descriptors"),
 }

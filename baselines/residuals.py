@@ -66,8 +66,8 @@ def features(registrations: Registrations, floor: float) -> np.ndarray:
     from gpca.uncertainty.spread import log_determinant
 
     log_determinant_N = log_determinant(attached(registrations, "covariance")[:, OBSERVED], floor)
-    found = measured(registrations, "residuals_", lambda: {"both_ways": residuals(registrations)})
-    return np.column_stack([found.attached["residuals_both_ways"], log_determinant_N])
+    described = measured(registrations, "residuals_", lambda: {"both_ways": residuals(registrations)})
+    return np.column_stack([described.attached["residuals_both_ways"], log_determinant_N])
 
 
 def residuals(registrations: Registrations) -> np.ndarray:

@@ -12,9 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from baselines.values import KnobValues, LearnedValues, ScaledValues, Worth
+from baselines.values import KnobValues, LearnedValues, ScaledValues
 from gpca.explainers.interface import ExplainerEntry
-from gpca.settings import Positive
 
 ONE_AT_A_TIME = [0, 1, 2, 4]  # the corners with none or one of the three features present
 STEPS = [0, 8, 9, 10]  # the conditions of design ``additive`` that are untouched or a small step of one knob
@@ -66,21 +65,6 @@ def total_indices(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray
     return values_N_3
 
 
-def sa_local_additive(source: str, seed: int) -> KnobValues:
-    """Make the paper's explainer: local derivatives at the observed pair."""
-    return KnobValues(local_derivatives, STEPS)
-
-
-def sa_prcc_additive(source: str, seed: int) -> KnobValues:
-    """Make the explainer with rank correlations over a Latin hypercube."""
-    return KnobValues(partial(_over_settings, partial_rank_correlations, "latin"))
-
-
-def sa_sobol_additive(source: str, seed: int) -> KnobValues:
-    """Make the explainer with total indices."""
-    return KnobValues(partial(_over_settings, total_indices, "saltelli"))
-
-
 def _over_settings(sensitivities: Callable, kind: str, uncertainty_N_K: np.ndarray) -> np.ndarray:
     from gpca.uncertainty.designs import sample_knobs
 
@@ -93,16 +77,12 @@ def single_drops(worth_N_8: np.ndarray) -> np.ndarray:
     return worth_N_8[:, ONE_AT_A_TIME[1:]] - worth_N_8[:, :1]
 
 
-def sa_local_removal(source: str, seed: int, worth: Worth = "uncertainty") -> ScaledValues:
-    """Make the explainer that names the remedy which alone lowers the worth most."""
-    return ScaledValues(single_drops, ONE_AT_A_TIME, worth)
-
-
-def sa_supervised(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> LearnedValues:
-    """Make the explainer that learns from what each remedy alone changes."""
-    return LearnedValues(single_drops, ONE_AT_A_TIME, inverse_regularisation)
-
-
+# The paper's are local derivatives at the observed pair.
+sa_local_additive = partial(KnobValues, local_derivatives, STEPS)
+sa_prcc_additive = partial(KnobValues, partial(_over_settings, partial_rank_correlations, "latin"), None)
+sa_sobol_additive = partial(KnobValues, partial(_over_settings, total_indices, "saltelli"), None)
+sa_local_removal = partial(ScaledValues, single_drops, ONE_AT_A_TIME)
+sa_supervised = partial(LearnedValues, single_drops, ONE_AT_A_TIME)
 EXPLAINERS = {
     "sa_local_additive": ExplainerEntry("SA", sa_local_additive, reads="uncertainty/additive"),
     "sa_prcc_additive": ExplainerEntry("SA, PRCC", sa_prcc_additive, reads="uncertainty/latin"),

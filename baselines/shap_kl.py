@@ -8,11 +8,12 @@ clean pair (oracle), or a remedy applied to the observed pair (removal; supervis
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from baselines.values import KnobValues, LearnedValues, ScaledValues, Worth
+from baselines.values import KnobValues, LearnedValues, ScaledValues
 from gpca.explainers.interface import ExplainerEntry
-from gpca.settings import Positive
 
 ALL_CORNERS = list(range(8))
 
@@ -33,20 +34,14 @@ def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
     return np.reshape(explainer.shap_values(np.ones((1, 3)), l1_reg=False, silent=True), (3, -1)).T
 
 
-def shap_over_knobs(source: str, seed: int) -> KnobValues:
-    """Make the explainer that names the knob which raises the uncertainty most (designs ``additive``, ``oracle``)."""
-    return KnobValues(lambda uncertainty_N_K: shapley_values(uncertainty_N_K[:, :8]), ALL_CORNERS)
+def _of_corners(uncertainty_N_K: np.ndarray) -> np.ndarray:
+    """Return the Shapley values (N, 3) of the knobs, whose eight corners come first in their designs."""
+    return shapley_values(uncertainty_N_K[:, :8])
 
 
-def shap_removal(source: str, seed: int, worth: Worth = "uncertainty") -> ScaledValues:
-    """Make the explainer that names the remedy which lowers the worth most."""
-    return ScaledValues(shapley_values, ALL_CORNERS, worth)
-
-
-def shap_supervised(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> LearnedValues:
-    """Make the explainer that learns from the remedies' Shapley values."""
-    return LearnedValues(shapley_values, ALL_CORNERS, inverse_regularisation)
-
+shap_over_knobs = partial(KnobValues, _of_corners, ALL_CORNERS)
+shap_removal = partial(ScaledValues, shapley_values, ALL_CORNERS)
+shap_supervised = partial(LearnedValues, shapley_values, ALL_CORNERS)
 
 EXPLAINERS = {
     "shap_additive": ExplainerEntry("SHAP", shap_over_knobs, reads="uncertainty/additive"),

@@ -18,6 +18,7 @@ from gpca.explainers.concept_classifier import ClassifierExplainer, standardized
 from gpca.explainers.interface import ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.settings import Positive
 
 Worth = Literal["uncertainty", "residual"]  # of a condition: KL in nats, or log distance from target to source
 WORTHS: tuple[str, ...] = get_args(Worth)
@@ -42,9 +43,12 @@ class KnobValues(ChargedValues):
     Args:
         values: uncertainty (S, K) under the conditions of a design -> the values (S, 3) of the knobs.
         conditions: those that it needs, and is charged with; None for all.
+        source, seed: not used; nothing is drawn.
     """
 
-    def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int] | None = None) -> None:
+    def __init__(
+        self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int] | None, source: str, seed: int
+    ) -> None:
         super().__init__(conditions)
         self._values = values
 
@@ -62,10 +66,18 @@ class ScaledValues(ChargedValues):
     Args:
         values: worth (S, 8) of the corners of design ``removal`` -> the values (S, 3) of the remedies.
         conditions: the corners that it needs, and is charged with.
-        worth: one of `WORTHS`; of both, a drop is counted.
+        source, seed: not used; nothing is drawn.
+        worth: of both, a drop is counted.
     """
 
-    def __init__(self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], worth: str) -> None:
+    def __init__(
+        self,
+        values: Callable[[np.ndarray], np.ndarray],
+        conditions: list[int],
+        source: str,
+        seed: int,
+        worth: Worth = "uncertainty",
+    ) -> None:
         if worth not in WORTHS:
             raise InputError("setting 'worth'", f"unknown '{worth}'", f"choose one of {', '.join(WORTHS)}")
         super().__init__(conditions)
@@ -87,7 +99,12 @@ class LearnedValues(ChargedValues, ClassifierExplainer):
     """Logistic regression on the values of the remedies by both worths, with the same labels as GP-CA."""
 
     def __init__(
-        self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int], inverse_regularisation: float
+        self,
+        values: Callable[[np.ndarray], np.ndarray],
+        conditions: list[int],
+        source: str,
+        seed: int,
+        inverse_regularisation: Positive = 1.0,
     ) -> None:
         ChargedValues.__init__(self, conditions)
         ClassifierExplainer.__init__(self, standardized_regression(inverse_regularisation))

@@ -54,7 +54,7 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
 
     from gpca.alignment.canonical_frame import CanonicalFrame
     from gpca.alignment.rigid import inverse, transform
-    from gpca.features.groups import MOTION
+    from gpca.features.settings import MOTION
     from gpca.pairs.dataset import Registrations
     from gpca.process.progress import progress
 

@@ -103,8 +103,7 @@ def measure(registrations, icp_seconds_S, settings) -> dict[str, tuple[float, fl
     import inspect
 
     from gpca.explainers.registry import explainers
-    from gpca.uncertainty.designs import DESIGNS
-    from gpca.uncertainty.evaluation import design_rows, evaluate_design
+    from gpca.uncertainty.designs import DESIGNS, design_rows, evaluate_design
 
     prepared = {"registrations": with_seconds(registrations, icp_seconds_S)}
     prepared["embeddings"] = embedded(prepared["registrations"])

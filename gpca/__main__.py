@@ -65,8 +65,7 @@ def _set_threads(arguments: list[str]) -> None:
 
 
 def _mapping(text: str) -> dict:
-    from gpca.io.json_file import parse_json
-    from gpca.io.structured_text import require_plain
+    from gpca.io.structured_text import parse_json, require_plain
 
     try:
         settings = parse_json(text)

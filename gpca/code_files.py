@@ -10,8 +10,7 @@ ROOT = Path(__file__).resolve().parent.parent  # the folder that holds both pack
 PACKAGES = ("gpca", "baselines")
 BESIDE = {  # what a module reads from its own folder
     "gpca.comparison.claims": "claims.yaml",
-    "gpca.comparison.published": "published.csv",
-    "gpca.comparison.reasons": "reasons.csv",
+    "gpca.comparison.published": "*.csv",
     "gpca.reporting.figures.style": "matplotlibrc",
     "gpca.page.page": "templates/*",
 }
@@ -25,15 +24,15 @@ def code_files(*modules: str) -> list[str]:
     at the root of a checkout, else absolute. Modules chosen by name at run time (kinds of source, encoders,
     explainers) are not seen and have to be given.
     """
-    found: set[str] = set()
+    reached: set[str] = set()
     open_modules = list(modules)
     while open_modules:
         module = open_modules.pop()
-        if module not in found:
-            found.add(module)
+        if module not in reached:
+            reached.add(module)
             open_modules += _imports(module)
-    files = [_file_of(module) for module in found]
-    for module in found.intersection(BESIDE):
+    files = [_file_of(module) for module in reached]
+    for module in reached.intersection(BESIDE):
         files += _file_of(module).parent.glob(BESIDE[module])
     working = Path.cwd().resolve()  # as ROOT is
     seen = ROOT.relative_to(working) if ROOT.is_relative_to(working) else ROOT

@@ -34,9 +34,9 @@ class Registry(Generic[Entry]):
 
     def entry(self, name: str) -> Entry:
         """Return the entry of that name; an unknown one raises an InputError that lists the known."""
-        found = self.entries()
-        require_known(self.kind, name, found)
-        return found[name]
+        entries = self.entries()
+        require_known(self.kind, name, entries)
+        return entries[name]
 
     def module(self, name: str) -> str:
         """Return the module that lists the entry of that name."""

@@ -139,7 +139,7 @@ import json
 from pathlib import Path
 from gpca.code_files import code_files
 from gpca.comparison.published import PUBLISHED, read_published
-from gpca.comparison.reasons import REASONS
+from gpca.comparison.published import REASONS
 from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.style import MATPLOTLIBRC
 from gpca.page.page import TEMPLATES

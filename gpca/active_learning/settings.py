@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare
+from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare, read_settings
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,4 @@ class NewConceptSettings:
     @classmethod
     def from_dict(cls, section: dict) -> NewConceptSettings:
         """Build from the config's section ``new_concepts``, of which the encoder is another part."""
-        given: dict[str, Any] = {name: value for name, value in section.items() if name != "encoder"}
-        lists = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
-        return cls(**given | lists)
+        return read_settings(cls, {name: value for name, value in section.items() if name != "encoder"})

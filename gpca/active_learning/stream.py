@@ -76,18 +76,18 @@ def run_stream(
         manager = BalancedIncrementalQuantileFilter(w=stream.window, w_tol=stream.window, budget=stream.budget)
     learner: StreamLearner = LEARNERS[strategy](task, *axes, task.held_out) if strategy in LEARNERS else copy(gpc)
     right: list[bool] = []
-    asked: list[int] = []
-    steps = [_row(task, learner, right, asked, stream)]
+    queried: list[int] = []
+    steps = [_row(task, learner, right, queried, stream)]
     for row in arrival_order(task, stream, *axes):
         h = task.pool.h[[row]]
         concept = task.pool.concept_N[row]
         scores_1_C, _, worth_1 = learner.attribute(h)
         right.append(learner.classes[int(scores_1_C.argmax())] == concept)
         if _asks(manager, worth_1):
-            asked.append(row)
+            queried.append(row)
             learner.update(h, task.pool.concept_N[[row]], settings.iterations, settings.tolerance)
         if len(right) % stream.every == 0:
-            steps.append(_row(task, learner, right, asked, stream))
+            steps.append(_row(task, learner, right, queried, stream))
     return steps
 
 
@@ -102,14 +102,18 @@ def _asks(manager, worth_1: np.ndarray) -> bool:
 
 
 def _row(
-    task: LabelingTask[Projection], learner: StreamLearner, right: list[bool], asked: list[int], stream: StreamSettings
+    task: LabelingTask[Projection],
+    learner: StreamLearner,
+    right: list[bool],
+    queried: list[int],
+    stream: StreamSettings,
 ) -> dict[str, float]:
     accuracy, accuracy_new = accuracies(task, learner)
     return {
         "arrived": len(right),
         "present": int(len(right) >= stream.quiet),
-        "labels": len(asked),
-        "new_labels": int(np.sum(task.pool.concept_N[asked] == task.held_out)) if asked else 0,
+        "labels": len(queried),
+        "new_labels": int(np.sum(task.pool.concept_N[queried] == task.held_out)) if queried else 0,
         "running": float(np.mean(right[-stream.window :])) if right else float("nan"),
         "accuracy": accuracy,
         "accuracy_new": accuracy_new,

@@ -14,13 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.alignment.clique import largest_clique
-from gpca.alignment.least_squares import best_rotation
-from gpca.alignment.rigid import rigid_motion, rotate
+from gpca.alignment.rigid import best_rotation, rigid_motion, rotate
 
 GROWTH = 1.4  # of the convexity's parameter μ per iteration, as in the paper
 MOST_ITERATIONS = 100
 SETTLED = 1e-9  # relative change of the cost
+MOST_BRANCHES = 20_000  # then the best so far is taken: counted, not timed, so that it is the same on every machine
 
 
 @dataclass(frozen=True)
@@ -96,3 +95,58 @@ def vote(shifts_n: np.ndarray, bound: float) -> float:
     means_e = np.where(inlier_e_n, shifts_n, 0).sum(axis=1) / counts_e
     squares_e = np.where(inlier_e_n, np.square(shifts_n - means_e[:, None]), 0).sum(axis=1)
     return float(means_e[np.argmin(squares_e + (len(shifts_n) - counts_e) * bound**2)])
+
+
+def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES) -> tuple[np.ndarray, bool]:
+    """Return the nodes of the largest clique, sorted, and whether it is certain that none is larger.
+
+    Branch and bound over sets of bits, bounded by greedy colors (Tomita & Seki 2003; San Segundo et al. 2011).
+
+    Args:
+        adjacent_n_n: symmetric; what is on the diagonal does not matter.
+        most_branches: limit of the search.
+    """
+    adjacent_n_n = adjacent_n_n & ~np.eye(len(adjacent_n_n), dtype=bool)
+    order = np.argsort(-adjacent_n_n.sum(axis=1), kind="stable")  # colors are given to nodes of many neighbors first
+    packed = np.packbits(adjacent_n_n[np.ix_(order, order)], axis=1, bitorder="little")
+    neighbors = [int.from_bytes(row.tobytes(), "little") for row in packed]
+
+    best: list[int] = []
+    path: list[int] = []  # the clique so far; for it and each of its beginnings, what may come next:
+    candidates = [(1 << len(order)) - 1]
+    branches = [_colored(candidates[0], neighbors)]
+    tried = 0
+    while branches:
+        if not branches[-1] or len(path) + branches[-1][-1][1] <= len(best) or tried >= most_branches:
+            branches.pop()
+            candidates.pop()
+            path = path[:-1]
+            continue
+        tried += 1
+        node, _ = branches[-1].pop()
+        candidates[-1] ^= 1 << node
+        further = candidates[-1] & neighbors[node]
+        if further:
+            path.append(node)
+            candidates.append(further)
+            branches.append(_colored(further, neighbors))
+        elif len(path) >= len(best):
+            best = [*path, node]
+    return np.sort(order[best]), tried < most_branches
+
+
+def _colored(candidates: int, neighbors: list[int]) -> list[tuple[int, int]]:
+    """Give each candidate a color, no two neighbors the same, and list both by color.
+
+    A clique among the candidates up to any place in the list has no more nodes than the color there.
+    """
+    colored, colour = [], 0
+    while candidates:
+        colour += 1
+        free = candidates
+        while free:
+            node = (free & -free).bit_length() - 1
+            free &= ~(neighbors[node] | 1 << node)
+            candidates ^= 1 << node
+            colored.append((node, colour))
+    return colored

@@ -1,16 +1,33 @@
-"""Fast point feature histograms (Rusu et al. 2009) and the correspondences that they suggest."""
+"""Features of points by their neighbors: normals, and the fast point feature histograms by which points are matched.
+
+Rusu, Blodow, Beetz: Fast Point Feature Histograms (FPFH) for 3D Registration, ICRA 2009.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from gpca.process.environment import open3d_cloud, require_open3d
 
+NEIGHBORS = 20  # as Open3D takes for the covariances of generalized ICP
 RADIUS = 0.25  # diameters: five times the spacing of some 500 points on an object
 MOST_NEIGHBORS = 100
+
+
+def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.ndarray:
+    """Return unit normals (N, 3) that point away from the center of the cloud.
+
+    The neighbors leave the sign open. Away from the center is outward on a convex object, and elsewhere at least the
+    same side in two clouds of one object.
+    """
+    cloud = open3d_cloud(points_N_3)
+    cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(neighbors))
+    normals_N_3 = np.array(cloud.normals)
+    outward_N_3 = points_N_3 - points_N_3.mean(axis=0)
+    inward_N = np.einsum("ni,ni->n", normals_N_3, outward_N_3) < 0
+    return np.where(inward_N[:, None], -normals_N_3, normals_N_3)
 
 
 def fpfh_of_pair(pair: Any, radius: float = RADIUS) -> tuple[list[Any], list[Any]]:
@@ -22,12 +39,14 @@ def fpfh_of_pair(pair: Any, radius: float = RADIUS) -> tuple[list[Any], list[Any
 def fpfh(cloud: Any, radius: float = RADIUS) -> Any:
     """Return Open3D's features of a cloud with normals; `.data` is (33, N)."""
     o3d = require_open3d()
-    neighbours = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBORS)
-    return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbours)
+    neighbors = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBORS)
+    return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbors)
 
 
 def mutual_matches(source_N_d: np.ndarray, target_P_d: np.ndarray, most: int) -> np.ndarray:
     """Return rows (n, 2) of source and target that are each other's nearest in feature space, best `most` of them."""
+    from scipy.spatial import cKDTree
+
     distance_N, nearest_N = cKDTree(target_P_d).query(source_N_d)
     _, nearest_P = cKDTree(source_N_d).query(target_P_d)
     mutual_n = np.flatnonzero(nearest_P[nearest_N] == np.arange(len(source_N_d)))

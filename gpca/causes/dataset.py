@@ -1,4 +1,4 @@
-"""Registrations whose causes are measured, and the file that holds them."""
+"""Registrations whose causes are measured, the file that holds them, and their labels for explainers of causes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from gpca.causes.shapley import SUBSETS
-from gpca.causes.truth import Truth
+from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.io.arrays import REAL, load_arrays, save_arrays
 from gpca.io.names import Axes
 from gpca.pairs.dataset import CLOUDS, REGISTRATION_COLUMNS, Registrations
 from gpca.pairs.perturbation import CONCEPTS
+
+LABELS = (NOMINAL, *CONCEPTS)
 
 
 @dataclass(frozen=True)
@@ -104,3 +106,28 @@ class Causes:
 MEASURED = ("error", "uncertainty")
 LIMITS = tuple(field.name for field in fields(Truth) if field.name not in MEASURED)
 COLUMNS = tuple(field.name for field in fields(Causes) if field.name not in ("registrations", "truth", "truth_again"))
+
+
+def labels_of(truth: Truth) -> np.ndarray:
+    """Return (S,) labels: nominal, the dominant cause of a failed registration, or ``borderline`` between the two.
+
+    A failure of the geometry has no label either, since none of `LABELS` is right: it counts as borderline.
+    """
+    named_S = np.where(truth.state == FAILED, truth.dominant, truth.state)
+    return np.where(np.isin(named_S, LABELS), named_S, BORDERLINE)
+
+
+def labeled(causes: Causes) -> Registrations:
+    """Return the registrations with their labels in the place of the concepts, and the sets of causes attached.
+
+    An explainer that learns gets these; ``causes`` (S, 3) is 1 where a concept is one of the causes.
+    """
+    truth = {"causes": causes.truth.causes.astype(float)}
+    own = causes.registrations
+    return replace(own, concept=labels_of(causes.truth), attached={**own.attached, **truth})
+
+
+def with_label(causes: Causes) -> Registrations:
+    """Return those registrations that have a label, as :func:`labeled` returns them."""
+    registrations = labeled(causes)
+    return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))

@@ -162,7 +162,7 @@ def _table(instances: Instances, causes: Causes) -> pd.DataFrame:
     rows = registrations.sample
     seen = {name: getattr(instances, name)[rows] for name in ("dataset", "scene", "image", "init_from")}
     severities = {name: getattr(registrations, f"severity_{name}") for name in SEVERITIES}
-    found = {"state": truth.state, "dominant": truth.dominant}
-    found |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
-    found |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}
-    return pd.DataFrame({"sample": rows, **seen, "object": registrations.object_name, **severities, **found})
+    judged = {"state": truth.state, "dominant": truth.dominant}
+    judged |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
+    judged |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}
+    return pd.DataFrame({"sample": rows, **seen, "object": registrations.object_name, **severities, **judged})

@@ -101,9 +101,9 @@ class Quotas:
             if len(lacking) == 1:
                 state += " among several causes" if lacking[0] else " alone"
                 change = ", widen causes.several"
-        found = f"{candidates} candidates yielded {self._count(name)} of {self._wanted[name]} {state}"
+        fault = f"{candidates} candidates yielded {self._count(name)} of {self._wanted[name]} {state}"
         remedy = f"{REMEDIES[name]}{change}, or move part of causes.shares.{name} to another share"
-        return InputError(f"causes of {source}, seed {seed}, {split}", found, remedy)
+        return InputError(f"causes of {source}, seed {seed}, {split}", fault, remedy)
 
     def _count(self, name: str) -> int:
         return self._taken[name, False] + self._taken[name, True]

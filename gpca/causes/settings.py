@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, fields
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import HalfTurn, Hidden, Severities, Shift
-from gpca.settings import Bounds, Count, OpenShare, Positive, Share
+from gpca.settings import Bounds, Count, OpenShare, Positive, Share, read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 
@@ -146,12 +145,4 @@ class CauseSettings(UncertaintySettings):
         Raises:
             InputError: values that contradict each other.
         """
-        given: dict[str, Any] = dict(settings)
-        if "severities" in given:
-            ranges = {name: tuple(limits) for name, limits in given["severities"].items()}
-            given["severities"] = CauseSeverities(**ranges)
-        for name, kind in (("limits", Limits), ("shares", Shares)):
-            if name in given:
-                given[name] = kind(**given[name])
-        given |= {name: tuple(given[name]) for name in ("points", "several") if name in given}
-        return cls(**given, icp=ICPSettings(**icp or {}))
+        return read_settings(cls, settings | {"icp": icp or {}})

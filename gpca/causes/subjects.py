@@ -70,7 +70,7 @@ class Subject:
 def read_subjects(objects: ObjectClouds) -> list[Subject]:
     """Return the objects, with errors that respect their symmetries."""
     symmetries = (find_symmetries(objects.points(i), float(objects.diameters_m[i])) for i in range(len(objects)))
-    return [Subject.of(objects, i, bool(found)) for i, found in enumerate(symmetries)]
+    return [Subject.of(objects, i, bool(symmetric)) for i, symmetric in enumerate(symmetries)]
 
 
 def split_by_object(
@@ -113,8 +113,8 @@ def measure_clean_pairs(
     count = -(-settings.clean_pairs // len(subjects))
     for subject in progress(subjects, f"clean pairs of {source}, seed {seed}"):
         measured = [_clean_pair(subject, source, seed, number, settings) for number in range(count)]
-        found = [pair for pair in measured if pair is not None]
-        off = count - sum(error < settings.limits.nominal for error, _ in found)
+        usable = [pair for pair in measured if pair is not None]
+        off = count - sum(error < settings.limits.nominal for error, _ in usable)
         if off > MOST_FAILING * count and not settings.shares.geometry:
             print(
                 f"causes of {source}: object '{subject.name}' is skipped: {off} of {count} clean pairs have an error "
@@ -123,7 +123,7 @@ def measure_clean_pairs(
             )
             continue
         left.append(subject)
-        uncertainties += [uncertainty for _, uncertainty in found]
+        uncertainties += [uncertainty for _, uncertainty in usable]
     if not uncertainties:
         limit = f"{100 * settings.limits.nominal:g} % of the diameter"
         fault = f"nearly all clean pairs of every object have an error of at least {limit} or cannot be registered"

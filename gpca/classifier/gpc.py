@@ -9,7 +9,7 @@ inducing inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import torch
@@ -21,10 +21,33 @@ from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import SparseGPs
-from gpca.classifier.standardization import Standardization
 from gpca.errors import InputError
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
+
+
+@dataclass(frozen=True)
+class Standardization:
+    """Means and deviations (d,) of the inputs that it was fitted to; a constant input has the deviation 1.
+
+    scikit-learn fits it. To apply it takes none of that, which loads for a second.
+    """
+
+    mean_d: np.ndarray
+    scale_d: np.ndarray
+
+    @classmethod
+    def of(cls, h_N_d: np.ndarray) -> Standardization:
+        """Fit it to inputs."""
+        from sklearn.preprocessing import StandardScaler
+
+        fitted = StandardScaler().fit(h_N_d)
+        return cls(fitted.mean_, fitted.scale_)
+
+    def __call__(self, h_N_d: np.ndarray) -> np.ndarray:
+        """Return the standardized inputs, in their own precision."""
+        precision = np.result_type(h_N_d, np.float32)
+        return (h_N_d - self.mean_d.astype(precision)) / self.scale_d.astype(precision)
 
 
 class GPC:

@@ -66,13 +66,13 @@ def run(options: Namespace) -> int:
     torch.set_num_threads(options.threads)
     say_when_compiling()
     model = Model.load(path)
-    asked = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator}
+    requested = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator}
     explainer = Explainer(model)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
     status = 0
     for name, source in zip(options.source, sources, strict=True):
         try:
-            explanation = explainer.explain(source, target, T_init, options.unit, frame, **asked)
+            explanation = explainer.explain(source, target, T_init, options.unit, frame, **requested)
         except InputError as fault:
             raise InputError(name, str(fault)) from fault
         status = UNKNOWN_STATUS if explanation.unknown else status

@@ -65,12 +65,14 @@ def run(options: Namespace) -> None:
     labels = LabelFile(options.labels, dict.fromkeys(keys))
     session = Session(h_S_d, keys, start, labels, settings, options.strategy)
     answers = _answers(options.answers)
-    asked = 0
+    questions_asked = 0
     print(f"{len(start)} labeled at the start, {len(session.answered)} answered before, {len(keys)} samples")
     print("answer with a concept or with " + ", ".join(f"{name} ({what})" for name, what in COMMANDS.items()))
-    while asked < options.questions and (questions := session.ask(min(options.batch, options.questions - asked))):
+    while questions_asked < options.questions and (
+        questions := session.ask(min(options.batch, options.questions - questions_asked))
+    ):
         for question in questions:
-            asked += 1
+            questions_asked += 1
             answer = _ask(session, registrations, question, options.picture, answers)
             if answer in (None, "/quit"):
                 return _finish(session, registrations, options)
@@ -106,8 +108,8 @@ def _ask(session: Session, registrations: Registrations, question: Question, pic
     title = f"{split} sample {sample}: {registrations.object_name[row]}"
     draw_query(registrations.cloud(row), registrations.target(row), title, picture)
     columns = zip(session.gpc.classes, question.scores_C, question.variances_C, strict=True)
-    told = ", ".join(f"{name} {score:.2f} (variance {variance:.3f})" for name, score, variance in columns)
-    print(f"\n{title}\n  {told}; BALD {question.bald:.3f}; picture {picture}")
+    scores = ", ".join(f"{name} {score:.2f} (variance {variance:.3f})" for name, score, variance in columns)
+    print(f"\n{title}\n  {scores}; BALD {question.bald:.3f}; picture {picture}")
     while True:
         print("  cause? ", end="", flush=True)
         line = answers.readline()
@@ -145,8 +147,8 @@ def _finish(session: Session, registrations: Registrations, options: Namespace) 
     print(f"\n{options.labels}: {counts}")
     if options.predictions:
         scores_N_C, variances_N_C, bald_N = session.gpc.attribute(session.h_S_d)
-        said = Attribution.of_scores(session.gpc.classes, scores_N_C, seconds=0.0)
-        said = replace(said, variances_N_C=variances_N_C, bald_N=bald_N)
+        attribution = Attribution.of_scores(session.gpc.classes, scores_N_C, seconds=0.0)
+        attribution = replace(attribution, variances_N_C=variances_N_C, bald_N=bald_N)
         inputs = [options.registrations, options.embeddings, *([options.labels] if options.labels.is_file() else [])]
         with record_provenance([options.predictions], inputs, options.settings):
-            write_predictions(options.predictions, registrations, said)
+            write_predictions(options.predictions, registrations, attribution)

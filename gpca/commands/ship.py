@@ -1,19 +1,187 @@
-"""Step ``ship``: a run's model -> the same one as it comes with the package, and its card; for releases."""
+"""Step ``ship``: a run's model -> the same one as it comes with the package, and its card; for releases.
+
+The card tells the data and their licenses, scores and limits; all of it comes from the files of the run.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import fill
+from typing import TYPE_CHECKING
 
-from gpca.commands.card import card
 from gpca.errors import InputError
+from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.diagnosis.measures import RECALL
 from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.io.files import require_outputs, whole_file
-from gpca.model.file import Model
-from gpca.model.origin import Origin
+from gpca.model.diagnoser import Diagnoser
+from gpca.model.file import VERSION, Model
+from gpca.model.origin import License, Origin
+from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
+from gpca.pairs.perturbation import CONCEPTS
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+OWN = "gpca_multilabel"  # the explainer that has the model's classifiers
+EXPLAINERS = {
+    OWN: "one classifier of failure and one of each cause, as in this model",
+    "gpca_pair": "one classifier of all",
+    CEILING: "the truth, measured again",
+}
+MEASURES = {
+    "balanced_accuracy": "balanced accuracy",
+    "dominant_accuracy": "dominant cause",
+    "auroc_failed": "AUROC of failed",
+    "false_alarm_rate": "false alarms",
+    "average_precision": "mean average precision",
+}
 LARGEST_BYTES = 5 * 10**6  # of a file that every installation carries
+
+
+def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: Origin, scores: pd.DataFrame) -> str:
+    """Return the Markdown of the card; the same inputs give the same text.
+
+    Args:
+        name: of the file that is handed on.
+        content: of that file.
+        model, diagnoser: its parts.
+        origin: of the model.
+        scores: what :func:`gpca.experiments.diagnosis.metrics.collect_intervals` returned for its run.
+
+    Raises:
+        InputError: no scores of a classifier as in the model, or settings of a run that are incomplete.
+    """
+    try:
+        limits = _limits(model, diagnoser, origin)
+    except (LookupError, TypeError, ValueError, AttributeError) as fault:
+        raise InputError("provenance of the model", f"is incomplete ({fault})", "regenerate the model") from fault
+    paragraphs = [
+        f"# Model card of {name}",
+        "The model that `gpca explain` uses unless another is named or found. It says whether a registration of two "
+        f"point clouds is right and, if it is not, which of the causes {', '.join(CONCEPTS)} made it fail. "
+        "`python -m gpca ship` wrote this page; docs/explain.md says how to use the model.",
+        "## File",
+        _file(name, content, origin),
+        *("## Training data", *_training(model, diagnoser, origin)),
+        *("## Data and licenses", *_licenses(origin)),
+        *("## Scores", *_scores(origin, scores)),
+        *("## Limits", "\n".join(_wrapped(f"- {line}", "  ") for line in limits)),
+    ]
+    return "\n\n".join(text if text[0] in "|-#" else _wrapped(text) for text in paragraphs) + "\n"
+
+
+def _file(name: str, content: bytes, origin: Origin) -> str:
+    record, code = origin.record, origin.record["code"]
+    changed = ", with changes" if code.get("dirty") else ""
+    rows = {
+        "file": f"`{name}`, {len(content)} bytes, format version {VERSION}",
+        "SHA-256": f"`{hashlib.sha256(content).hexdigest()}`",
+        "precision": "that of the training; no number was rounded",
+        "made by": f"version {code.get('version')} of the package, commit `{code.get('commit')}`{changed}",
+        "settings": f"seed {record.get('seed')}, SHA-256 `{record.get('settings_sha256')}`",
+    }
+    return _table(["", ""], rows.items())
+
+
+def _training(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
+    rows = [(source.title, source.objects, "diagnosis" if source.diagnosed else "GP-CA") for source in origin.sources]
+    return [
+        f"The diagnosis was trained on {diagnoser.classifier.samples} registrations whose causes were measured by "
+        "counterfactuals (docs/causes.md). Their source clouds were sampled from the objects' surfaces and perturbed. "
+        f"GP-CA as in the paper, which is printed beside it, was trained on {len(model.gpc.learned_N_d)} "
+        "registrations, each perturbed in one way.",
+        _table(["objects", "number", "train"], rows),
+    ]
+
+
+def _licenses(origin: Origin) -> list[str]:
+    used: dict[License, list[str]] = {}
+    for source in origin.sources:
+        for license in source.licenses:
+            used.setdefault(license, []).append(source.title)
+    rows = [(of.dataset, of.license, of.known, "; ".join(dict.fromkeys(titles))) for of, titles in used.items()]
+    return [
+        "The file holds weights, descriptors and embeddings that were computed from these data, but none of their "
+        "points or images. The data stay under their own licenses; this page takes no position on whether these extend "
+        'to a trained model. "Seen" means read in the stated place, "from memory" means not confirmed.',
+        _table(["dataset", "license", "source of this information", "part of"], rows),
+    ]
+
+
+def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
+    titles = {source.name: source.title for source in origin.sources if source.diagnosed} | {POOLED: "all together"}
+    rows, own = [], 0
+    for source, title in titles.items():
+        for explainer, words in EXPLAINERS.items():
+            of = scores[(scores["source"] == source) & (scores["method"] == explainer)].set_index("metric")
+            if len(of):
+                own += explainer == OWN
+                samples, seeds = of["samples"].reindex(list(MEASURES)).dropna(), of["seeds"].iloc[0]
+                counts = " to ".join(f"{count:.0f}" for count in sorted({samples.min(), samples.max()}))
+                counts = f"{counts} ({seeds:.0f})"
+                rows.append((title, words, *(_interval(of, metric) for metric in MEASURES), counts))
+    if not own:
+        raise InputError("cause_intervals.csv", f"has no scores of {OWN}", "switch it on in diagnosis.explainers")
+    changes = origin.record["settings"].get("model", {}).get("causes", {})
+    return [
+        "These are the scores of the same kinds of classifier in the run that made this model, on objects held out of "
+        "their training, with 95\u00a0% intervals over objects and seeds. The model itself was trained on all objects, "
+        "so none is left to test it on. The scored registrations were drawn as the section `causes` of the config "
+        "says; the training registrations of the model were drawn with these changes:",
+        "\n".join(f"- `{name}: {json.dumps(value, sort_keys=True)}`" for name, value in sorted(changes.items()))
+        or "- none",
+        _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows),
+        "False alarms: the share of nominal registrations that are called failed at the threshold that finds "
+        f"{100 * RECALL:g}\u00a0% of the failed ones. The truth, measured again from other starts, is the most that "
+        "can be expected. docs/causes.md defines every measure.",
+    ]
+
+
+def _interval(of: pd.DataFrame, metric: str) -> str:
+    if metric not in of.index:
+        return "–"
+    value, low, high = of.loc[metric, ["value", "low", "high"]]
+    return f"{value:.3f} ({low:.3f} to {high:.3f})"
+
+
+def _limits(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
+    settings = origin.record["settings"]
+    causes = settings["causes"] | settings["model"].get("causes", {})
+    severities = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in causes["severities"].items())
+    ranges = model.familiar.ranges.items() if model.familiar else ()
+    familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in ranges)
+    return [
+        f"Failed means an error above {causes['limits']['failed']:g} of the diameter. Your task may need "
+        "another limit.",
+        f"The diagnosis was trained on {severities} (lengths in diameters; crop and outliers in shares of the points), "
+        "on clouds of {} to {} points, and on results of ICP `{}`. Outside these ranges it extrapolates.".format(
+            *causes["points"], model.icp.method
+        ),
+        f"The threshold of {diagnoser.threshold:.3f} was chosen on objects held out of a first classifier's training, "
+        f"so that at most {100 * settings['model']['false_alarms']:g}\u00a0% of their nominal registrations are called "
+        "failed.",
+        f"It knows only the causes {', '.join(CONCEPTS)}. It attributes whatever else is wrong, such as the wrong "
+        "object or a sensor's bias, to one of them.",
+        f"It warns of clouds outside the geometry that GP-CA was trained on: {familiar} (docs/explain.md)."
+        if familiar
+        else "It keeps no ranges of its training geometry, so it notices fewer unfamiliar clouds.",
+        f"It explains rigid objects of {SMALLEST_DIAMETER_M:g} to {LARGEST_DIAMETER_M:g} m. It is not a safety device.",
+    ]
+
+
+def _wrapped(text: str, indent: str = "") -> str:
+    return fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -41,8 +209,8 @@ def run(options: Namespace) -> None:
         model.save(written)
         content = written.read_bytes()
     if len(content) > LARGEST_BYTES:
-        found = f"has {len(content) / 1e6:.1f} MB, more than the {LARGEST_BYTES / 1e6:g} MB allowed in the package"
-        raise InputError(options.model, found, "lower causes.train, causes.test or real_world.train")
+        fault = f"has {len(content) / 1e6:.1f} MB, more than the {LARGEST_BYTES / 1e6:g} MB allowed in the package"
+        raise InputError(options.model, fault, "lower causes.train, causes.test or real_world.train")
     origin = Origin.of(options.model, model.title)
     text = card(options.out.name, content, model, model.diagnoser, origin, read_intervals(scores))
     with whole_file(options.out) as partial:

@@ -86,8 +86,8 @@ def _fits(group: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> np.ndarra
     values = [_reproduced(row) for row in rows]
     fits_K_K = np.zeros((len(rows), len(rows)), dtype=bool)
     for i, printed in enumerate(rows):
-        for j, found in enumerate(rows):
-            in_unit = values[j].times(UNITS[printed.unit].factor / UNITS[found.unit].factor)
+        for j, measured in enumerate(rows):
+            in_unit = values[j].times(UNITS[printed.unit].factor / UNITS[measured.unit].factor)
             fits_K_K[i, j] = verdict_of(_printed(printed), in_unit, tolerances[printed.unit]) in (REPRODUCED, CLOSE)
     return fits_K_K
 

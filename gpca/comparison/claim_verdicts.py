@@ -96,10 +96,10 @@ def _row(claim: Claim, compared: Compared, results, objects, strict: float) -> t
         **{"source": places[0].sources[0], "table": places[0].table},
         **{"one": _named(compared.one, places), "other": _named(compared.other, places)},
     }
-    found = _difference(claim, compared, results, strict)
-    if found is None:
+    difference = _difference(claim, compared, results, strict)
+    if difference is None:
         return row | {"verdict": NOT_RUN}, NOT_RUN
-    value, intervals, n, at_least, at_most = found
+    value, intervals, n, at_least, at_most = difference
     (low, high), strictly = intervals[LEVEL], intervals[strict]
     shown = (math.exp(bound) if claim.ratio else bound for bound in (value, low, high))
     row |= {name: round(bound, 6) for name, bound in zip(("value", "low", "high"), shown, strict=True)} | {"n": n}
@@ -153,10 +153,10 @@ def _of_runtime(claim: Claim, compared: Compared, rows: pd.DataFrame, levels: It
     """Compare mean seconds that were measured apart from one another; of logarithms by the delta method."""
     from scipy.stats import t as student_t
 
-    found = [mean for place in compared.counterparts if (mean := runtime_mean(rows, place)) is not None]
-    if len(found) < 2:
+    means = [mean for place in compared.counterparts if (mean := runtime_mean(rows, place)) is not None]
+    if len(means) < 2:
         return None
-    (one, error, n), (other, other_error, other_n) = found
+    (one, error, n), (other, other_error, other_n) = means
     n = min(n, other_n)
     if claim.ratio:
         value, error = math.log(one / other), math.hypot(error / one, other_error / other)
@@ -171,7 +171,7 @@ def _calibration(claims: Sequence[Claim], prediction_files: Iterable[str | Path]
     """Return the calibration errors that the claims ask for, tidy, by seed."""
     import pandas as pd
 
-    asked = {
+    wanted = {
         (place.sources[0], place.methods[0])
         for claim in claims
         for compared in claim.compared
@@ -181,7 +181,7 @@ def _calibration(claims: Sequence[Claim], prediction_files: Iterable[str | Path]
     records = []
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
-        if (source, method) in asked and Path(path).parts[-4] == PREDICTIONS:
+        if (source, method) in wanted and Path(path).parts[-4] == PREDICTIONS:
             rows = read_predictions(path)
             rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
             concepts = concepts_of(rows)

@@ -58,13 +58,13 @@ def cluster_intervals(
     for path in prediction_files:
         source, method, _ = source_method_seed(path)
         files[Path(path).parts[-4], source, method].append(path)
-    found: dict[Counterpart, tuple[float, float]] = {}
+    intervals: dict[Counterpart, tuple[float, float]] = {}
     for folder, of_folder in counterparts.items():
         if folder in files:
             rows = _samples(files[folder])
             weights_B_N = pigeonhole_weights(generator("printed", *folder), rows["seed"], rows["cluster"])
-            found |= {counterpart: _bounds_of(counterpart, rows, weights_B_N) for counterpart in of_folder}
-    return found
+            intervals |= {counterpart: _bounds_of(counterpart, rows, weights_B_N) for counterpart in of_folder}
+    return intervals
 
 
 def _samples(paths: list[str | Path]):

@@ -1,16 +1,22 @@
-"""The numbers that the paper prints, in its tables and text, from ``published.csv`` (docs/comparison.md)."""
+"""The numbers that the paper prints, in its tables and text, and why some were not reached (docs/comparison.md).
+
+They stand in ``published.csv`` and ``reasons.csv``.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 PUBLISHED = Path(__file__).with_name("published.csv")
 HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # on which the paper measured its times (Sec. IV-E)
 TEXT = "text"  # stands for the running text in the column `table`; its rows and columns are free
+REASONS = PUBLISHED.with_name("reasons.csv")
+NONE_YET = "no reason found yet"
 
 
 @dataclass(frozen=True)
@@ -191,3 +197,28 @@ def _counterpart(fields: dict[str, str]) -> Counterpart:
         fields["concept"],
         fields["statistic"],
     )
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A reason and the numbers that it applies to; `*` in row and column stands for any text."""
+
+    table: str
+    row: str
+    column: str
+    text: str
+
+    def fits(self, number: Number) -> bool:
+        """Return whether it applies to this number."""
+        patterns = (self.table, self.row, self.column)
+        return all(fnmatchcase(name, pattern) for name, pattern in zip(number.key, patterns, strict=True))
+
+
+def read_reasons() -> list[Reason]:
+    """Return the reasons, in the order of the file."""
+    return [Reason(*fields.values()) for fields in read_lines(REASONS)]
+
+
+def reason_of(number: Number, reasons: Sequence[Reason]) -> str:
+    """Return the first reason that applies to the number."""
+    return next((reason.text for reason in reasons if reason.fits(number)), NONE_YET)

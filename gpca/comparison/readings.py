@@ -61,8 +61,8 @@ def judge_readings(
             continue
         wanted = (*counterpart.sources, *counterpart.methods, counterpart.concept)
         for name in (name for name in parts if wanted in holds[name]):
-            found = _value(number, counterpart, name, parts[name])
-            if found is None:
+            reproduced = _value(number, counterpart, name, parts[name])
+            if reproduced is None:
                 continue
             group, _, reading = name.partition("/")
             tolerance, printed = tolerances[number.unit], _exactly(number)
@@ -75,11 +75,11 @@ def judge_readings(
                     *own.loc[number.key],
                     group,
                     reading,
-                    round(found.value, 6),
-                    found.at_least,
-                    found.n,
-                    round(distance(printed, found.value, tolerance), 6),
-                    verdict_of(printed, _exact(found), tolerance) in (REPRODUCED, CLOSE),
+                    round(reproduced.value, 6),
+                    reproduced.at_least,
+                    reproduced.n,
+                    round(distance(printed, reproduced.value, tolerance), 6),
+                    verdict_of(printed, _exact(reproduced), tolerance) in (REPRODUCED, CLOSE),
                 )
             )
     return pd.DataFrame(records, columns=list(READING_COLUMNS))
@@ -126,12 +126,12 @@ def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGr
         fitted = rows.groupby("reading", sort=False)["close"].sum()
         touched = len(rows[["table", "row", "column"]].drop_duplicates())
         joint[group] = (str(fitted.idxmax()), int(fitted.max()), touched)
-    found: dict[tuple[str, str, str], dict[str, OfGroup]] = {}
-    asked = asked_about(judged).groupby(["table", "row", "column", "group"], sort=False)
-    for (table, row, column, group), rows in asked:
+    summaries: dict[tuple[str, str, str], dict[str, OfGroup]] = {}
+    by_group = asked_about(judged).groupby(["table", "row", "column", "group"], sort=False)
+    for (table, row, column, group), rows in by_group:
         nearest = rows.loc[rows["distance"].abs().idxmin()]
         least, most = rows["value"].min(), rows["value"].max()
-        found.setdefault((table, row, column), {})[group] = OfGroup(
+        summaries.setdefault((table, row, column), {})[group] = OfGroup(
             len(rows),
             int(rows["close"].sum()),
             float(least),
@@ -141,28 +141,28 @@ def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGr
             *joint[group],
             inside=bool(least <= nearest["upper"] and most >= nearest["published"]),
         )
-    return found
+    return summaries
 
 
 def sentence(groups: Mapping[str, OfGroup]) -> str:
     """Return the sentence of a reason about the readings."""
-    told = []
+    sentences = []
     for group, of in groups.items():
         span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.nearest}, {of.value:.3g}"
         if of.close:
-            told.append(f"Readings of {group}: {of.close} of {of.readings} are close, the nearest {nearest}.")
+            sentences.append(f"Readings of {group}: {of.close} of {of.readings} are close, the nearest {nearest}.")
         elif of.inside:
-            told.append(f"Readings of {group}: none of {of.readings} is close, {span}, the nearest {nearest}.")
+            sentences.append(f"Readings of {group}: none of {of.readings} is close, {span}, the nearest {nearest}.")
         else:
-            told.append(f"Readings of {group}: outside of all {of.readings}, {span}.")
-    return " ".join(told)
+            sentences.append(f"Readings of {group}: outside of all {of.readings}, {span}.")
+    return " ".join(sentences)
 
 
 def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFrame:
     """Return the comparison in which the reasons of misses say what the readings give."""
-    found = summarize(judged[judged["verdict"] == NOT_REPRODUCED])
+    summaries = summarize(judged[judged["verdict"] == NOT_REPRODUCED])
     reasons = [
-        f"{reason} {sentence(found[key])}" if key in found else reason
+        f"{reason} {sentence(summaries[key])}" if key in summaries else reason
         for *key, reason in comparison[["table", "row", "column", "reason"]].itertuples(index=False)
         for key in [tuple(key)]
     ]
@@ -194,6 +194,6 @@ def _exactly(number: Number) -> Printed:
     return Printed(number.value, number.upper, number.rounding, number.value, number.upper)
 
 
-def _exact(found: Reproduced) -> Reproduced:
+def _exact(reproduced: Reproduced) -> Reproduced:
     """Return the value as if its interval were none; a few seeds have too wide a one to tell readings apart."""
-    return Reproduced(found.value, found.value, found.value, found.n, found.at_least)
+    return Reproduced(reproduced.value, reproduced.value, reproduced.value, reproduced.n, reproduced.at_least)

@@ -106,9 +106,9 @@ def _of_config(outcome: FileCheck, run: Path, reference: Path) -> FileCheck:
 
 
 def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean], allowance: Allowance) -> FileCheck:
-    for one, other, told in ((there, here, "lacks"), (here, there, "adds to the reference")):
+    for one, other, verb in ((there, here, "lacks"), (here, there, "adds to the reference")):
         if beyond := [key for key in one if key not in other]:
-            return FileCheck(file, DIFFERENT, f"{told} {len(beyond)} of {len(one)} values, such as {_named(beyond[0])}")
+            return FileCheck(file, DIFFERENT, f"{verb} {len(beyond)} of {len(one)} values, such as {_named(beyond[0])}")
     differing = [key for key in there if here[key].value != there[key].value]
     if not differing:
         return FileCheck(file, IDENTICAL, f"all {len(there)} values")
@@ -128,11 +128,11 @@ def _excess(difference: float, allowed: float) -> float:
 
 def _difference(difference: float, allowed: float, mean: Mean) -> str:
     """A difference and what is allowed, in samples where it is a share of them."""
-    told = f"{difference:+.4g}, where {allowed:.4g} is allowed"
+    detail = f"{difference:+.4g}, where {allowed:.4g} is allowed"
     if not (mean.samples and mean.unit):
-        return told
+        return detail
     flipped, expected = (x / mean.unit * mean.samples for x in (abs(difference), allowed))
-    return f"{told} ({flipped:.0f} of {mean.samples} samples, where {expected:.0f} are expected at most)"
+    return f"{detail} ({flipped:.0f} of {mean.samples} samples, where {expected:.0f} are expected at most)"
 
 
 def device_of(folder: Path, file: str) -> str:

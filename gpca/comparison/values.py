@@ -72,16 +72,17 @@ def value_of_run(
     if counterpart is None or counterpart.file not in results:
         return None
     of_file = _of_runtime if counterpart.file == RUNTIME else _of_tidy
-    found = of_file(results[counterpart.file], counterpart)
-    if found is None:
+    reproduced = of_file(results[counterpart.file], counterpart)
+    if reproduced is None:
         return None
     cluster_low, cluster_high = (clusters or {}).get(counterpart, (math.nan, math.nan))
     unit = UNITS[number.unit]
-    found = replace(found, cluster_low=cluster_low, cluster_high=cluster_high).times(unit.factor)
+    reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high).times(unit.factor)
     low, high = (
-        bound if math.isnan(bound) else min(max(bound, unit.least), unit.most) for bound in (found.low, found.high)
+        bound if math.isnan(bound) else min(max(bound, unit.least), unit.most)
+        for bound in (reproduced.low, reproduced.high)
     )
-    return replace(found, low=low, high=high)
+    return replace(reproduced, low=low, high=high)
 
 
 def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
@@ -155,9 +156,9 @@ def _of_runtime(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | No
     """Add up the mean seconds of the components on one device, measured apart from one another."""
     from scipy.stats import t as student_t
 
-    if (found := runtime_mean(rows, counterpart)) is None:
+    if (measured := runtime_mean(rows, counterpart)) is None:
         return None
-    mean, error, n = found
+    mean, error, n = measured
     if n < 2:
         return Reproduced(mean, math.nan, math.nan, n)
     half_width = float(student_t.ppf(0.975, n - 1) * error)

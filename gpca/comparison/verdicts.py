@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.comparison.published import TIMES, Counterpart, Number
-from gpca.comparison.reasons import Reason, reason_of
+from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, deviation_interval, value_of_run
 from gpca.errors import InputError
 from gpca.objects.title import STAND_IN, title_of
@@ -96,11 +95,13 @@ def compare(
             raise InputError("config key comparison.tolerances", f"has no unit '{number.unit}'", "add its tolerance")
         deviation = _deviation_of(number, deviations)
         printed = printed_of(number, deviation)
-        found = values[number.key] = value_of_run(number, results, clusters)
+        reproduced = values[number.key] = value_of_run(number, results, clusters)
         tolerance = tolerances[number.unit]
-        verdict, reason = _judge(number, printed, found, objects, tolerance, reasons)
+        verdict, reason = _judge(number, printed, reproduced, objects, tolerance, reasons)
         first = values.get(number.same_as)
-        repeats = first is not None and found is not None and (first.value, first.n) == (found.value, found.n)
+        repeats = (
+            first is not None and reproduced is not None and (first.value, first.n) == (reproduced.value, reproduced.n)
+        )
         records.append(
             {
                 **dict(zip(("table", "row", "column"), number.key, strict=True)),
@@ -111,7 +112,7 @@ def compare(
                 "decimals": number.decimals,
                 **_sampling(printed),
                 "deviation": deviation.value if deviation else np.nan,
-                **_columns(number, found, tolerance),
+                **_columns(number, reproduced, tolerance),
                 "verdict": verdict,
                 "repeat_of": " / ".join(number.same_as) if repeats else "",
                 "reason": reason,
@@ -150,7 +151,7 @@ def printed_of(number: Number, deviation: Number | None = None) -> Printed:
     return Printed(number.value, number.upper, number.rounding, float(low), float(high))
 
 
-def verdict_of(printed: Printed, found: Reproduced, tolerance: Tolerance) -> str:
+def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -> str:
     """Return one of `JUDGED`.
 
     The printed number is a band, half its last digit to either side. The difference of the run's value from the band
@@ -162,11 +163,11 @@ def verdict_of(printed: Printed, found: Reproduced, tolerance: Tolerance) -> str
     scale = _log if tolerance.factor else float
     near, far = (scale(bound) for bound in (tolerance.reproduced, tolerance.close))
     least, most = scale(printed.value - printed.rounding), scale(printed.upper + printed.rounding)
-    value = scale(found.value)
-    if found.at_least:
+    value = scale(reproduced.value)
+    if reproduced.at_least:
         return NOT_REPRODUCED if value - most > far else INCONCLUSIVE
     apart = _apart(value, min(max(value, least), most))
-    found_low, found_high = (scale(bound) for bound in found.interval())
+    found_low, found_high = (scale(bound) for bound in reproduced.interval())
     below = math.hypot(_apart(value, found_low), _apart(scale(printed.high), scale(printed.upper)))
     above = math.hypot(_apart(found_high, value), _apart(scale(printed.value), scale(printed.low)))
     low, high = apart - below, apart + above
@@ -194,46 +195,46 @@ def counts(comparison: pd.DataFrame) -> dict[str, int]:
     return {verdict: int((comparison["verdict"] == verdict).sum()) for verdict in VERDICTS}
 
 
-def _judge(number, printed, found, objects, tolerance, reasons) -> tuple[str, str]:
+def _judge(number, printed, reproduced, objects, tolerance, reasons) -> tuple[str, str]:
     if number.counterpart is None:
         return NOT_COMPARABLE, number.note
     if any(objects[source]["stand_in"] for source in number.counterpart.sources if source in objects):
         return NOT_COMPARABLE, STAND_IN
-    if found is None:
+    if reproduced is None:
         return NOT_RUN, f"{number.counterpart.file} holds no such value"
-    verdict = verdict_of(printed, found, tolerance)
+    verdict = verdict_of(printed, reproduced, tolerance)
     if verdict == INCONCLUSIVE:
-        no_interval = math.isnan(found.interval()[0])
-        return verdict, LOWER_BOUND if found.at_least else ONE_REPEAT if no_interval else TOO_WIDE
+        no_interval = math.isnan(reproduced.interval()[0])
+        return verdict, LOWER_BOUND if reproduced.at_least else ONE_REPEAT if no_interval else TOO_WIDE
     return verdict, "" if verdict == REPRODUCED else reason_of(number, reasons)
 
 
 def _sampling(printed: Printed) -> dict[str, float]:
     """Return the bounds that the paper's sampling leaves; NaN where they are not told."""
-    told = (printed.low, printed.high) != (printed.value, printed.upper)
+    is_known = (printed.low, printed.high) != (printed.value, printed.upper)
     return {
-        name: round(bound, 6) if told else np.nan
+        name: round(bound, 6) if is_known else np.nan
         for name, bound in (("paper_low", printed.low), ("paper_high", printed.high))
     }
 
 
-def _columns(number: Number, found: Reproduced | None, tolerance: Tolerance) -> dict[str, object]:
+def _columns(number: Number, reproduced: Reproduced | None, tolerance: Tolerance) -> dict[str, object]:
     """Return the reproduced value, and its distance from the nearest end of the printed number."""
     import pandas as pd
 
-    if found is None:
+    if reproduced is None:
         return {"n": pd.NA, "at_least": False}
-    printed = min(max(found.value, number.value), number.upper)
+    printed = min(max(reproduced.value, number.value), number.upper)
     return {
-        "reproduced": round(found.value, 6),
-        "ci_low": round(found.low, 6),
-        "ci_high": round(found.high, 6),
-        "cluster_low": round(found.cluster_low, 6),
-        "cluster_high": round(found.cluster_high, 6),
-        "n": found.n,
-        "at_least": found.at_least,
-        "difference": round(found.value - printed, 6),
-        "factor": round(found.value / printed, 6) if tolerance.factor else np.nan,
+        "reproduced": round(reproduced.value, 6),
+        "ci_low": round(reproduced.low, 6),
+        "ci_high": round(reproduced.high, 6),
+        "cluster_low": round(reproduced.cluster_low, 6),
+        "cluster_high": round(reproduced.cluster_high, 6),
+        "n": reproduced.n,
+        "at_least": reproduced.at_least,
+        "difference": round(reproduced.value - printed, 6),
+        "factor": round(reproduced.value / printed, 6) if tolerance.factor else np.nan,
     }
 
 

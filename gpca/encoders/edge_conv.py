@@ -106,12 +106,12 @@ class _EdgeMax(torch.autograd.Function):
     @staticmethod
     def forward(ctx, ac_B_N_2F, neighbors_B_N_k, gamma_F, beta_F, eps):
         n_edges = neighbors_B_N_k.numel()
-        ac, neighbours, gamma, beta = _numpy(ac_B_N_2F, neighbors_B_N_k, gamma_F, beta_F)
-        extreme, extreme_at, edge_sums, mean, variance = edge_kernels.gather_extreme_and_sums(ac, neighbours, gamma)
+        ac, neighbors, gamma, beta = _numpy(ac_B_N_2F, neighbors_B_N_k, gamma_F, beta_F)
+        extreme, extreme_at, edge_sums, mean, variance = edge_kernels.gather_extreme_and_sums(ac, neighbors, gamma)
         inverse_std = (1.0 / (variance + eps) ** 0.5).astype(ac.dtype)
         mean = mean.astype(ac.dtype)
         out = edge_kernels.normalize_activate(extreme, mean, inverse_std, gamma, beta, NEGATIVE_SLOPE)
-        ctx.numpy_arrays = (ac, neighbours, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges)
+        ctx.numpy_arrays = (ac, neighbors, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges)
         mean_F, variance_F = torch.from_numpy(mean), torch.from_numpy(variance.astype(ac.dtype))
         ctx.mark_non_differentiable(mean_F, variance_F)
         return torch.from_numpy(out), mean_F, variance_F

@@ -107,7 +107,7 @@ def _collect_with_ties(row, below, above, out):
 
 
 @njit(**OVER_CLOUDS)
-def gather_extreme_and_sums(ac, neighbours, gamma):
+def gather_extreme_and_sums(ac, neighbors, gamma):
     """Pass once over all edges y_ij = A_j + C_i.
 
     Returns:
@@ -116,7 +116,7 @@ def gather_extreme_and_sums(ac, neighbours, gamma):
         edge_sums (B, N, F): Σ_j y_ij.
         mean, variance (F,): float64, over all B·N·k edges (variance biased, as batch norm normalizes by it).
     """
-    batch, n, k = neighbours.shape
+    batch, n, k = neighbors.shape
     features = ac.shape[2] // 2
     extreme = np.empty((batch, n, features), ac.dtype)
     extreme_at = np.empty((batch, n, features), np.int32)
@@ -129,13 +129,13 @@ def gather_extreme_and_sums(ac, neighbours, gamma):
         for i in range(n):
             c = ac[b, i, features:]
             best, best_at, total = extreme[b, i], extreme_at[b, i], edge_sums[b, i]
-            first = neighbours[b, i, 0]
+            first = neighbors[b, i, 0]
             a = ac[b, first, :features]
             for f in range(features):
                 y = a[f] + c[f]
                 best[f], best_at[f], total[f], square[f] = y * sign[f], first, y, y * y
             for slot in range(1, k):
-                j = neighbours[b, i, slot]
+                j = neighbors[b, i, slot]
                 a = ac[b, j, :features]
                 for f in range(features):
                     y = a[f] + c[f]
@@ -176,9 +176,9 @@ def normalize_activate(extreme, mean, inverse_std, gamma, beta, slope):
 
 
 @njit(**OVER_CLOUDS)
-def gather_max_affine(ac, neighbours, scale, shift, slope):
+def gather_max_affine(ac, neighbors, scale, shift, slope):
     """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), for inference: in one pass and without statistics."""
-    batch, n, k = neighbours.shape
+    batch, n, k = neighbors.shape
     features = ac.shape[2] // 2
     out = np.empty((batch, n, features), ac.dtype)
     slope = ac.dtype.type(slope)
@@ -190,9 +190,9 @@ def gather_max_affine(ac, neighbours, scale, shift, slope):
         for i in range(n):
             best = out[b, i]
             for f in range(features):
-                best[f] = scaled[neighbours[b, i, 0], f]
+                best[f] = scaled[neighbors[b, i, 0], f]
             for slot in range(1, k):
-                a = scaled[neighbours[b, i, slot]]
+                a = scaled[neighbors[b, i, slot]]
                 for f in range(features):
                     best[f] = max(best[f], a[f])
             for f in range(features):
@@ -203,7 +203,7 @@ def gather_max_affine(ac, neighbours, scale, shift, slope):
 
 @njit(**OVER_CLOUDS)
 def edge_max_backward(
-    grad_out, ac, neighbours, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope
+    grad_out, ac, neighbors, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope
 ):
     """Return the gradients of :func:`normalize_activate` after :func:`gather_extreme_and_sums`.
 
@@ -216,7 +216,7 @@ def edge_max_backward(
     Returns:
         grad_ac (B, N, 2F), grad_gamma (F,), grad_beta (F,).
     """
-    batch, n, k = neighbours.shape
+    batch, n, k = neighbors.shape
     features = gamma.shape[0]
     dtype = ac.dtype
     slope = dtype.type(slope)
@@ -248,7 +248,7 @@ def edge_max_backward(
         for i in range(n):
             c = ac[b, i, features:]
             for slot in range(k):
-                j = neighbours[b, i, slot]
+                j = neighbors[b, i, slot]
                 degree[j] += 1
                 row = arriving_c[j]
                 for f in range(features):

@@ -99,9 +99,9 @@ class _Edges:
     def __init__(self, groups: Groups, points_B_N_3: torch.Tensor) -> None:
         self.batch, n_points, _ = points_B_N_3.shape
         # All must be contiguous, or numba compiles the passes over them a second time.
-        neighbours, counts = (x.contiguous().numpy() for x in (groups.neighbors_B_M_k, groups.counts_B_M))
-        self.slots = neighbours.size
-        self.point, self.weight, self.ends = kernels.distinct_edges(neighbours, counts, n_points)
+        neighbors, counts = (x.contiguous().numpy() for x in (groups.neighbors_B_M_k, groups.counts_B_M))
+        self.slots = neighbors.size
+        self.point, self.weight, self.ends = kernels.distinct_edges(neighbors, counts, n_points)
         self.cloud_ends = self.ends[:: counts.shape[1]].copy()
 
 

@@ -17,9 +17,9 @@ _BLOCK = 64  # rows that are summed in the arrays' own precision before they are
 
 
 @njit(cache=True)
-def distinct_edges(neighbours, counts, n_points):
+def distinct_edges(neighbors, counts, n_points):
     """Return point (E,), the row of each edge's point in all clouds; weight (E,), the slots it fills; ends (G + 1,)."""
-    batch, n_groups, k = neighbours.shape
+    batch, n_groups, k = neighbors.shape
     ends = np.zeros(batch * n_groups + 1, np.int64)
     ends[1:] = np.cumsum(counts.reshape(-1))
     point = np.empty(ends[-1], np.int64)
@@ -29,7 +29,7 @@ def distinct_edges(neighbours, counts, n_points):
             g = b * n_groups + m
             weight[ends[g]] += k - counts[b, m]  # the first one fills the slots that were left
             for slot in range(counts[b, m]):
-                point[ends[g] + slot] = b * n_points + neighbours[b, m, slot]
+                point[ends[g] + slot] = b * n_points + neighbors[b, m, slot]
     return point, weight, ends
 
 

@@ -63,8 +63,8 @@ def ball_query(
     k = min(k, points_B_N_3.shape[1])
     if points_B_N_3.device.type == "cpu":
         points, centers = (x.contiguous().numpy() for x in (points_B_N_3, centers_B_M_3))
-        neighbours, counts = grouping_kernels.ball_query(points, centers, radius, k)
-        return torch.from_numpy(neighbours), torch.from_numpy(counts)
+        neighbors, counts = grouping_kernels.ball_query(points, centers, radius, k)
+        return torch.from_numpy(neighbors), torch.from_numpy(counts)
     return _ball_query_plain(points_B_N_3, centers_B_M_3, radius, k)
 
 

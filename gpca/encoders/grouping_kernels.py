@@ -40,7 +40,7 @@ def ball_query(points, centers, radius, k):
     batch, n, _ = points.shape
     n_centers = centers.shape[1]
     # np.empty will not do: a center of NaN has no neighbor at all, and the slots must still be indices of points.
-    neighbours = np.zeros((batch, n_centers, k), np.int32)
+    neighbors = np.zeros((batch, n_centers, k), np.int32)
     counts = np.zeros((batch, n_centers), np.int32)
     limit = points.dtype.type(radius) * points.dtype.type(radius)
     for b in prange(batch):
@@ -51,14 +51,14 @@ def ball_query(points, centers, radius, k):
             for i in range(n):
                 dx, dy, dz = x[i] - cx, y[i] - cy, z[i] - cz
                 squares[i] = dx * dx + dy * dy + dz * dz
-            found = neighbours[b, m]
+            listed = neighbors[b, m]
             count = 0
             for i in range(n):
                 # Written always, kept only when within: no branch to mispredict.
-                found[count] = i
+                listed[count] = i
                 count += squares[i] <= limit
                 if count == k:
                     break
-            found[count:] = found[0] if count else 0
+            listed[count:] = listed[0] if count else 0
             counts[b, m] = max(count, 1)
-    return neighbours, counts
+    return neighbors, counts

@@ -1,6 +1,6 @@
 """Encoders of a registered pair: both clouds at once, each point described by how it lies to the other cloud.
 
-Both take the features of :func:`gpca.features.points.describe_points`, and the motion of ICP, which they hand on
+Both take the features of :func:`gpca.features.distances.describe_points`, and the motion of ICP, which they hand on
 beside their own features of the points.
 """
 

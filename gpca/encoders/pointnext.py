@@ -19,10 +19,10 @@ class SetAbstraction(nn.Module):
     have inverted residual blocks after each stage, of which S has none.
     """
 
-    def __init__(self, in_features: int, out_features: int, radius: float, neighbours: int) -> None:
+    def __init__(self, in_features: int, out_features: int, radius: float, neighbors: int) -> None:
         super().__init__()
         self.radius = radius
-        self.neighbours = neighbours
+        self.neighbors = neighbors
         self.layers = GroupMLP(in_features, (out_features // 2, out_features), last_relu=False)
         self.skip = PointLinear(in_features, out_features)
 
@@ -30,8 +30,8 @@ class SetAbstraction(nn.Module):
         """Return the centroids (B, M, 3) and their features (B, M, F_out)."""
         chosen_B_M = farthest_points(points_B_N_3, max(1, points_B_N_3.shape[1] // 2))
         centers_B_M_3 = take(points_B_N_3, chosen_B_M)
-        found = ball_query(points_B_N_3, centers_B_M_3, self.radius, self.neighbours)
-        pooled_B_M_F = self.layers(points_B_N_3, x_B_N_F, Groups(centers_B_M_3, *found, self.radius))
+        around = ball_query(points_B_N_3, centers_B_M_3, self.radius, self.neighbors)
+        pooled_B_M_F = self.layers(points_B_N_3, x_B_N_F, Groups(centers_B_M_3, *around, self.radius))
         return centers_B_M_3, (pooled_B_M_F + self.skip(take(x_B_N_F, chosen_B_M))).relu()
 
 

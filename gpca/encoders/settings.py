@@ -50,9 +50,9 @@ class EncoderSettings:
     def __post_init__(self) -> None:
         if self.patience and not self.validation_share:
             raise InputError("encoder setting 'patience'", "needs held-out samples", "set validation_share above 0")
-        neighbours = self.options.get("k", DGCNNOptions.k) if self.backbone == "dgcnn" else 0
-        if (points := self.fewest_points or self.draw_points) < neighbours:
-            fault = f"{neighbours} neighbors are too many for draws of {points} points"
+        neighbors = self.options.get("k", DGCNNOptions.k) if self.backbone == "dgcnn" else 0
+        if (points := self.fewest_points or self.draw_points) < neighbors:
+            fault = f"{neighbors} neighbors are too many for draws of {points} points"
             raise InputError("encoder option 'k'", fault, "lower it, or draw more points")
         if self.fewest_points is None:
             return

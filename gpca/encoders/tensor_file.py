@@ -1,19 +1,23 @@
 """Files of torch.save, read without trust: whole to the byte, no code, and only possible numbers.
 
-torch itself takes a file in which a bit has flipped for a whole one: it reads no checksum.
+torch itself takes a file in which a bit has flipped for a whole one: it reads no checksum. Checkpoints are
+such files; by them a stopped training continues.
 """
 
 from __future__ import annotations
 
+import hashlib
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from gpca.io.files import whole_file
 from gpca.io.limits import LARGEST_NUMBER
+from gpca.pairs.dataset import Registrations
 
 
 def read_tensors(path: str | Path) -> Any:
@@ -53,10 +57,10 @@ def require_like(state: object, expected: Mapping[str, torch.Tensor], what: str)
     if not isinstance(state, Mapping) or set(state) != set(expected):
         raise ValueError(f"its {what} has different parts")
     for name, tensor in expected.items():
-        found = state[name]
-        if not isinstance(found, torch.Tensor) or found.shape != tensor.shape or found.dtype != tensor.dtype:
+        own = state[name]
+        if not isinstance(own, torch.Tensor) or own.shape != tensor.shape or own.dtype != tensor.dtype:
             raise ValueError(f"'{name}' of its {what} has a different shape or type")
-        if name.endswith("running_var") and (found < 0).any():
+        if name.endswith("running_var") and (own < 0).any():
             raise ValueError(f"'{name}' of its {what} contains negative variances")
 
 
@@ -82,3 +86,43 @@ def _require_sound(name: str, tensor: torch.Tensor) -> None:
     # gpytorch keeps the bounds of its parameters, which may be infinite.
     if tensor.is_floating_point() and not name.endswith("_bound") and not (tensor.abs() <= LARGEST_NUMBER).all():
         raise ValueError(f"'{name}' contains NaN, infinity or numbers above {LARGEST_NUMBER:.0e}")
+
+
+def fingerprint(registrations: Registrations, targets_S_C: np.ndarray | None) -> str:
+    """Hash the data of a training: the clouds, their labels or targets, and their splits."""
+    digest = hashlib.sha256(registrations.points.tobytes())
+    digest.update(b"" if targets_S_C is None else targets_S_C.tobytes())
+    for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
+        digest.update(repr(column.tolist()).encode())
+    return digest.hexdigest()
+
+
+def fingerprint_of(weights: Mapping[str, torch.Tensor] | None) -> str:
+    """Hash the weights that a training starts from, if any are given."""
+    digest = hashlib.sha256()
+    for name, tensor in (weights or {}).items():
+        digest.update(name.encode() + tensor.numpy().tobytes())
+    return digest.hexdigest()
+
+
+def keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]) -> None:
+    """Write the state and the training curve so far, where a checkpoint is wanted."""
+    if checkpoint is None:
+        return
+    content = {name: part.state_dict() for name, part in state.items()}
+    write_tensors(checkpoint, content | {"identity": identity, "curve": curve})
+
+
+def resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
+    """Load the checkpoint into `state`; an unreadable one or one of other settings or data is left aside."""
+    if checkpoint is None or not checkpoint.is_file():
+        return []
+    try:
+        content = read_tensors(checkpoint)
+    except Exception:  # whatever a damaged file makes torch raise, training from the start is right
+        return []
+    if not isinstance(content, dict) or content.get("identity") != identity or not set(state) <= set(content):
+        return []
+    for name, part in state.items():
+        part.load_state_dict(content[name])
+    return content["curve"]

@@ -17,9 +17,9 @@ import numpy as np
 import torch
 from torch import nn
 
-from gpca.encoders.checkpoint import fingerprint, fingerprint_of, keep, resume
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.tensor_file import fingerprint, fingerprint_of, keep, resume
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

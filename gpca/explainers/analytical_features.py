@@ -13,7 +13,7 @@ from gpca.seeds import generator
 
 
 def analytical_features(
-    registrations: Registrations, *axes: object, shape_points: int = 256, neighbours: int = 16, point_count: bool = True
+    registrations: Registrations, *axes: object, shape_points: int = 256, neighbors: int = 16, point_count: bool = True
 ) -> np.ndarray:
     """Return (N, F): inlier RMSE (of diameters), then those of :func:`compare`, the point-count ratio last.
 
@@ -22,7 +22,7 @@ def analytical_features(
         axes: name the draws.
         shape_points: source points at which local shape is measured, drawn by split and sample; all where there are
             fewer.
-        neighbours: how many points, itself included, make a point's local shape.
+        neighbors: how many points, itself included, make a point's local shape.
         point_count: whether the point-count ratio is among the features.
     """
     rows = []
@@ -30,12 +30,12 @@ def analytical_features(
         source, target = registrations.cloud(i), registrations.target(i)
         random = generator(*axes, registrations.split[i], registrations.sample[i])
         drawn = random.permutation(len(source))[:shape_points]
-        row = [registrations.inlier_rmse[i], *compare(source, target, drawn, neighbours)]
+        row = [registrations.inlier_rmse[i], *compare(source, target, drawn, neighbors)]
         rows.append(row + [len(source) / len(target)] * point_count)
     return np.array(rows)
 
 
-def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, neighbours: int) -> list[float]:
+def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, neighbors: int) -> list[float]:
     """Compare the local shape of the aligned source at the drawn points with that of the nearest target points.
 
     Returns:
@@ -47,9 +47,9 @@ def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, n
     source_tree, target_tree = cKDTree(source_P_3), cKDTree(target_Q_3)
     query_D_3 = source_tree.data[drawn]
     _, nearest_D = target_tree.query(query_D_3)
-    normals_D_3, planarity_D, linearity_D = local_shape(source_tree, query_D_3, neighbours)
+    normals_D_3, planarity_D, linearity_D = local_shape(source_tree, query_D_3, neighbors)
     target_normals_D_3, target_planarity_D, target_linearity_D = local_shape(
-        target_tree, target_tree.data[nearest_D], neighbours
+        target_tree, target_tree.data[nearest_D], neighbors
     )
     return [
         np.abs(np.sum(normals_D_3 * target_normals_D_3, axis=1)).mean(),
@@ -60,14 +60,14 @@ def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, n
     ]
 
 
-def local_shape(tree, query_D_3: np.ndarray, neighbours: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def local_shape(tree, query_D_3: np.ndarray, neighbors: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return normals (D, 3) without a sign, planarity (D,) and linearity (D,) of a cloud at the query points.
 
-    From the eigenvalues λ1 ≥ λ2 ≥ λ3 of the covariance of the nearest `neighbours` points of `tree` (all where it has
+    From the eigenvalues λ1 ≥ λ2 ≥ λ3 of the covariance of the nearest `neighbors` points of `tree` (all where it has
     fewer): planarity (λ2 - λ3)/λ1 and linearity (λ1 - λ2)/λ1 (Weinmann et al. 2015); the normal is the eigenvector
     of λ3. Points that coincide have neither.
     """
-    _, rows_D_K = tree.query(query_D_3, k=min(neighbours, tree.n))
+    _, rows_D_K = tree.query(query_D_3, k=min(neighbors, tree.n))
     points_D_K_3 = tree.data[rows_D_K]
     offsets_D_K_3 = points_D_K_3 - points_D_K_3.mean(axis=1, keepdims=True)
     eigenvalues_D_3, eigenvectors_D_3_3 = np.linalg.eigh(offsets_D_K_3.transpose(0, 2, 1) @ offsets_D_K_3)

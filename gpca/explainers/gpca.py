@@ -46,10 +46,10 @@ class DescriptorGPCA(GPCA):
     """
 
     def __init__(self, axes: tuple, source: str, seed: int, **settings: GPCArguments) -> None:
-        from gpca.explainers.pair_classifier import NormalisedDescriptors
+        from gpca.explainers.pair_classifier import NormalizedFeatures
 
         super().__init__(source, seed, **settings)
-        self._normalized = NormalisedDescriptors(*axes)
+        self._normalized = NormalizedFeatures(*axes)
 
     def fit(self, registrations: Registrations) -> None:
         """Learn the scales of the descriptors, and fit the GPC to the labeled registrations."""

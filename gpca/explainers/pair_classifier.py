@@ -23,7 +23,7 @@ USUAL = 0.99  # share of the training samples that are no farther from their nei
 ABSENT, PRESENT = "absent", "present"
 
 
-class NormalisedDescriptors:
+class NormalizedFeatures:
     """Every descriptor mapped to a normal distribution by its ranks among the training samples.
 
     Distances, angles, costs and counts have tails of all kinds, in which one lengthscale would see little else.
@@ -32,7 +32,7 @@ class NormalisedDescriptors:
     def __init__(self, *axes: object) -> None:
         self._axes = axes
 
-    def fit(self, features_N_F: np.ndarray) -> NormalisedDescriptors:
+    def fit(self, features_N_F: np.ndarray) -> NormalizedFeatures:
         """Learn the ranks."""
         from sklearn.preprocessing import QuantileTransformer
 
@@ -54,7 +54,7 @@ class NormalisedDescriptors:
         return torch.from_numpy(self._quantiles_Q_F)
 
     @classmethod
-    def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalisedDescriptors:
+    def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalizedFeatures:
         """Return the normalization of that state."""
         made = cls()
         made._quantiles_Q_F = quantiles_Q_F.numpy()
@@ -87,7 +87,7 @@ class PairClassifier:
     """
 
     def __init__(self, settings: GPCSettings, *axes: object) -> None:
-        self.normalized = NormalisedDescriptors(*axes)
+        self.normalized = NormalizedFeatures(*axes)
         self._failure = GPC((NOMINAL, FAILED), settings, *axes, FAILED)
         self._causes = [GPC((ABSENT, PRESENT), settings, *axes, concept) for concept in CONCEPTS]
 
@@ -149,7 +149,7 @@ class PairClassifier:
     def from_state(cls, state: dict) -> PairClassifier:
         """Return the classifier of a :meth:`state`."""
         made = cls.__new__(cls)
-        made.normalized = NormalisedDescriptors.from_state(state["quantiles"])
+        made.normalized = NormalizedFeatures.from_state(state["quantiles"])
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
         return made

@@ -23,7 +23,7 @@ STARTS = (
 
 
 def describe_motion(pair: ObservedPair) -> np.ndarray:
-    """Return the numbers of :data:`gpca.features.groups.MOTION`, in radians and diameters.
+    """Return the numbers of :data:`gpca.features.settings.MOTION`, in radians and diameters.
 
     Angle, length and displacement from the initial pose; the fit; and the spread of the runs from other starts.
     """

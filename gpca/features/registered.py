@@ -6,10 +6,9 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse
 from gpca.alignment.twist import log
-from gpca.features.distances import MatchedPair, describe_distances
-from gpca.features.groups import QUANTILES
+from gpca.features.distances import CHANNELS, MatchedPair, describe_distances, describe_points, log_of_ratio
 from gpca.features.pair import ObservedPair, displacements
-from gpca.features.points import CHANNELS, describe_points, log_of_ratio
+from gpca.features.settings import QUANTILES
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
 from gpca.seeds import generator
@@ -27,7 +26,7 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
     - distances: the 52 of :func:`gpca.features.distances.describe_distances`, in diameters.
     - relations: what of a pair does not depend on which object it is (:func:`relations`).
     - densities: logarithms of spacing and extent of the observed cloud relative to the model's.
-    - points: (N, 2, points, 7) of :func:`gpca.features.points.describe_points`.
+    - points: (N, 2, points, 7) of :func:`gpca.features.distances.describe_points`.
 
     Args:
         registrations: N of them.

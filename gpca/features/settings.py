@@ -1,4 +1,7 @@
-"""Settings that bound the work of a description."""
+"""The groups of features and some of their columns by name, and the settings that bound the work of measuring them.
+
+Nothing here needs the code that computes them.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,15 @@ import numpy as np
 from gpca.settings import Bounds, Positive
 from gpca.uncertainty.settings import start_deviation
 
+GROUPS = ("distances", "planes", "motion", "starts", "remedied", "entropy")
+QUANTILES = 13  # of each distance
+MOTION = (
+    *("rotation", "translation", "displacement", "fitness", "inlier_rmse"),
+    *("spread_rotation", "spread_translation", "log_determinant"),
+)
+# Of the groups distances and motion, joined: every other quantile of the three distances, and all of the motion.
+RESIDUALS = (*range(0, 3 * QUANTILES, 2), *range(4 * QUANTILES, 4 * QUANTILES + len(MOTION)))
+DENSITIES = tuple(range(3 * QUANTILES, 3 * QUANTILES + 6))  # of the planes: spacings, extents, numbers of points
 DescribedPoints = Annotated[int, Bounds(minimum=16, maximum=65536)]  # of each cloud
 
 

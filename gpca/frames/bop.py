@@ -102,14 +102,14 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
             that cannot be, an object without a mask, two folders of one scene.
     """
     folders = list(folders)
-    found = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
-    if not found:
+    scene_files = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
+    if not scene_files:
         raise InputError(
             ", ".join(map(str, folders)), f"has no {split}*/<scene>/scene_gt.json", "check location or split"
         )
-    frames = [frame for path in found for frame in _frames_of_scene(path.parent)]
+    frames = [frame for path in scene_files for frame in _frames_of_scene(path.parent)]
     if not frames:
-        raise InputError(found[0], "lists no image", REMEDY)
+        raise InputError(scene_files[0], "lists no image", REMEDY)
     first: dict[tuple[int, int], Frame] = {}
     for frame in frames:
         if (same := first.setdefault((frame.scene, frame.image), frame)) is not frame:

@@ -1,16 +1,31 @@
-"""Instances: objects as single depth frames show them, with their true and their initial poses, and their file."""
+"""Instances: objects as single depth frames show them, with their true and their initial poses, and their file.
+
+Beside registrations of depth frames lies a CSV that says which instance each sample shows, and its pose errors.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.errors import InputError
 from gpca.io.arrays import REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.csv_file import numbers, read_csv
 from gpca.objects.splits import unseen
+from gpca.pairs.dataset import Registrations
 from gpca.seeds import generator
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
+FRAME_COLUMNS = (  # all that the file may hold
+    *COLUMNS,
+    *("concept", "scene", "image", "object", "symmetric", "init_from", "init_error", "icp_error", "lost_to"),
+)
 
 
 @dataclass(frozen=True)
@@ -101,3 +116,24 @@ class Instances:
         if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
             raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", REGENERATE)
         return cls(**{name: arrays[name] for name in shapes})
+
+
+def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
+    """Read the columns that tell samples apart, as text but for `in_training`."""
+    rows = read_csv(path, COLUMNS, others=FRAME_COLUMNS)
+    return rows.assign(in_training=rows["in_training"] == "True")
+
+
+def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndarray:
+    """Return the instance (S,) that each registration shows.
+
+    Raises:
+        InputError: the file is of other samples.
+    """
+    rows = read_samples_of_frames(path)
+    for name in ("sample", "split"):
+        if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
+            raise InputError(
+                path, "its samples differ from those of the registrations", "regenerate both from the same config"
+            )
+    return numbers(path, rows, "instance", least=0).to_numpy(int)

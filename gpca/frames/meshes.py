@@ -47,7 +47,7 @@ def datasets_of(
             tuple(folders(entry, downloads)),
             places=read_scene_splits(splits, name) if splits else {},
             role=role,
-            **_given(entry),
+            **_dataset_options(entry),
         )
         for name, entry in entries.items()
     }
@@ -107,7 +107,7 @@ def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
     return Surface(surface.name, np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64))
 
 
-def _given(entry: dict) -> dict:
-    given = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
+def _dataset_options(entry: dict) -> dict:
+    options = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
     paths = {name: Path(entry[name]) if entry.get(name) else None for name in ("models", "errors")}
-    return given | paths | {"results": tuple(map(Path, entry["results"]))}
+    return options | paths | {"results": tuple(map(Path, entry["results"]))}

@@ -14,11 +14,17 @@ from scipy.spatial import cKDTree
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, without_background
-from gpca.frames.estimates import EstimatorErrors, choose_estimate, error_of, read_pose_errors
+from gpca.frames.estimates import (
+    EstimatorErrors,
+    PosesByObject,
+    choose_estimate,
+    error_of,
+    read_bop_results,
+    read_pose_errors,
+)
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
 from gpca.frames.instances import Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
-from gpca.frames.results_file import PosesByObject, read_bop_results
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_center
 from gpca.objects.splits import DRAWN, EVALUATION, Place
@@ -58,11 +64,11 @@ class Dataset:
 
     def frames(self) -> list[Frame]:
         """Return its frames, or a draw of them; InputError for a scene that the splits lack."""
-        found = [frame for frame in read_frames(self.folders, self.split) if self._is_read(frame)]
-        if self.most_frames is None or len(found) <= self.most_frames:
-            return found
-        rows = generator(self.name, "frames").choice(len(found), self.most_frames, replace=False)
-        return [found[row] for row in np.sort(rows)]
+        frames = [frame for frame in read_frames(self.folders, self.split) if self._is_read(frame)]
+        if self.most_frames is None or len(frames) <= self.most_frames:
+            return frames
+        rows = generator(self.name, "frames").choice(len(frames), self.most_frames, replace=False)
+        return [frames[row] for row in np.sort(rows)]
 
     def _is_read(self, frame: Frame) -> bool:
         if not self.places:
@@ -168,14 +174,14 @@ def read_instances(
     left_out: list[str] = []
     seen: list[tuple[_Objects, Frame, int, dict]] = []
     for dataset, frames, models in datasets.values():
-        found = _Objects(dataset, objects, models, settings)
+        catalog = _Objects(dataset, objects, models, settings)
         of_dataset: list[tuple[_Objects, Frame, int, dict]] = []
         for frame in progress(frames, f"frames of {dataset.name}"):
             shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
             shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or "")}
             shown["fold"] = dataset.fold(frame.scene)
-            of_dataset += [(found, frame, n, shown | row) for n, row in found.in_frame(frame, left_out)]
-        observations = [found.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]
+            of_dataset += [(catalog, frame, n, shown | row) for n, row in catalog.in_frame(frame, left_out)]
+        observations = [catalog.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]
         require_shared_form(dataset.name, observations)
         seen += of_dataset
     if not seen:
@@ -184,8 +190,8 @@ def read_instances(
     # Results last: they are measured against poses that fit what was seen.
     find = _from_results(datasets, seen) if settings.form == "results" else None
     rows = []
-    for found, frame, n, row in progress(seen, "initial poses"):
-        init_from, T_init = find(found, frame, n, row) if find else (settings.form, found.initial_pose(frame, n, row))
+    for own, frame, n, row in progress(seen, "initial poses"):
+        init_from, T_init = find(own, frame, n, row) if find else (settings.form, own.initial_pose(frame, n, row))
         rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
     for fault in left_out:
         print(f"skipped: {fault}", file=sys.stderr)
@@ -198,29 +204,30 @@ def read_instances(
 def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:
     """Return a function to initial poses: an estimator's if one found the object, else the truth with an error."""
     estimators = {name: _estimators(dataset) for name, (dataset, _, _) in datasets.items()}
-    said: dict[int, tuple[str, np.ndarray]] = {}
-    errors = EstimatorErrors({(found.name, number) for found, _, _, _ in seen for number in found.symmetric_ids()})
+    estimates: dict[int, tuple[str, np.ndarray]] = {}
+    symmetric = {(catalog.name, number) for catalog, _, _, _ in seen for number in catalog.symmetric_ids()}
+    errors = EstimatorErrors(symmetric)
     for name, (dataset, _, models) in datasets.items():
         for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
             errors.add((name, number), T_error)
-    for place, (found, frame, n, row) in enumerate(seen):
+    for place, (catalog, frame, n, row) in enumerate(seen):
         annotation = frame.annotations[n]
         number = annotation.object_id
         alone = Counter(of.object_id for of in frame.annotations)[number] == 1
-        random = generator(found.name, *frame.place, n, "estimator")
-        shown = row | {"diameter_m": found.diameter_m(number)}
-        if chosen := choose_estimate(estimators[found.name], (*frame.place, number), alone, shown, random):
-            said[place] = chosen
-            errors.add((found.name, number), error_of(annotation.T_camera_model, chosen[1]))
-    places = {(found.name, *frame.place, n): place for place, (found, frame, n, _) in enumerate(seen)}
+        random = generator(catalog.name, *frame.place, n, "estimator")
+        shown = row | {"diameter_m": catalog.diameter_m(number)}
+        if chosen := choose_estimate(estimators[catalog.name], (*frame.place, number), alone, shown, random):
+            estimates[place] = chosen
+            errors.add((catalog.name, number), error_of(annotation.T_camera_model, chosen[1]))
+    places = {(catalog.name, *frame.place, n): place for place, (catalog, frame, n, _) in enumerate(seen)}
 
-    def find(found: _Objects, frame: Frame, n: int, row: dict) -> tuple[str, np.ndarray]:
+    def find(catalog: _Objects, frame: Frame, n: int, row: dict) -> tuple[str, np.ndarray]:
         number = frame.annotations[n].object_id
-        axes = (found.name, *frame.place, n)
-        if chosen := said.get(places[axes]):
-            return chosen[0], chosen[1] @ found.T_model_object(number)
-        T_error = errors.draw((found.name, number), generator(*axes, "error"))
-        return "errors", frame.annotations[n].T_camera_model @ T_error @ found.T_model_object(number)
+        axes = (catalog.name, *frame.place, n)
+        if chosen := estimates.get(places[axes]):
+            return chosen[0], chosen[1] @ catalog.T_model_object(number)
+        T_error = errors.draw((catalog.name, number), generator(*axes, "error"))
+        return "errors", frame.annotations[n].T_camera_model @ T_error @ catalog.T_model_object(number)
 
     return find
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gpca.alignment.rigid import require_rotation, rigid_motion
 from gpca.errors import InputError
-from gpca.io.json_file import finite_numbers, read_json
+from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
 
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
@@ -26,18 +26,19 @@ def read_images(path: Path) -> dict[int, Any]:
     """Return what scene_camera.json or scene_gt.json holds, by the number of the image.
 
     Raises:
-        InputError: what :func:`gpca.io.json_file.read_json` refuses, a key that is no number, two of the same number.
+        InputError: what :func:`gpca.io.structured_text.read_json` refuses, a key that is no number, or the same
+            number twice.
     """
-    found: dict[int, Any] = {}
+    images: dict[int, Any] = {}
     for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
         try:
             image = whole(key)
         except ValueError as fault:
             raise InputError(path, f"its key {key[:40]!r} is not an image number", REMEDY) from fault
-        if image in found:
+        if image in images:
             raise InputError(path, f"image {image} occurs twice", "keep one of the two")
-        found[image] = entry
-    return found
+        images[image] = entry
+    return images
 
 
 def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:

@@ -65,19 +65,19 @@ def _is_absent(entry: dict, data_dir: str | None) -> bool:
 
 
 def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
-    found = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
-    given = found.get("results") or []
-    named = [given] if isinstance(given, str) else given
-    found["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]
-    errors = _matching(data_dir, found["errors"]) if found.get("errors") else []
-    if models := found.get("models"):
+    resolved = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
+    results = resolved.get("results") or []
+    named = [results] if isinstance(results, str) else results
+    resolved["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]
+    errors = _matching(data_dir, resolved["errors"]) if resolved.get("errors") else []
+    if models := resolved.get("models"):
         places = _places(data_dir, models)
-        found["models"] = str(next((path for path in places if path.is_dir()), places[0]))
-    found["errors"] = str(errors[0]) if errors else None
-    for path in (*found["results"], found["errors"]):
+        resolved["models"] = str(next((path for path in places if path.is_dir()), places[0]))
+    resolved["errors"] = str(errors[0]) if errors else None
+    for path in (*resolved["results"], resolved["errors"]):
         if path and not Path(path).is_file():
             raise InputError(path, "no such results file", f"correct results and errors of dataset {name}")
-    return found
+    return resolved
 
 
 def _places(data_dir: str | None, path: str) -> list[Path]:
@@ -90,4 +90,4 @@ def _matching(data_dir: str | None, name: str) -> list[Path]:
     places = _places(data_dir, name)
     if "*" not in name:
         return [next((path for path in places if path.is_file()), places[0])]
-    return next((found for path in places if (found := sorted(path.parent.glob(path.name)))), [])
+    return next((paths for path in places if (paths := sorted(path.parent.glob(path.name)))), [])

@@ -1,4 +1,7 @@
-"""Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labeled."""
+"""Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labeled.
+
+Overlap is lost to an occluder: the silhouette of another object moved over the mask, as if it stood in front.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,6 @@ import numpy as np
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.frames.instances import Instances
-from gpca.frames.occlusion import occlude
 from gpca.io.names import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 OCCLUDER, HALF_SPACE = "occluder", "half_space"
+STEP_PX = 2
+TOLERANCE = 0.03
 
 
 @dataclass(frozen=True)
@@ -83,24 +87,26 @@ def _register_one(
 ) -> tuple[dict, str]:
     index = int(instances.object_index[i])
     diameter_m = float(objects.diameters_m[index])
-    given = settings.registration
+    registration = settings.registration
     T_init_camera = inverse(instances.T_camera_object_init[i])
-    rows = random.permutation(len(instances.cloud_m(i)))[: given.cloud_points]
-    target_rows = random.permutation(len(objects.points(index)))[: given.cloud_points]
+    rows = random.permutation(len(instances.cloud_m(i)))[: registration.cloud_points]
+    target_rows = random.permutation(len(objects.points(index)))[: registration.cloud_points]
     points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
     perturbed = None
     lost_to = ""
     if concept == "overlap":
         if random.random() < settings.occluders:
-            share = random.uniform(*given.severities.crop)
+            share = random.uniform(*registration.severities.crop)
             kept_P = occlude(instances, i, instances.pixels_of(i)[rows], share, random)
             if kept_P is not None:
                 perturbed = Perturbed(points[kept_P], severity={"crop": float(1 - kept_P.mean())})
         lost_to = HALF_SPACE if perturbed is None else OCCLUDER
-    perturbed = PERTURBATIONS[concept](points, given.severities, random) if perturbed is None else perturbed
+    perturbed = PERTURBATIONS[concept](points, registration.severities, random) if perturbed is None else perturbed
     T_object_init = inverse(instances.T_camera_object_true[i]) @ instances.T_camera_object_init[i]
     T_true = scale_translation(T_object_init, 1 / diameter_m) @ perturbed.T_target_source_true
-    return align_pair(replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, given.icp), lost_to
+    return align_pair(
+        replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, registration.icp
+    ), lost_to
 
 
 def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict, trained: set[int]) -> dict:
@@ -117,3 +123,55 @@ def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict,
     in_training = {"object": record["object_name"], "in_training": record["object_index"] in trained}
     started = {"symmetric": symmetric, "init_from": instances.init_from[i]}
     return shown | {"instance": i, **seen, **in_training, **started, **errors}
+
+
+def occlude(
+    instances: Instances, i: int, pixels_P_2: np.ndarray, share: float, random: np.random.Generator
+) -> np.ndarray | None:
+    """Return which of the pixels stay visible (P,) when an occluder covers about the given share of them.
+
+    Occluders are the visible silhouettes of the dataset's other objects at their own size, tried in random order. One
+    comes in from a random direction until it covers the share.
+
+    Args:
+        pixels_P_2: (u, v) of the points of instance i that are in question.
+        share: how much of the pixels is to be covered.
+
+    Returns:
+        None where no silhouette of the dataset can cover that share to within `TOLERANCE`.
+    """
+    others = np.flatnonzero(
+        (instances.dataset == instances.dataset[i]) & (instances.object_index != instances.object_index[i])
+    )
+    center = pixels_P_2.mean(axis=0)
+    for other in random.permutation(others):
+        silhouette, corner = _silhouette(instances.pixels_of(other))
+        angle = random.uniform(0, 2 * np.pi)
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        reach = np.linalg.norm(np.ptp(pixels_P_2, axis=0)) + np.linalg.norm(silhouette.shape)
+        start = center - corner - np.array(silhouette.shape[::-1]) / 2
+        for distance_px in np.arange(reach, 0, -STEP_PX):
+            covered_P = _covers(silhouette, pixels_P_2 - np.rint(corner + start + distance_px * direction).astype(int))
+            if covered_P.mean() >= share:
+                break
+        if abs(covered_P.mean() - share) <= TOLERANCE:
+            return ~covered_P
+    return None
+
+
+def _silhouette(pixels_P_2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mask within its bounding box, closed where single pixels were not measured, and the box's corner."""
+    from scipy.ndimage import binary_closing
+
+    corner = pixels_P_2.min(axis=0)
+    u, v = (pixels_P_2 - corner).T
+    mask = np.zeros((v.max() + 1, u.max() + 1), bool)
+    mask[v, u] = True
+    return binary_closing(np.pad(mask, 3), iterations=2)[3:-3, 3:-3], corner
+
+
+def _covers(silhouette: np.ndarray, pixels_P_2: np.ndarray) -> np.ndarray:
+    height, width = silhouette.shape
+    u, v = pixels_P_2.T
+    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
+    return inside & silhouette[v.clip(0, height - 1), u.clip(0, width - 1)]

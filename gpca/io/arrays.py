@@ -73,8 +73,8 @@ def load_arrays(
     except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
         raise InputError(path, "is not a readable npz archive", REGENERATE) from fault
     for name, array in arrays.items():
-        if (found := _fault_of(name, array)) is not None:
-            raise InputError(path, f"array '{name}' contains {found}", REGENERATE)
+        if (value_fault := _fault_of(name, array)) is not None:
+            raise InputError(path, f"array '{name}' contains {value_fault}", REGENERATE)
     if axes is not None and "source" in arrays:
         require_axes(path, axes_in(arrays), axes)
     return arrays
@@ -151,8 +151,8 @@ def _read_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
 
 def _check_shape(path, name, actual, shape, sizes) -> None:
     matches = len(actual) == len(shape) and all(
-        sizes.setdefault(size, found) == found if isinstance(size, str) else size == found
-        for size, found in zip(shape, actual, strict=True)
+        sizes.setdefault(size, length) == length if isinstance(size, str) else size == length
+        for size, length in zip(shape, actual, strict=True)
     )
     if not matches:
         expected = "×".join(str(sizes.get(size, size)) for size in shape) or "scalar"

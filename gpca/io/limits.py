@@ -64,12 +64,12 @@ def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: 
     Half of the physical memory is the limit: data is checked, cut and converted, which takes as much again.
     """
     if needed_bytes > max(SMALL_BYTES, LARGEST_RATIO * file_bytes):
-        found = f"would unpack to {needed_bytes / 1e9:.3g} GB, more than {LARGEST_RATIO} times its size"
-        raise InputError(subject, found, remedy)
+        fault = f"would unpack to {needed_bytes / 1e9:.3g} GB, more than {LARGEST_RATIO} times its size"
+        raise InputError(subject, fault, remedy)
     memory_bytes = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if needed_bytes > memory_bytes / 2:
-        found = f"takes {needed_bytes / 1e9:.3g} GB, more than half of this machine's {memory_bytes / 1e9:.3g} GB"
-        raise InputError(subject, found, "use a machine with more memory, or smaller data")
+        fault = f"takes {needed_bytes / 1e9:.3g} GB, more than half of this machine's {memory_bytes / 1e9:.3g} GB"
+        raise InputError(subject, fault, "use a machine with more memory, or smaller data")
 
 
 def is_bounded(info: zipfile.ZipInfo) -> bool:

@@ -27,8 +27,8 @@ def _in_words(axes: Axes) -> str:
     return f"source '{source}'" + ("" if seed is None else f", seed {seed}")
 
 
-def require_axes(path: str | Path, found: Axes, expected: Axes | None) -> None:
+def require_axes(path: str | Path, actual: Axes, expected: Axes | None) -> None:
     """Raise an InputError unless a file is of the source and seed that are expected; of any where that is None."""
-    if expected is not None and found != expected:
+    if expected is not None and actual != expected:
         wanted = _in_words(expected)
-        raise InputError(path, f"is of {_in_words(found)}, not of {wanted}", f"give the file of {wanted}")
+        raise InputError(path, f"is of {_in_words(actual)}, not of {wanted}", f"give the file of {wanted}")

@@ -86,8 +86,8 @@ def _thinned(points: np.ndarray, cloud_points: int, role: str, notes: list[str])
 def _require_near(source: np.ndarray, unit: str) -> None:
     """Raise an InputError where a pose that was given puts the source, in diameters of the target, far from it."""
     if (distance := float(np.linalg.norm(source, axis=1).min())) > FARTHEST_START:
-        found = f"puts the source {distance:.3g} diameters of the target away from it"
-        raise InputError("initial pose", found, f"give T_target_source, with its translation in {unit}")
+        fault = f"puts the source {distance:.3g} diameters of the target away from it"
+        raise InputError("initial pose", fault, f"give T_target_source, with its translation in {unit}")
 
 
 def _require_like_sizes(source: np.ndarray, target: np.ndarray) -> None:

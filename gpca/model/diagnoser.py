@@ -14,9 +14,8 @@ from gpca.alignment.twist import exp
 from gpca.causes.truth import FAILED, LARGEST_ERROR, NOMINAL
 from gpca.explainers.pair_classifier import PairClassifier
 from gpca.features.dataset import describe
-from gpca.features.groups import GROUPS
 from gpca.features.pair import ObservedPair
-from gpca.features.settings import DescriptorSettings
+from gpca.features.settings import GROUPS, DescriptorSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
@@ -38,7 +37,7 @@ class Diagnosis:
         bald: of the least certain of these probabilities, nats (Eq. 7).
         expected_error: of the pose: ADD, or ADD-S of a symmetric object.
         unlikeness: how unlike the training samples the pair is: 1 % of these are above 1.
-        void: whether the pair is such that none of these numbers means anything (:mod:`gpca.model.voids`).
+        void: whether the pair is such that none of these numbers means anything (:mod:`gpca.model.familiarity`).
     """
 
     failure: float

@@ -27,10 +27,10 @@ from gpca.errors import InputError
 from gpca.model.clouds import Clouds
 from gpca.model.diagnoser import Diagnosis
 from gpca.model.explanation import CHECK, Explanation, PoseSpread
+from gpca.model.familiarity import Void, voids_of
 from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.pose_spread import NAMES, estimated_spread, spread_estimator, spread_of_icp
-from gpca.model.voids import Void, voids_of
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings

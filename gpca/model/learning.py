@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.causes.dataset import Causes
-from gpca.causes.labels import labels_of
+from gpca.causes.dataset import Causes, labels_of
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import BORDERLINE, NOMINAL
@@ -16,8 +15,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import PairClassifier
 from gpca.features.dataset import Descriptors
-from gpca.features.groups import GROUPS
-from gpca.features.settings import DescriptorSettings
+from gpca.features.settings import GROUPS, DescriptorSettings
 from gpca.model.diagnoser import SMALLEST_ERROR, Diagnoser
 
 RIDGE = 10.0  # of the regression of the error, in samples

@@ -20,7 +20,7 @@ def require_model(path: str | Path) -> None:
     require_file(path, "no such model", REMEDY)
 
 
-def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path:
+def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Path:
     """Return the path to use: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
 
     Of those in `results`, by default the folder of that name in the working directory, that of the run ``real`` comes
@@ -29,8 +29,8 @@ def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path
     Raises:
         InputError: there is none.
     """
-    if given is not None:
-        return Path(given)
+    if chosen is not None:
+        return Path(chosen)
     if named := os.environ.get(VARIABLE):
         if not Path(named).is_file():
             raise InputError(f"{VARIABLE}={named}", "no such model", f"correct it or {REMEDY}")
@@ -41,9 +41,9 @@ def model_path(given: str | Path | None = None, results: Path = RESULTS) -> Path
         preferred = BEST_FIRST.index(run) if run in BEST_FIRST else len(BEST_FIRST)
         return run == "smoke", preferred, -path.stat().st_mtime
 
-    found = [*sorted(results.glob("*/model.pt"), key=rank), *([SHIPPED] if SHIPPED.is_file() else [])]
-    if not found:
+    candidates = [*sorted(results.glob("*/model.pt"), key=rank), *([SHIPPED] if SHIPPED.is_file() else [])]
+    if not candidates:
         raise InputError(
             "no model", f"none in {results.absolute()}", f"{REMEDY}, or name one with --model or {VARIABLE}"
         )
-    return found[0]
+    return candidates[0]

@@ -9,8 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.io.json_file import read_json
-from gpca.io.structured_text import load_own_yaml
+from gpca.io.structured_text import load_own_yaml, read_json
 from gpca.objects.canonical import ObjectClouds
 
 LICENSES = Path(__file__).with_name("licenses.yaml")
@@ -74,10 +73,10 @@ class Origin:
             InputError: provenance that is missing or incomplete, objects drawn by the package, data without a license.
         """
         record = _provenance(model)
-        found = [match.groups() for path in record["inputs_sha256"] if (match := _READ.search(f"/{path}"))]
-        if not found:
+        learned_from = [match.groups() for path in record["inputs_sha256"] if (match := _READ.search(f"/{path}"))]
+        if not learned_from:
             raise InputError(_beside(model), "lists nothing that a model learns from", REMEDY)
-        sources = (_source(model.parent, name, kind == "model_causes", title) for kind, name in found)
+        sources = (_source(model.parent, name, kind == "model_causes", title) for kind, name in learned_from)
         try:
             return cls(record, tuple(sources))
         except (LookupError, TypeError, AttributeError) as fault:

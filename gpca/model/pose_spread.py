@@ -62,7 +62,7 @@ def estimated_spread(
     source = thin(source, settings.icp_points, "spread")
     target = thin(target, settings.icp_points, "spread", "target")
     pair = Pair(source, target, seed=seed_of("explanation", "estimate")).with_normals()
-    said = estimate(RegisteredPair(pair, outcome, method, settings.deviation_6()))
-    if said.covariance_6_6 is None:
-        return None, f"{name} gives no covariance: {said.failure}"
-    return PoseSpread(said.covariance_6_6, diameter, name, settings.starts if name == MONTE_CARLO else None), ""
+    estimated = estimate(RegisteredPair(pair, outcome, method, settings.deviation_6()))
+    if estimated.covariance_6_6 is None:
+        return None, f"{name} gives no covariance: {estimated.failure}"
+    return PoseSpread(estimated.covariance_6_6, diameter, name, settings.starts if name == MONTE_CARLO else None), ""

@@ -21,8 +21,8 @@ from typing import IO, Any
 
 from gpca.errors import InputError
 from gpca.io.files import sha256_of_file, whole_file, whole_folder
-from gpca.io.json_file import read_json
 from gpca.io.limits import LARGEST_FILE_BYTES, is_bounded, require_file
+from gpca.io.structured_text import read_json
 
 LARGEST_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
 LONGEST_HEADER = 2**20  # bytes of what comes before a member, such as its long name; tarfile reads it as a whole
@@ -114,9 +114,9 @@ def _require_listed(folder: Path, listed: Path) -> None:
     remedy = f"remove {folder} and {listed.name} beside it, and the archive will be unpacked again"
     expected = read_json(listed, "a list of files", remedy)
     # What a desktop leaves in a folder that somebody looked at begins with a dot; no reader takes it for data.
-    found = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file() or file.is_symlink()}
-    for name in sorted({*expected, *(name for name in found if not Path(name).name.startswith("."))}):
-        if name not in found:
+    present = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file() or file.is_symlink()}
+    for name in sorted({*expected, *(name for name in present if not Path(name).name.startswith("."))}):
+        if name not in present:
             raise InputError(folder / name, "is missing from what was unpacked", remedy)
         if name not in expected:
             raise InputError(folder / name, "is not from the archive that was unpacked here", remedy)

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from gpca.errors import InputError
-from gpca.io.json_file import read_json
 from gpca.io.limits import require_file
+from gpca.io.structured_text import read_json
 from gpca.numerals import whole
 from gpca.objects.canonical import diameter
 from gpca.objects.mesh_folder import meters_per, read_surface

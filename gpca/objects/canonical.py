@@ -50,9 +50,9 @@ def _require_resolution(points: np.ndarray, subject: object) -> None:
             rounded = (off < NEARLY).all()
         if extent > 0 and coarse_3.any() and rounded:
             step, largest = step_3.max(), largest_3[coarse_3].max()
-            found = f"at coordinates of {largest:.3g}, {kind.__name__} has steps of {step:.2g}, but all points span "
+            fault = f"at coordinates of {largest:.3g}, {kind.__name__} has steps of {step:.2g}, but all points span "
             remedy = "subtract an offset before saving it, from source and target alike"
-            raise InputError(subject, f"{found}{extent:.2g}", remedy)
+            raise InputError(subject, f"{fault}{extent:.2g}", remedy)
 
 
 def diameter(points: np.ndarray, subject: object) -> float:
@@ -263,8 +263,8 @@ class ObjectClouds:
         # From the center of its box, no point of an object is farther away than its diameter.
         extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
         if np.abs(points_m).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
-            found = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
-            raise InputError(subject, f"{found}, or they are not centered", REGENERATE)
+            fault = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
+            raise InputError(subject, f"{fault}, or they are not centered", REGENERATE)
         lengths = np.linalg.norm(self.normals(i), axis=1)
         if np.abs(lengths - 1).max() > UNIT_TOLERANCE:
             raise InputError(subject, "a normal is not of unit length", REGENERATE)

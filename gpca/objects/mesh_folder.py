@@ -47,20 +47,20 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
     if not folder.is_dir():
         raise InputError(folder, "no such folder", "check location and data_dir in the config")
     if patterns is None:
-        found = {path for path in folder.iterdir() if path.name.lower().endswith(tuple(suffixes))}
-        if not found:
+        files = {path for path in folder.iterdir() if path.name.lower().endswith(tuple(suffixes))}
+        if not files:
             raise InputError(folder, f"the folder has none of {formats}", "check location, or set files")
-        return sorted(found)
-    found = set()
+        return sorted(files)
+    files = set()
     for pattern in patterns:
         matches = {path for path in folder.glob(pattern) if path.is_file()}
         if not matches:
             raise InputError(folder / pattern, "no file matches", "check files in the config")
-        found |= matches
-    for path in sorted(found):
+        files |= matches
+    for path in sorted(files):
         if not path.name.lower().endswith(tuple(suffixes)):
             raise InputError(path, "has an unsupported format", f"let files match {formats} only")
-    return sorted(found)
+    return sorted(files)
 
 
 def read_surface(path: Path, scale: float) -> Surface:

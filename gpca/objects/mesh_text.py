@@ -123,8 +123,10 @@ def _check_off(path: Path) -> None:
             corners = _count(row[0])
             whole = len(row) - 1 - corners in OFF_COLOR_COLUMNS and all(word.isdigit() for word in row[1 : 1 + corners])
             if corners < 3 or not whole:
-                found = f"has {corners} corners" if 0 < corners < 3 else "is missing or does not have its stated length"
-                raise ValueError(f"face {i + 1} of {faces} {found}")
+                defect = (
+                    f"has {corners} corners" if 0 < corners < 3 else "is missing or does not have its stated length"
+                )
+                raise ValueError(f"face {i + 1} of {faces} {defect}")
         if next(rows, None) is not None:
             raise ValueError("more rows than it declares")
 
@@ -186,8 +188,8 @@ def _check_stl(path: Path) -> None:
                 continue
             keyword = STL_FACET[place]
             length = len(keyword.split())
-            if (found := b" ".join(words[:length])) != keyword:
-                raise ValueError(f"line {number}: {_shown(found)} stands where {_shown(keyword)} should")
+            if (written := b" ".join(words[:length])) != keyword:
+                raise ValueError(f"line {number}: {_shown(written)} stands where {_shown(keyword)} should")
             if (numbers := len(words) - length) != STL_NUMBERS.get(keyword, 0):
                 raise ValueError(f"line {number}: {_shown(keyword)} has {numbers} numbers")
             place = (place + 1) % len(STL_FACET)

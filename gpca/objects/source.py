@@ -54,7 +54,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         procedural.require_family(entry["family"])
         return {name: value for name, value in entry.items() if name not in OF_FILES} | {"origin": "procedural"}
     module = _module_of(entry.get("kind"))
-    if folder := _found(entry, data_dir):
+    if folder := _local_data(entry, data_dir):
         require_whole_if_ours(folder)
         if require_entry := getattr(module, "require_entry", None):
             require_entry(entry, folder)
@@ -110,8 +110,8 @@ def data_files(entry: dict) -> list[Path]:
     if entry["origin"] != "local":
         return []
     patterns = entry.get("files") or ["*", "models/*"]
-    found = {path for pattern in patterns for path in Path(entry["location"]).glob(pattern)}
-    return sorted(path for path in found if path.is_file())
+    matching = {path for pattern in patterns for path in Path(entry["location"]).glob(pattern)}
+    return sorted(path for path in matching if path.is_file())
 
 
 def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str, str]:
@@ -136,7 +136,7 @@ def _unpacked(file: Path) -> Path:
     return archive.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
 
 
-def _found(entry: dict, data_dir: str | None) -> Path | None:
+def _local_data(entry: dict, data_dir: str | None) -> Path | None:
     location, patterns = require_place(entry.get("location") or ""), entry.get("files")
     for pattern in patterns or ():
         _require_pattern(pattern)
@@ -159,10 +159,11 @@ def find_file(place: str, data_dir: str | None) -> Path:
         InputError: neither has it.
     """
     paths = [require_place(base / require_place(place)) for base in folders_of_data(data_dir)]
-    if (found := next((path for path in paths if path.is_file()), None)) is None:
+    path = next((path for path in paths if path.is_file()), None)
+    if path is None:
         raise InputError(paths[-1], "no such file", "correct the config, or restore it: git checkout -- data")
-    require_whole_if_ours(found)
-    return found
+    require_whole_if_ours(path)
+    return path
 
 
 def require_place(place: str | Path) -> Path:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.errors import InputError
-from gpca.io.json_file import finite_numbers
+from gpca.io.structured_text import finite_numbers
 
 REMEDY = "write it as the BOP format does"
 TOLERANCE = 0.01  # diameters

@@ -59,12 +59,12 @@ def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Fi
         "active_learning.csv": (read_metrics, [_labels]),
         "recovery.csv": (read_metrics, [_recovery]),
     }
-    found = []
+    findings = []
     for name, (read, tellers) in readers.items():
         if (folder / name).is_file():
             rows = read(folder / name)
-            found += [finding for tell in tellers if (finding := tell(rows, titles))]
-    return [finding for finding in found if finding.result in shown]
+            findings += [finding for tell in tellers if (finding := tell(rows, titles))]
+    return [finding for finding in findings if finding.result in shown]
 
 
 def _protocol(metrics: pd.DataFrame, titles: Titles) -> Finding | None:

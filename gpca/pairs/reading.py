@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.normals import estimate_normals
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations, ragged
@@ -52,12 +52,12 @@ def registered_backwards(registrations: Registrations, settings: ICPSettings) ->
         T_init = registrations.T_target_source("init", row)
         observed = registrations.source(row)
         normals = None if settings.method == "point_to_point" else estimate_normals(observed)
-        found = ICP(observed, normals, settings).register(target, inverse(T_init))
-        T_target_source = inverse(found.T_target_source)  # ICP's target was the source
+        backwards = ICP(observed, normals, settings).register(target, inverse(T_init))
+        T_target_source = inverse(backwards.T_target_source)  # ICP's target was the source
         clouds.append(transform(T_target_source, observed).astype(np.float32))
         targets.append(registrations.target(row))
         poses.append(scale_translation(T_target_source, float(registrations.diameter_m[row])))
-        fits.append((found.fitness, found.inlier_rmse))
+        fits.append((backwards.fitness, backwards.inlier_rmse))
     fitness, inlier_rmse = np.array(fits).T
     changed: dict[str, Any] = {"T_target_source_icp": np.array(poses), "fitness": fitness, "inlier_rmse": inlier_rmse}
     return replace(registrations, **changed | ragged(clouds, targets), attached={})

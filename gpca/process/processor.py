@@ -75,14 +75,14 @@ def describe() -> dict[str, str | list[str] | None]:
 
     A field that the system does not report is None.
     """
-    told = _cpuinfo()
+    facts = _cpuinfo()
     vector = ("avx", "fma", "amx", "bmi", "f16c", "sse4")
     return {
         "name": cpu_name(),
-        "vendor": told.get("vendor_id"),
-        "family": told.get("cpu family"),
-        "model": told.get("model"),
-        "stepping": told.get("stepping"),
+        "vendor": facts.get("vendor_id"),
+        "family": facts.get("cpu family"),
+        "model": facts.get("model"),
+        "stepping": facts.get("stepping"),
         "flags": sorted(flag for flag in _flags() if flag.startswith(vector)),
         "instructions": instructions(),
     }

@@ -61,12 +61,12 @@ def _rivals(
 
     A right pose is found again from other orientations, a wrong one loses to what is found.
     """
-    found = search(holding, robot, random, PROBED)
-    if not found:
+    poses = search(holding, robot, random, PROBED)
+    if not poses:
         return 0.0, 0.0, 0.0
     points_m = _thinned(robot.points_m, CLOUD_POINTS)
-    distances = [adds_error(points_m, T, holding.T_world_object) / robot.diameter_m for T in found]
-    best = int(np.argmax(worth := [explained(T) for T in found]))
+    distances = [adds_error(points_m, T, holding.T_world_object) / robot.diameter_m for T in poses]
+    best = int(np.argmax(worth := [explained(T) for T in poses]))
     elsewhere = np.mean([distance > CORRECT for distance in distances])
     return worth[best] - explained(holding.T_world_object), distances[best], float(elsewhere)
 

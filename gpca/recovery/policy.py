@@ -40,14 +40,14 @@ class Thresholds:
 
     def __post_init__(self) -> None:
         if not 0 <= self.improvement <= 1 or not 0 <= self.dominant <= 1:
-            found = f"improvement {self.improvement} and dominant {self.dominant}"
-            raise InputError("recovery thresholds", f"{found} are not both in [0, 1]", "they are shares of a score")
+            both = f"improvement {self.improvement} and dominant {self.dominant}"
+            raise InputError("recovery thresholds", f"{both} are not both in [0, 1]", "they are shares of a score")
         if self.dominant and self.improvement >= self.dominant:
             fault = f"improvement {self.improvement} is not below dominant {self.dominant}"
             raise InputError("recovery thresholds", fault, "a score cannot fall by more than its own value")
         if not self.uncertain >= 0 or self.attempts < 1:
-            found = f"uncertain {self.uncertain}, attempts {self.attempts}"
-            raise InputError("recovery thresholds", found, "give an uncertainty of 0 or more and at least 1 attempt")
+            fault = f"uncertain {self.uncertain}, attempts {self.attempts}"
+            raise InputError("recovery thresholds", fault, "give an uncertainty of 0 or more and at least 1 attempt")
 
 
 @dataclass(frozen=True)

@@ -66,18 +66,18 @@ class Result:
     @property
     def modules(self) -> list[str]:
         """The modules that make it: its builder's and its readers'."""
-        functions = [self.builder, *(given.read for given in self.inputs if given.read)]
+        functions = [self.builder, *(source.read for source in self.inputs if source.read)]
         return [function.split(":")[0] for function in functions]
 
     @property
     def readers(self) -> dict[str, dict]:
         """How each argument is read, in plain words for the rules: the function, and its keywords' names of files."""
         return {
-            given.argument: {
-                "function": given.read,
-                "keywords": {keyword: input_name(given.argument, keyword) for keyword in given.files},
+            source.argument: {
+                "function": source.read,
+                "keywords": {keyword: input_name(source.argument, keyword) for keyword in source.files},
             }
-            for given in self.inputs
+            for source in self.inputs
         }
 
     def file(self, suffix: str) -> str:
@@ -97,15 +97,15 @@ class Result:
     def files(self, names: Names) -> dict[str, list[str] | str]:
         """Return the files of each input, a path where there can be but one; see :func:`input_name` for the keys."""
         return {
-            input_name(given.argument, keyword): expand(patterns, self._shown(names))
-            for given in self.inputs
-            for keyword, patterns in given.files.items()
+            input_name(source.argument, keyword): expand(patterns, self._shown(names))
+            for source in self.inputs
+            for keyword, patterns in source.files.items()
         }
 
     def is_made(self, names: Names) -> bool:
         """Return whether a run with these names makes it: none of those that it takes is empty."""
         shown = self._shown(names)
-        patterns = [pattern for given in self.inputs for of_key in given.files.values() for pattern in of_key]
+        patterns = [pattern for source in self.inputs for of_key in source.files.values() for pattern in of_key]
         return all(shown[name] for name in (*self.needs, *_braced(patterns)))
 
     def arguments(self, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,7 +118,7 @@ class Result:
         for name, members in self.only.items():
             if isinstance(of_all := settings.get(f"{name}s"), Mapping):
                 shown[f"{name}s"] = {key: value for key, value in of_all.items() if key in members}
-        return {argument: _found(shown, place) for argument, place in self.settings.items()}
+        return {argument: _value_at(shown, place) for argument, place in self.settings.items()}
 
     def of_source(self, source: str) -> Result:
         """Return the result of one source, where the name has ``{source}`` in it."""
@@ -127,8 +127,8 @@ class Result:
             return text.replace("{source}", source)
 
         inputs = tuple(
-            replace(given, files={key: tuple(map(named, patterns)) for key, patterns in given.files.items()})
-            for given in self.inputs
+            replace(each, files={key: tuple(map(named, patterns)) for key, patterns in each.files.items()})
+            for each in self.inputs
         )
         settings = {argument: named(place) for argument, place in self.settings.items()}
         return replace(self, name=named(self.name), title=named(self.title), inputs=inputs, settings=settings)
@@ -207,15 +207,15 @@ def build(builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any]
         files: of each input, as :meth:`Result.files` names them.
         arguments: the builder's other arguments.
     """
-    given = {argument: _read(files, **reader) for argument, reader in readers.items()}
-    return load(builder)(**given, **arguments)
+    inputs = {argument: _read(files, **reader) for argument, reader in readers.items()}
+    return load(builder)(**inputs, **arguments)
 
 
 def _read(files: Mapping[str, Any], function: str, keywords: Mapping[str, str]) -> Any:
-    given = {keyword: files[name] for keyword, name in keywords.items()}
+    by_keyword = {keyword: files[name] for keyword, name in keywords.items()}
     if not function:
-        return given[""]
-    return load(function)(given[""]) if "" in given else load(function)(**given)
+        return by_keyword[""]
+    return load(function)(by_keyword[""]) if "" in by_keyword else load(function)(**by_keyword)
 
 
 def _result(section: str, entry: Mapping) -> Result:
@@ -227,7 +227,7 @@ def _result(section: str, entry: Mapping) -> Result:
         title=entry["title"],
         caption=entry["caption"].strip(),
         builder=entry["builder"],
-        inputs=tuple(_input(argument, given) for argument, given in entry["inputs"].items()),
+        inputs=tuple(_input(argument, source) for argument, source in entry["inputs"].items()),
         settings=entry.get("settings", {}),
         only={key: tuple(members) for key, members in entry.get("only", {}).items()},
         needs=tuple(entry.get("needs", ())),
@@ -236,20 +236,20 @@ def _result(section: str, entry: Mapping) -> Result:
     )
 
 
-def _input(argument: str, given: str | Mapping) -> Input:
-    if isinstance(given, str):
-        return Input(argument, {"": (given,)})
-    files = given.get("from", {})
+def _input(argument: str, source: str | Mapping) -> Input:
+    if isinstance(source, str):
+        return Input(argument, {"": (source,)})
+    files = source.get("from", {})
     of_key = files if isinstance(files, Mapping) else {"": files}
     patterns = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in of_key.items()}
-    return Input(argument, patterns, given.get("read", ""))
+    return Input(argument, patterns, source.get("read", ""))
 
 
 def _braced(patterns: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(name for pattern in patterns for name in re.findall(r"{(\w+)}", pattern)))
 
 
-def _found(settings: Mapping[str, Any], place: str) -> Any:
+def _value_at(settings: Mapping[str, Any], place: str) -> Any:
     for key in place.split("."):
         settings = settings[key]
     return settings

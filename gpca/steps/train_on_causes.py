@@ -7,8 +7,7 @@ from time import perf_counter
 import pandas as pd
 
 from gpca.attribution.predictions import read_timings, write_timings
-from gpca.causes.dataset import Causes
-from gpca.causes.labels import LABELS, with_label
+from gpca.causes.dataset import LABELS, Causes, with_label
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import TrainingTask, embed, train_encoder
 from gpca.encoders.weights import write_weights

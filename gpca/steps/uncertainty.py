@@ -6,8 +6,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.uncertainty.designs import DESIGNS
-from gpca.uncertainty.evaluation import design_rows, evaluate_design
+from gpca.uncertainty.designs import DESIGNS, design_rows, evaluate_design
 from gpca.uncertainty.outcomes import write_seconds
 from gpca.uncertainty.settings import UncertaintySettings
 

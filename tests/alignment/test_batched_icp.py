@@ -4,7 +4,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment import icp_target
-from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 from gpca.alignment.icp import ICP, METHODS, ICPSettings
 from gpca.alignment.rigid import transform
 from gpca.alignment.twist import exp
@@ -12,6 +12,7 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 
 DEVIATION = np.array([0.1, 0.1, 0.1, 0.03, 0.03, 0.03])
+TO_PLANES = ICPSettings("point_to_plane")
 
 
 def starts(n, seed=0, spread=1.0):
@@ -231,3 +232,39 @@ def test_three_points_suffice():
     poses, fitness, rmse = BatchedICP(transform(T, triangle), ICPSettings()).register(triangle, np.eye(4)[None])
     assert np.allclose(poses[0], T, atol=1e-9)
     assert fitness[0] == 1 and rmse[0] < 1e-9
+
+
+def ellipsoid(seed, points=300):
+    directions = np.random.default_rng(seed).normal(size=(points, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    normals = directions / [0.5, 0.35, 0.2]
+    return directions * [0.5, 0.35, 0.2], normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def test_runs_to_planes_end_where_open3d_ends():
+    (target, normals), (source, _) = ellipsoid(0), ellipsoid(1, 250)
+    starts_n = exp(np.random.default_rng(2).normal(size=(20, 6)) * 0.08)
+    poses_n, fitness_n, rmse_n = BatchedPlaneICP(target, normals, TO_PLANES).register(source, starts_n)
+    icp = ICP(target, normals, TO_PLANES)
+    for start, pose, fitness, rmse in zip(starts_n, poses_n, fitness_n, rmse_n, strict=True):
+        theirs = icp.register(source, start)
+        assert np.abs(pose - theirs.T_target_source).max() < 1e-6
+        assert (fitness, rmse) == pytest.approx((theirs.fitness, theirs.inlier_rmse), abs=1e-6)
+
+
+def test_what_planes_leave_open_stays():
+    plane = np.column_stack([np.random.default_rng(0).uniform(-0.5, 0.5, size=(200, 2)), np.zeros(200)])
+    start = exp(np.array([[0.05, -0.04, 0.0, 0.01, 0.02, 0.03]]))
+    up = np.tile([0.0, 0.0, 1.0], (200, 1))
+    poses_1, _, _ = BatchedPlaneICP(plane, up, TO_PLANES).register(plane, start)
+    assert np.abs((plane @ poses_1[0, :3, :3].T + poses_1[0, :3, 3])[:, 2]).max() < 1e-6  # down on the plane
+    assert poses_1[0, :2, 3] == pytest.approx(start[0, :2, 3], abs=5e-3)  # and not moved along it
+
+
+def test_without_correspondences_a_run_to_planes_stays_where_it_began():
+    target, normals = ellipsoid(0)
+    far = exp(np.array([[0, 0, 0, 5.0, 0, 0], np.zeros(6)]))
+    poses_2, fitness_2, rmse_2 = BatchedPlaneICP(target, normals, TO_PLANES).register(target, far)
+    assert (poses_2[0] == far[0]).all()
+    assert fitness_2.tolist() == [0, 1]
+    assert (rmse_2 < 1e-6).all()

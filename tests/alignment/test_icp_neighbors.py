@@ -75,7 +75,7 @@ def check(target, found_at):
 
 @pytest.mark.parametrize("distance", DISTANCES)
 @pytest.mark.parametrize("cloud", CLOUDS)
-def test_neighbours_are_those_of_a_tree_and_keep_within_the_radius(cloud, distance):
+def test_neighbors_are_those_of_a_tree_and_keep_within_the_radius(cloud, distance):
     points = CLOUDS[cloud]
     target = make_target(points, distance)
     same, radii = check(target, queries(points, distance))
@@ -100,7 +100,7 @@ def test_positions_that_only_some_lists_know_have_a_positive_radius():
 
 @pytest.mark.parametrize("lists", [0, 1, 7])
 @pytest.mark.parametrize("cloud", ["surface", "two clusters", "duplicates", "line"])
-def test_without_room_for_further_lists_neighbours_are_still_the_true_ones(monkeypatch, cloud, lists):
+def test_without_room_for_further_lists_neighbors_are_still_the_true_ones(monkeypatch, cloud, lists):
     monkeypatch.setattr(icp_target, "MOST_LISTS", lists)
     target = make_target(CLOUDS[cloud], 0.1)
     for _ in range(2):  # the second time every voxel that may have a list has it

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.gates import NominalThreshold
 from gpca.alignment.icp import ICPSettings
-from gpca.causes.labels import LABELS, labeled
+from gpca.causes.dataset import LABELS, labeled
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers

@@ -97,7 +97,7 @@ def test_a_remedy_without_effect_in_training_scores_a_finite_number(attached):
 
 def test_an_unknown_worth_is_refused():
     with pytest.raises(InputError, match=r"setting 'worth': unknown 'fitness'; choose one of uncertainty, residual"):
-        ScaledValues(single_drops, ONE_AT_A_TIME, "fitness")
+        ScaledValues(single_drops, ONE_AT_A_TIME, "tiny", 0, "fitness")
     with pytest.raises(InputError, match="setting 'worth'"):
         explainer_entry("shap_removal").make("tiny", 0, worth="")
 

@@ -22,12 +22,19 @@ def test_no_object_is_in_both_splits_and_seeds_differ(subjects):
 
 
 def test_views_of_one_instance_stay_together(subjects):
-    views = [replace(subjects[0], name=f"mug_{i}_1_{view}") for i in range(4) for view in range(5)]
+    views = [replace(subjects[0], name=f"mug_{i}_1_{view}", family=f"mug_{i}") for i in range(4) for view in range(5)]
     for seed in range(100, 105):
         split = split_by_object(views, "views", seed, SETTINGS)
         instances = [{name.rsplit("_", 2)[0] for name in names(part)} for part in split.values()]
         assert not instances[0] & instances[1]
         assert len(split["test"]) == 5
+
+
+def test_the_seeds_take_turns_with_the_folds_that_a_file_names(subjects):
+    placed = [replace(subject, fold=fold) for subject, fold in zip(subjects, (0, 1, 0, 2), strict=True)]
+    tested = [names(split_by_object(placed, "four", seed, SETTINGS)["test"]) for seed in range(6)]
+    of_fold = [names([subject for subject in placed if subject.fold == fold]) for fold in range(3)]
+    assert tested == of_fold * 2
 
 
 @pytest.mark.parametrize("share", [0.001, 0.999])
@@ -38,9 +45,9 @@ def test_each_split_has_an_object(subjects, share):
 
 
 def test_one_object_cannot_be_split(subjects):
-    views = [replace(subjects[0], name=f"mug_1_1_{view}") for view in range(5)]
+    views = [replace(subjects[0], name=f"mug_1_1_{view}", family="mug") for view in range(5)]
     for too_few in (subjects[:1], views):
-        message = r"causes of one: 1 object\(s\) cannot be split into .*; give at least 2 objects"
+        message = "causes of one: has objects of one family alone, .*; give objects of at least two families of shapes"
         with pytest.raises(InputError, match=message):
             split_by_object(too_few, "one", 100, SETTINGS)
 

@@ -6,8 +6,19 @@ import yaml
 from gpca.active_learning.acquisition import STRATEGIES
 from gpca.code_files import ROOT
 from gpca.comparison import published
-from gpca.comparison.published import PUBLISHED, TABLES, TEXT, UNITS, printed_seconds, read_lines, read_published
-from gpca.comparison.reasons import NONE_YET, Reason, read_reasons, reason_of
+from gpca.comparison.published import (
+    NONE_YET,
+    PUBLISHED,
+    TABLES,
+    TEXT,
+    UNITS,
+    Reason,
+    printed_seconds,
+    read_lines,
+    read_published,
+    read_reasons,
+    reason_of,
+)
 from gpca.experiments.kernel_grid.grid import setting_name
 from gpca.experiments.kernel_grid.tables import PRINTED
 from gpca.model.runtime_file import COMPONENTS

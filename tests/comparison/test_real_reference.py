@@ -10,9 +10,8 @@ from gpca.attribution.metrics import read_metrics
 from gpca.code_files import ROOT
 from gpca.comparison.claim_verdicts import read_verdicts
 from gpca.comparison.claims import read_claims
-from gpca.comparison.published import read_published
+from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
-from gpca.comparison.reasons import NONE_YET, read_reasons
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
 from gpca.reporting.tables.claims import counted

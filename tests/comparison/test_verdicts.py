@@ -7,7 +7,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from gpca.comparison.reasons import NONE_YET, Reason
+from gpca.comparison.published import NONE_YET, Reason
 from gpca.comparison.values import Reproduced
 from gpca.comparison.verdicts import (
     COMPARISON_COLUMNS,

@@ -10,20 +10,28 @@ from .configs import MISSING, changed, load, merged
 NAN = float("nan")
 
 
-@pytest.mark.parametrize("name", ["config", "smoke", "real"])
+@pytest.mark.parametrize("name", ["config", "smoke", "full", "stand_ins", "bop"])
 def test_the_shipped_configs_are_sound(name):
     sources = run_config.check(load(name))
     assert list(sources) == (["coffee_cup", "ycb"] if name == "smoke" else ["coffee_cup", "linemod", "ycb"])
     for entry in sources.values():
-        assert entry["stand_in"] == (name != "real")
-        assert entry["origin"] == ("download" if name == "real" else "procedural")
+        assert entry["stand_in"] == (name in ("smoke", "stand_ins"))
+        assert entry["origin"] == {"config": "local", "full": "local", "bop": "download"}.get(name, "procedural")
+
+
+def test_the_development_config_has_no_object_and_no_scene_of_the_evaluation():
+    config = load("development")
+    sources = run_config.check(config)
+    assert list(sources) == ["ycb_development"]
+    assert config["splits"]["role"] == "development"
+    assert min(config["seeds"]) >= 100
 
 
 def test_local_data_comes_before_the_download(tmp_path):
     (tmp_path / "bop/lm/models").mkdir(parents=True)
     for number in range(1, 16):
         (tmp_path / f"bop/lm/models/obj_{number:06d}.ply").write_text("ply")
-    linemod, ycb = map(run_config.check(load("real") | {"data_dir": str(tmp_path)}).get, ("linemod", "ycb"))
+    linemod, ycb = map(run_config.check(load("bop") | {"data_dir": str(tmp_path)}).get, ("linemod", "ycb"))
     assert (linemod["origin"], linemod["location"], ycb["origin"]) == ("local", str(tmp_path / "bop/lm"), "download")
 
 
@@ -44,7 +52,6 @@ FAULTS = [
     ("reductions.pca.neighbours", 3, "reductions.pca.neighbours: unknown; choose one of components"),
     ("explainers.gpca.iteratons", 3, "setting iteratons: unknown; did you mean iterations?"),
     ("sources.ycb.famly", "ycb", "sources.ycb.famly: unknown; did you mean family?"),
-    ("sources.my", folder(local={"knd": "bop"}), "sources.my.local.knd: unknown; did you mean kind?"),
     ("recovery.thresholds.dominnat", 0.4, "recovery.thresholds.dominnat: unknown; did you mean dominant?"),
     ("comparison.tolerances.labels.close", 1, "comparison.tolerances.labels: tolerance: 1.5 and 1; must satisfy 1 <="),
     ("comparison.tolerances.s.reproduced", 0.5, "comparison.tolerances.s: tolerance: 0.5 and 3; must satisfy 1 <= "),
@@ -210,7 +217,6 @@ def test_a_fault_is_one_line_that_names_the_key(key, value, message):
         ("explainers.gpca", None),
         ("registrations.severities.noise", [0, 0]),
         ("encoders.other", {"backbone": "dgcnn"}),
-        ("sources.my", folder(local={"kind": "bop"})),
         ("sources.my", LINK | {"sha256": None}),
     ],
 )

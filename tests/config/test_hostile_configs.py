@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from gpca.config.layers import with_defaults
-from gpca.io.structured_text import LARGEST_BYTES
+from gpca.io.structured_text import LARGEST_CONFIG_BYTES
 
 from ..hostile import refusal
 from .configs import load
@@ -65,7 +65,7 @@ TEXTS = {
     "number in base 60 as name": ("encoders: {1:30: {backbone: dgcnn}}", "reads 1:30 as 90"),
     "nothing as name": ("learners: {~: {}}", "learners.None", "is not text"),
     "list as name": ("? [a, b]\n: 1\n", "neither YAML nor JSON"),
-    "too long": ("#" * (LARGEST_BYTES + 1), "more than the limit of 0.262 MB"),
+    "too long": ("#" * (LARGEST_CONFIG_BYTES + 1), "more than the limit of 0.262 MB"),
 }
 
 

@@ -59,17 +59,15 @@ def test_switches_are_a_list_in_their_order_and_a_list_may_stand_in_their_place(
 
 
 def test_a_dataset_that_is_false_leaves_the_scenes():
-    config = merged(
-        load("real"), {"real_world": {"datasets": dict.fromkeys(load("real")["real_world"]["datasets"], False)}}
-    )
+    config = merged(load(), {"real_world": {"datasets": dict.fromkeys(load()["real_world"]["datasets"], False)}})
     whole = without_false(config)["real_world"]
     assert (whole["datasets"], whole["virtual"]) == ({}, None)
     check(config)
 
 
 def test_virtual_frames_stay_while_a_dataset_does():
-    config = merged(load("real"), {"real_world": {"datasets": {"visp": False}}})
-    assert without_false(config)["real_world"]["virtual"] == load("real")["real_world"]["virtual"]
+    config = merged(load(), {"real_world": {"datasets": {"visp": False}}})
+    assert without_false(config)["real_world"]["virtual"] == load()["real_world"]["virtual"]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from .configs import load
 
 
-@pytest.mark.parametrize("names", [(), ("smoke",), ("real",)])
+@pytest.mark.parametrize("names", [(), ("smoke",), ("full",)])
 def test_the_shipped_configs_have_training_samples_for_every_start(names):
     config = load(*names)
     train, active = config["registrations"]["train"], config["active_learning"]

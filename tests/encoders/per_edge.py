@@ -16,8 +16,8 @@ class PerEdgeConv(nn.Module):
         batch = len(x_B_N_F)
         squares = x_B_N_F.square().sum(-1, keepdim=True)
         distances = squares - 2 * x_B_N_F @ x_B_N_F.transpose(1, 2) + squares.transpose(1, 2)
-        neighbours = distances.topk(self.k, dim=-1, largest=False).indices
-        x_j = x_B_N_F[torch.arange(batch)[:, None, None], neighbours]
+        neighbors = distances.topk(self.k, dim=-1, largest=False).indices
+        x_j = x_B_N_F[torch.arange(batch)[:, None, None], neighbors]
         x_i = x_B_N_F[:, :, None, :].expand(-1, -1, self.k, -1)
         edges = self.linear(torch.cat([x_j - x_i, x_i], dim=-1))
         edges = self.norm(edges.permute(0, 3, 1, 2)).permute(0, 2, 3, 1)

@@ -49,16 +49,16 @@ def test_points_that_coincide_are_chosen_only_when_no_other_is_left():
 def test_a_ball_holds_the_first_points_within_its_radius(query, radius, k):
     points = clouds()
     centers = take(points, farthest_points(points, 10))
-    neighbours, counts = query(points, centers, radius, k)
-    for cloud, found, of_cloud, centers_M_3 in zip(points, neighbours, counts, centers, strict=True):
+    neighbors, counts = query(points, centers, radius, k)
+    for cloud, found, of_cloud, centers_M_3 in zip(points, neighbors, counts, centers, strict=True):
         for indices, count, center in zip(found, of_cloud, centers_M_3, strict=True):
             assert (indices.tolist(), int(count)) == in_ball_by_a_loop(cloud.numpy(), center.numpy(), radius, k)
 
 
 def test_a_ball_holds_no_more_points_than_the_cloud():
     points = clouds(1, 6)
-    neighbours, counts = ball_query(points, points, 2.0, 32)
-    assert neighbours.tolist() == [[[0, 1, 2, 3, 4, 5]] * 6]
+    neighbors, counts = ball_query(points, points, 2.0, 32)
+    assert neighbors.tolist() == [[[0, 1, 2, 3, 4, 5]] * 6]
     assert counts.tolist() == [[6] * 6]
 
 

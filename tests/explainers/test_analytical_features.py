@@ -11,8 +11,8 @@ def plane(seed):
     return np.random.default_rng(seed).uniform(-1, 1, size=(600, 3)) * [1, 1, 0]
 
 
-def shape_at(cloud, point, neighbours):
-    return [array[0] for array in local_shape(cKDTree(cloud), np.array([point]), neighbours)]
+def shape_at(cloud, point, neighbors):
+    return [array[0] for array in local_shape(cKDTree(cloud), np.array([point]), neighbors)]
 
 
 def test_a_line_is_linear_a_disc_planar_and_a_ball_neither():

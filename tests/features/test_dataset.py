@@ -5,7 +5,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.features.dataset import Descriptors, describe_all
-from gpca.features.groups import GROUPS
+from gpca.features.settings import GROUPS
 from tests.features.conftest import FEW, ICP
 
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse
-from gpca.features.groups import MOTION
 from gpca.features.motion import STARTS, describe_motion, describe_starts
+from gpca.features.settings import MOTION
 from tests.features.conftest import ICP
 
 

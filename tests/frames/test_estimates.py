@@ -2,15 +2,27 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.frames.estimates import EstimatorErrors, choose_estimate, error_of, read_pose_errors
+from gpca.frames.estimates import (
+    EstimatorErrors,
+    choose_estimate,
+    error_of,
+    nearest_to,
+    read_bop_results,
+    read_pose_errors,
+)
+from gpca.frames.initial_pose import InitialPoseSettings
 
-HEAD = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
+from .tiny import read
+
+ERRORS = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
 SEEN = {
     "points_m": np.array([[0.0, 0, 1], [0.01, 0, 1], [0, 0.01, 1]]),
     "pixels": np.array([[50, 50], [51, 50], [50, 51]]),
     "camera_3_3": np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]]),
     "diameter_m": 0.1,
 }
+HEAD = "scene_id,im_id,obj_id,score,R,t,time\n"
+ONE = "1 0 0 0 1 0 0 0 1"
 
 
 def pose(x_m, z_m=1.0):
@@ -58,7 +70,7 @@ def test_an_error_takes_the_true_pose_to_the_estimated_one():
 
 def test_a_file_of_errors_is_read_in_metres_and_of_known_objects(tmp_path):
     path = tmp_path / "errors.csv"
-    path.write_text(f"{HEAD}\n48,1,1,x,0,0,{np.pi / 2},1.5,0,-20\n48,1,9,x,0,0,0,0,0,0\n")
+    path.write_text(f"{ERRORS}\n48,1,1,x,0,0,{np.pi / 2},1.5,0,-20\n48,1,9,x,0,0,0,0,0,0\n")
     [(number, T)] = read_pose_errors(path, [1])
     assert number == 1
     assert np.allclose(T[:3, 3], [0.0015, 0, -0.02])
@@ -76,6 +88,84 @@ def test_a_file_of_errors_is_read_in_metres_and_of_known_objects(tmp_path):
 )
 def test_a_faulty_file_of_errors_is_refused(tmp_path, row, expected):
     path = tmp_path / "errors.csv"
-    path.write_text(f"{HEAD}\n{row}\n")
+    path.write_text(f"{ERRORS}\n{row}\n")
     with pytest.raises(InputError, match=expected):
         read_pose_errors(path, [1])
+
+
+def results(tmp_path, *lines, head=HEAD):
+    path = tmp_path / "results.csv"
+    path.write_text(head + "\n".join(lines) + "\n")
+    return path
+
+
+def test_results_are_read_best_first_row_by_row_and_in_metres(tmp_path):
+    quarter = "0 -1 0 1 0 0 0 0 1"
+    path = results(
+        tmp_path, f"1,0,3,0.2,{ONE},100 200 300,-1", f"1,0,3,0.9,{quarter},1 2 3,-1", f"2,5,4,1,{ONE},0 0 9,0.1"
+    )
+    found = read_bop_results(path, {(1, 0): [0.3], (2, 5): []}, {3, 4})
+    assert set(found) == {(1, 0, 3), (2, 5, 4)}
+    best, second = found[1, 0, 3]
+    assert best[:3, 3].tolist() == [0.001, 0.002, 0.003]
+    assert (best[:3, :3] @ [1, 0, 0]).tolist() == [0, 1, 0]
+    assert second[:3, 3].tolist() == [0.1, 0.2, 0.3]
+
+
+DISTANCES_M, KNOWN = {(1, 0): [0.7, 0.8]}, {3}
+FAULTS = {
+    "no column R": ((f"1,0,3,0.2,{ONE}",), "scene_id,im_id,obj_id,score,t\n", "column 'R' is missing"),
+    "eight entries": (("1,0,3,0.2,1 0 0 0 1 0 0 0,1 2 3,-1",), HEAD, "line 2: R has 8 entries, not 9"),
+    "two entries": ((f"1,0,3,0.2,{ONE},1 2,-1",), HEAD, "line 2: t has 2 entries, not 3"),
+    "words": ((f"1,0,3,0.2,{ONE},1 2 x,-1",), HEAD, "t contains values that are not finite numbers"),
+    "a mirror": (
+        ("1,0,3,0.2,1 0 0 0 1 0 0 0 -1,1 2 900,-1",),
+        HEAD,
+        "line 2: the pose is not a rigid transform: it is mirrored",
+    ),
+    "NaN": ((f"1,0,3,0.2,{ONE},1 2 nan,-1",), HEAD, "t contains values that are not finite"),
+    "an image that is not there": (
+        (f"1,0,3,1,{ONE},1 2 800,1", f"1,8,3,1,{ONE},1 2 800,1"),
+        HEAD,
+        "line 3: the dataset has no image 8",
+    ),
+    "no number": ((f"1,0,cup,1,{ONE},1 2 3,1",), HEAD, "line 2: obj_id is 'cup', not a whole number"),
+    "no rows": ((), HEAD, "has no rows"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faulty_results_are_refused_in_one_line(tmp_path, fault):
+    lines, head, expected = FAULTS[fault]
+    with pytest.raises(InputError, match=expected) as caught:
+        read_bop_results(results(tmp_path, *lines, head=head), DISTANCES_M, KNOWN)
+    assert str(caught.value).startswith(str(tmp_path / "results.csv"))
+
+
+def test_of_several_equal_objects_the_one_seen_in_the_mask_is_meant():
+    camera_3_3 = np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]])
+    poses = [np.eye(4), np.eye(4)]
+    poses[0][:3, 3], poses[1][:3, 3] = (0.2, 0, 1), (-0.2, 0, 1)
+    assert nearest_to(poses, np.array([[29, 50], [33, 52]]), camera_3_3) is poses[1]
+
+
+def test_instances_start_from_the_results_and_without_any_from_an_error_of_these(scenes, tiny, tmp_path):
+    instances, objects = tiny
+    lines = []
+    for i in range(0, len(instances), 2):  # of every other instance; objects are centred, so models' poses are theirs
+        T, name = instances.T_camera_object_true[i], objects.names[instances.object_index[i]]
+        number = ["brick", "cylinder", "cone", "capsule", "bracket"].index(name.removeprefix("tiny ")) + 1
+        R, t = " ".join(map(str, T[:3, :3].ravel())), " ".join(map(str, 1e3 * T[:3, 3] + 1.0))
+        lines.append(f"{instances.scene[i]},{instances.image[i]},{number},1.0,{R},{t},-1")
+    path = results(tmp_path, *lines)
+    found, _ = read(scenes, tmp_path / "objects.npz", InitialPoseSettings("results"), path)
+    assert len(found) == len(instances)
+    assert (found.init_from == np.where(np.arange(len(found)) % 2 == 0, "results", "errors")).all()
+    errors_m = (found.T_camera_object_init - found.T_camera_object_true)[:, :3, 3]
+    assert np.allclose(errors_m[::2], 1e-3, atol=1e-6)
+    assert np.allclose(np.linalg.norm(errors_m, axis=1), np.sqrt(3) * 1e-3, atol=1e-6)
+
+
+def test_results_must_be_named_for_poses_to_come_from_them(scenes, tmp_path):
+    with pytest.raises(InputError, match="dataset tiny: has no results file"):
+        read(scenes, tmp_path / "objects.npz", InitialPoseSettings("results"))

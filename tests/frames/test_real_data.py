@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from gpca.frames.estimates import read_bop_results
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.plausibility import FARTHEST, points_on_model
 from gpca.frames.reading import Dataset, read_instances, read_models
-from gpca.frames.results_file import read_bop_results
 from gpca.objects.bop import read_models_info
 from gpca.objects.canonical import sample_objects
 

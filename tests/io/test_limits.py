@@ -12,9 +12,8 @@ from gpca.errors import InputError
 from gpca.io.arrays import load_arrays
 from gpca.io.csv_file import read_csv
 from gpca.io.files import read_image
-from gpca.io.json_file import read_json
 from gpca.io.limits import require_file
-from gpca.io.structured_text import read_mapping
+from gpca.io.structured_text import read_json, read_mapping
 from gpca.model.file import Model
 from gpca.model.point_file import read_points, read_pose
 from gpca.objects import uw_rgbd

@@ -20,7 +20,6 @@ CUPS = {
     "kind": "uw_rgbd",
     "unit": "m",
     "urls": ["https://example.org/mug_1.tar", "https://example.org/mug_2.tar"],
-    "local": {"title": "Scanned cups", "kind": "mesh_folder", "files": ["cups/*.ply", "more/cup_?.ply"]},
 }
 BOX = trimesh.creation.box((30.0, 40.0, 120.0))
 
@@ -60,16 +59,19 @@ def test_relative_location_is_not_looked_up_in_the_working_folder(tmp_path, monk
     assert resolve(BOP, ".")["location"] == str(tmp_path / "bop" / "toy")
 
 
-def test_local_part_overrides_when_all_its_files_are_there(tmp_path):
+def test_a_folder_counts_when_it_has_all_files(tmp_path):
+    entry = CUPS | {"kind": "mesh_folder", "files": ["cups/*.ply", "more/cup_?.ply"]}
     write_cups(tmp_path, ["cups"])
-    resolved = resolve(CUPS, str(tmp_path))
-    assert (resolved["origin"], resolved["kind"], resolved["title"]) == ("download", "uw_rgbd", "Cups")
+    assert resolve(entry, str(tmp_path))["origin"] == "download"
     write_cups(tmp_path, ["more"])
-    resolved = resolve(CUPS, str(tmp_path))
-    assert (resolved["origin"], resolved["kind"], resolved["title"]) == ("local", "mesh_folder", "Scanned cups")
-    assert "local" not in resolved
+    resolved = resolve(entry, str(tmp_path))
+    assert resolved["origin"] == "local"
     assert [surface.name for surface in surfaces(resolved, tmp_path)] == ["cup_c", "cup_m"]
-    assert "local" in CUPS  # the entry itself is left as it was
+
+
+def test_a_procedural_source_laid_over_one_of_files_needs_none_of_its_keys():
+    entry = {"title": "Toy", "kind": "procedural", "family": "ycb"}
+    assert resolve({**BOP, **CUPS, **entry, "location": "."}, None) == {**entry, "origin": "procedural"}
 
 
 def test_empty_folder_is_a_fault_and_no_download(tmp_path):

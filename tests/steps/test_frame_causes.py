@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from gpca.causes.dataset import Causes
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS, Causes
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.tables import table9_frames
 from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH, collect

@@ -6,7 +6,7 @@ import pytest
 
 from baselines import analytical
 from gpca.attribution.predictions import read_predictions, write_timings
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.io.arrays import save_arrays
 from gpca.model.file import Model
 from gpca.recovery.policy import RecoveryPolicy, Thresholds

@@ -5,9 +5,8 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty import evaluation
-from gpca.uncertainty.designs import DESIGNS
-from gpca.uncertainty.evaluation import design_rows, evaluate_design
+from gpca.uncertainty import designs
+from gpca.uncertainty.designs import DESIGNS, design_rows, evaluate_design
 from gpca.uncertainty.outcomes import Outcomes
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence
@@ -145,12 +144,12 @@ def test_the_observed_pair_starts_alike_in_every_design(registrations):
 def test_what_was_perturbed_is_hidden_from_all_but_the_oracle(registrations, monkeypatch, design):
     shown = []
 
-    class Recorded(evaluation.RegisteredRow):
+    class Recorded(designs.RegisteredRow):
         def __init__(self, registrations, row):
             shown.append(registrations)
             super().__init__(registrations, row)
 
-    monkeypatch.setattr(evaluation, "RegisteredRow", Recorded)
+    monkeypatch.setattr(designs, "RegisteredRow", Recorded)
     evaluate(design, registrations, registrations.rows("test")[:1])
     (given,) = shown
     told = given.concept[0] in CONCEPTS and np.isfinite(given.severity_noise[0])

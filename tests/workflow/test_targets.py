@@ -88,7 +88,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/reporting/figures/contact_sheet.py": ("objects_coffee_cup objects_ycb", "objects/ tables/ fig3_concepts"),
     "gpca/encoders/reduction.py": ("dgcnn/pca predictions/real_rgbd/dgcnn-pca", "encoders predictions/ycb model.pt"),
-    "gpca/frames/occlusion.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
+    "gpca/frames/synthesis.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
     "gpca/frames/bop.py": ("scenes/ instances/ frame_causes/ recovery/", "predictions/ycb encoders/ycb causes/ycb"),
     "gpca/recovery/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
     "gpca/experiments/concept_attribution/tables.py": (

@@ -4,9 +4,8 @@ from gpca.attribution.metrics import read_metrics
 from gpca.comparison.claim_verdicts import judge
 from gpca.comparison.claims import read_claims
 from gpca.comparison.clusters import cluster_intervals
-from gpca.comparison.published import read_published
+from gpca.comparison.published import read_published, read_reasons
 from gpca.comparison.readings import judge_readings, with_readings
-from gpca.comparison.reasons import read_reasons
 from gpca.comparison.values import measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
 from gpca.io.csv_file import write_csv

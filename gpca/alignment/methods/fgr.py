@@ -47,10 +47,10 @@ def align(
         maximum_tuple_count=tuples,
     )
     try:
-        found = registration.registration_fgr_based_on_feature_matching(*clouds, *features, option)
+        result = registration.registration_fgr_based_on_feature_matching(*clouds, *features, option)
     except RuntimeError as fault:  # with a single match it has none to draw from
         raise FailedRegistration("too few correspondences agree") from fault
-    T_target_source = as_array(found.transformation)
+    T_target_source = as_array(result.transformation)
     if np.array_equal(T_target_source, np.eye(4)):  # what it gives with less than ten
         raise FailedRegistration("too few correspondences agree")
     return Outcome.at(pair, T_target_source, correspondence_distance)

@@ -37,7 +37,7 @@ def align(
     registration = o3d.pipelines.registration
     clouds, features = fpfh_of_pair(pair, feature_radius)
     o3d.utility.random.seed(pair.seed % 2**31)
-    found = registration.registration_ransac_based_on_feature_matching(
+    result = registration.registration_ransac_based_on_feature_matching(
         *clouds,
         *features,
         mutual_filter=True,
@@ -50,9 +50,9 @@ def align(
         ],
         criteria=registration.RANSACConvergenceCriteria(iterations, confidence),
     )
-    if len(found.correspondence_set) < FEWEST:
+    if len(result.correspondence_set) < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
-    return Outcome.at(pair, as_array(found.transformation), correspondence_distance)
+    return Outcome.at(pair, as_array(result.transformation), correspondence_distance)
 
 
 METHODS = {"fpfh_ransac": MethodEntry("FPFH and RANSAC", align, is_global=True)}

@@ -15,9 +15,10 @@ from gpca.alignment.methods.interface import (
     MethodEntry,
     Outcome,
     Pair,
+    align_by_open3d,
     as_array,
+    failure_of_a_step,
 )
-from gpca.alignment.methods.local import align_by_open3d, failure_of_a_step
 
 LAST_STEP = 1e-4  # of small_gicp, radians and diameters
 
@@ -48,7 +49,7 @@ def align_by_small_gicp(
     package.estimate_covariances(source, num_neighbors=neighbours, num_threads=1)
 
     def step(T_target_source: np.ndarray, iterations: int) -> np.ndarray:
-        found = package.align(
+        result = package.align(
             target,
             source,
             tree,
@@ -59,7 +60,7 @@ def align_by_small_gicp(
             rotation_epsilon=LAST_STEP,
             translation_epsilon=LAST_STEP,
         )
-        return as_array(found.T_target_source)
+        return as_array(result.T_target_source)
 
     T_found = step(pair.T_target_source_init, max_iterations)
     failure = failure_of_a_step(pair, T_found, step(T_found, 1), max_iterations)

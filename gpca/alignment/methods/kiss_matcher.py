@@ -31,12 +31,12 @@ def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = COR
             raise FailedRegistration(f"of the {name}, voxels of {voxel:g} diameters leave too few points")
     try:  # it does not take voxels below 0.005, nor clouds of which too little is left
         matcher = package.KISSMatcher(package.KISSMatcherConfig(voxel))
-        found = matcher.estimate(pair.source.astype(np.float32), pair.target.astype(np.float32))
+        result = matcher.estimate(pair.source.astype(np.float32), pair.target.astype(np.float32))
     except RuntimeError as fault:
         raise FailedRegistration(f"KISS-Matcher: {fault}") from fault
-    if not found.valid or matcher.get_num_final_inliers() < FEWEST:
+    if not result.valid or matcher.get_num_final_inliers() < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
-    T_target_source = rigid_motion(found.rotation, np.ravel(found.translation))
+    T_target_source = rigid_motion(result.rotation, np.ravel(result.translation))
     return Outcome.at(pair, T_target_source, correspondence_distance)
 
 

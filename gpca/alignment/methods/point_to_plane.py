@@ -9,8 +9,14 @@ from __future__ import annotations
 from functools import partial
 from typing import Literal
 
-from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
-from gpca.alignment.methods.local import align_by_open3d
+from gpca.alignment.methods.interface import (
+    CORRESPONDENCE_DISTANCE,
+    MAX_ITERATIONS,
+    MethodEntry,
+    Outcome,
+    Pair,
+    align_by_open3d,
+)
 from gpca.process.environment import require_open3d
 
 Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss"]

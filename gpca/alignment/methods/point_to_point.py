@@ -10,8 +10,9 @@ from gpca.alignment.methods.interface import (
     MethodEntry,
     Outcome,
     Pair,
+    align_by_open3d,
+    failure_of_a_step,
 )
-from gpca.alignment.methods.local import align_by_open3d, failure_of_a_step
 
 
 def align(

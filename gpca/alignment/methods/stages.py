@@ -8,10 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from gpca.alignment.least_squares import best_motion, plane_step
-from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair
-from gpca.alignment.methods.local import failure_of_a_step
-from gpca.alignment.rigid import rotate, transform
+from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair, failure_of_a_step
+from gpca.alignment.rigid import best_motion, plane_step, rotate, transform
 
 Metric = Literal["point_to_point", "point_to_plane"]
 
@@ -75,8 +73,8 @@ class Stages:
         rows_n = np.arange(len(pair.source)) if self.rows is None else self.rows
         source_n_3 = transform(T_target_source, pair.source[rows_n])
         distance_n, target_rows_n = pair.target_tree.query(source_n_3)
-        found = Matches(pair, T_target_source, rows_n, source_n_3, target_rows_n, distance_n, self.distance)
-        matches = self.reject(found.kept(distance_n < self.distance))
+        nearest = Matches(pair, T_target_source, rows_n, source_n_3, target_rows_n, distance_n, self.distance)
+        matches = self.reject(nearest.kept(distance_n < self.distance))
         if len(matches.distance) < FEWEST:
             raise FailedRegistration(f"fewer than {FEWEST} correspondences are left")
         return matches

@@ -31,10 +31,10 @@ def align(
     _, features = fpfh_of_pair(pair, feature_radius)
     source_N_33, target_P_33 = (each.data.T for each in features)
     rows_n_2 = mutual_matches(source_N_33, target_P_33, most_matches)
-    found = solve(pair.source[rows_n_2[:, 0]], pair.target[rows_n_2[:, 1]], noise)
-    if found is None or len(found.inliers) < FEWEST:
+    solution = solve(pair.source[rows_n_2[:, 0]], pair.target[rows_n_2[:, 1]], noise)
+    if solution is None or len(solution.inliers) < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
-    return Outcome.at(pair, found.T_target_source, correspondence_distance)
+    return Outcome.at(pair, solution.T_target_source, correspondence_distance)
 
 
 METHODS = {"teaser": MethodEntry("TEASER's solver", align, is_global=True)}

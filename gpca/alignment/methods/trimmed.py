@@ -27,13 +27,13 @@ def align(
     if not overlap:
         from scipy.optimize import minimize_scalar
 
-        found = minimize_scalar(
+        optimum = minimize_scalar(
             lambda share: _objective(pair, share, max_iterations),
             bounds=(LEAST_OVERLAP, 1.0),
             method="bounded",
             options={"xatol": 0.02, "maxiter": 12},
         )
-        overlap = float(found.x)
+        overlap = float(optimum.x)
     T, _, failure = _run(pair, overlap, max_iterations)
     return Outcome.at(pair, T, correspondence_distance, failure)
 

@@ -1,7 +1,7 @@
 """The variants of ICP that Rusinkiewicz & Levoy (2001) compare: sampling, rejection, weighting, one at a time.
 
 All minimize distances to planes, as theirs do. The sign of normals counts: those of both clouds have to point to the
-same side of the surface (:func:`gpca.alignment.normals.estimate_normals`).
+same side of the surface (:func:`gpca.alignment.features.estimate_normals`).
 """
 
 from __future__ import annotations

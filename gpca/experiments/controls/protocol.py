@@ -28,7 +28,7 @@ from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, Describing, Encoding
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.evaluation import evaluate_design
+from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
 if TYPE_CHECKING:

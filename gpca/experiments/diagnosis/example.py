@@ -10,9 +10,8 @@ import numpy as np
 
 from gpca.attribution.metrics import source_method_seed
 from gpca.attribution.predictions import read_predictions
-from gpca.causes.dataset import Causes
-from gpca.causes.labels import LABELS
-from gpca.causes.replay import replay
+from gpca.causes.counterfactuals import replay
+from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL, SUBSETS
 from gpca.causes.truth import FAILED

@@ -11,8 +11,7 @@ import numpy as np
 
 from gpca.attribution.metrics import source_method_seed
 from gpca.attribution.predictions import read_predictions
-from gpca.causes.dataset import Causes
-from gpca.causes.labels import LABELS, labels_of
+from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import NOMINAL, Truth
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
@@ -30,7 +29,7 @@ class Judged:
     """N test samples with an explainer's predictions.
 
     Attributes:
-        label: one of :data:`gpca.causes.labels.LABELS`, or ``borderline``.
+        label: one of :data:`gpca.causes.dataset.LABELS`, or ``borderline``.
         instance: the object, views of one instance together. seed: the repeat.
         error: (N, 8) v of every subset of the causes. phi: (N, 3). causes: (N, 3) whether each is one of them.
         alarm: how wrong the explainer takes the registration to be, larger is worse. scores: (N, 3) of the causes.

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.metrics import ABSTAINED, ALL, PREDICTED_AS, confusion, tidy
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, joined, read_judged
 from gpca.experiments.diagnosis.measures import MEASURES, SMALLER_IS_BETTER, counted, measure

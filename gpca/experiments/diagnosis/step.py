@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
-from gpca.causes.dataset import Causes
-from gpca.causes.labels import labeled
+from gpca.causes.dataset import Causes, labeled
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.explainers.interface import ExplainerEntry

@@ -11,8 +11,7 @@ import numpy as np
 
 from gpca.attribution.confidence import pigeonhole_weights
 from gpca.attribution.predictions import read_predictions
-from gpca.causes.dataset import Causes
-from gpca.causes.labels import LABELS, labels_of
+from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by

@@ -14,9 +14,8 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
-from gpca.causes.dataset import Causes
+from gpca.causes.dataset import LABELS, Causes, labeled
 from gpca.causes.frames import chosen_instances, measure_frames
-from gpca.causes.labels import LABELS, labeled
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads

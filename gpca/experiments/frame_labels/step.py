@@ -11,7 +11,7 @@ from gpca.active_learning.new_concepts import NewConceptTrial, run_trial
 from gpca.active_learning.rounds import Embedded
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.experiments.frame_labels.settings import PAIR, FrameLabelSettings
-from gpca.explainers.pair_classifier import NormalisedDescriptors
+from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.features.registered import describe_registrations
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.perturbation import CONCEPTS
@@ -49,5 +49,5 @@ def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:
     yield from zip(job.backbones, map(samples, of_backbones), strict=True)
     axes = (job.source, job.seed)
     measured_S_F = describe_registrations(registrations, *axes, points=points)["relations"]
-    normalized = NormalisedDescriptors(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
+    normalized = NormalizedFeatures(*axes, "frame_labels").fit(measured_S_F[registrations.rows("train")])
     yield PAIR, samples(normalized(measured_S_F))

@@ -17,19 +17,17 @@ from gpca.active_learning.settings import (
     NewConceptSettings,
 )
 from gpca.alignment.icp import ICPSettings
-from gpca.causes.dataset import Causes
+from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.drawing import draw_geometry
-from gpca.causes.labels import LABELS, labels_of
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import TrainingTask, embed, train_encoder
 from gpca.encoders.weights import load_model
-from gpca.explainers.pair_classifier import NormalisedDescriptors
+from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.features.dataset import Descriptors, describe_all
-from gpca.features.groups import GROUPS
 from gpca.features.registered import describe_registrations
-from gpca.features.settings import DescriptorSettings
+from gpca.features.settings import GROUPS, DescriptorSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
@@ -138,7 +136,7 @@ class _Work:
 
 
 def _normalized(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) -> np.ndarray:
-    return NormalisedDescriptors(*axes, "new_concepts").fit(measured_S_F[train_S])(measured_S_F)
+    return NormalizedFeatures(*axes, "new_concepts").fit(measured_S_F[train_S])(measured_S_F)
 
 
 def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str | None = None) -> dict[str, Embedded]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
-from gpca.frames.sample_file import FRAME_COLUMNS
+from gpca.frames.instances import FRAME_COLUMNS
 from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds

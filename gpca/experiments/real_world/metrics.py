@@ -12,7 +12,7 @@ from gpca.attribution.diagnostics import brier_score, calibration_error, negativ
 from gpca.attribution.metrics import ALL, attribution_metrics, read_metrics, source_method_seed, tidy
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
-from gpca.frames.sample_file import read_samples_of_frames
+from gpca.frames.instances import read_samples_of_frames
 from gpca.frames.source import REAL_WORLD
 
 if TYPE_CHECKING:

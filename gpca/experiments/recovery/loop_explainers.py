@@ -15,7 +15,7 @@ from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.recovery.answers import Explain
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
-from gpca.uncertainty.evaluation import evaluate_design
+from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
 Attach = Callable[[Registrations], Registrations]

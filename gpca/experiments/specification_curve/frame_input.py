@@ -23,7 +23,7 @@ from gpca.errors import InputError
 from gpca.experiments.specification_curve.frames import of_objects, values
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
-from gpca.frames.sample_file import read_instances_of
+from gpca.frames.instances import read_instances_of
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations, joined
 from gpca.pairs.perturbation import CONCEPTS

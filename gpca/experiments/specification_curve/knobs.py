@@ -17,8 +17,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.uncertainty.conditions import CORNERS
-from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow
-from gpca.uncertainty.evaluation import design_rows
+from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow, design_rows
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence, log_determinant, log_residual
@@ -64,7 +63,7 @@ def _pairs(
 ) -> Iterator[tuple[str, int, Iterator[tuple[str, dict[str, tuple[RegisteredRow, KnobRuns]]]]]]:
     """Yield source, seed, and of each sample its concept and its runs: of the observed pair, and of a clean one.
 
-    What is random in a sample is named as in :func:`gpca.uncertainty.evaluation.evaluate_design`.
+    What is random in a sample is named as in :func:`gpca.uncertainty.designs.evaluate_design`.
     """
     for (source, seed), path in run_files.registrations.items():
         registrations = Registrations.load(path, (source, seed))

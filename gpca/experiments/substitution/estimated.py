@@ -12,9 +12,9 @@ from functools import cache
 
 import numpy as np
 
+from gpca.alignment.features import estimate_normals
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.normals import estimate_normals
 from gpca.experiments.estimators.examples import Moved, describe, example
 from gpca.experiments.judge import Judges
 from gpca.pairs.dataset import Registrations

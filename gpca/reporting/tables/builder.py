@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
-from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause, title_of
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
 from gpca.reporting.words import plural, span
-
-if TYPE_CHECKING:
-    pass
 
 INTERVAL = "± is the half-width of the 95 % t-interval over the seeds"
 Label = tuple[str, str]  # key for the CSV, title for the reader

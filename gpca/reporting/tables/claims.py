@@ -85,8 +85,8 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
 def counted(verdicts: pd.DataFrame) -> str:
     """Return how many sentences have each verdict, in words."""
     counts = verdicts.drop_duplicates("claim")["claim_verdict"].value_counts(sort=False)
-    told = (f"{counts[verdict]} {verdict}" for verdict in CLAIM_VERDICTS if verdict in counts)
-    return f"Of {counts.sum()} sentences: {', '.join(told)}."
+    phrases = (f"{counts[verdict]} {verdict}" for verdict in CLAIM_VERDICTS if verdict in counts)
+    return f"Of {counts.sum()} sentences: {', '.join(phrases)}."
 
 
 def _expected(row) -> str:

@@ -28,7 +28,7 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Toler
         tolerances: The tolerances of each unit.
     """
     parts = ["# Published and reproduced", summary(comparison), counts_table(comparison, tolerances)]
-    parts += [_chance_told(comparison, tolerances), *_rule(tolerances)]
+    parts += [_chance_in_words(comparison, tolerances), *_rule(tolerances)]
     for table, rows in comparison.groupby("table", sort=False):
         parts += [f"## {_name(table)}", _table(rows), *_reasons(rows), *_objects(rows)]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -37,14 +37,16 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Toler
 def summary(comparison: pd.DataFrame) -> str:
     """Return the counts: means, each value once, by verdict; standard deviations and repeats apart."""
     once, deviations, repeats = _parts(comparison)
-    told = [f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {_told(once)}."]
+    sentences = [
+        f"Of {len(comparison)} printed numbers, {len(once)} are means, each judged once: {_counts_in_words(once)}."
+    ]
     if len(deviations):
-        told.append(f"{len(deviations)} are standard deviations: {_told(deviations)}.")
+        sentences.append(f"{len(deviations)} are standard deviations: {_counts_in_words(deviations)}.")
     if len(repeats):
-        told.append(f"{len(repeats)} repeat values that are already judged: {_told(repeats)}.")
+        sentences.append(f"{len(repeats)} repeat values that are already judged: {_counts_in_words(repeats)}.")
     if (comparison["reason"] == STAND_IN).any():
-        told.append(f"The objects of this run are {STAND_IN}s, and only real ones are compared.")
-    return " ".join(told)
+        sentences.append(f"The objects of this run are {STAND_IN}s, and only real ones are compared.")
+    return " ".join(sentences)
 
 
 def counts_table(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> str:
@@ -67,7 +69,7 @@ def _parts(comparison: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, pd.Dat
     return judged_once(comparison), comparison[(comparison["statistic"] == "deviation") & ~repeats], comparison[repeats]
 
 
-def _told(rows: pd.DataFrame) -> str:
+def _counts_in_words(rows: pd.DataFrame) -> str:
     return ", ".join(f"{count} {verdict}" for verdict, count in counts(rows).items() if count)
 
 
@@ -82,7 +84,7 @@ def _chance_cells(of_table: Chance | None) -> list[str]:
     return [f"{of_table.expected:.1f}", p, rho]
 
 
-def _chance_told(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> str:
+def _chance_in_words(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> str:
     of_all = chance(comparison, tolerances).get(ALL)
     if of_all is None:
         return ""
@@ -183,8 +185,8 @@ def _numbered(rows: pd.DataFrame) -> dict[str, int]:
 
 def _objects(rows: pd.DataFrame) -> list[str]:
     shown = rows[rows["reproduced"].notna()]
-    told = []
+    sentences = []
     for name in ("objects", "hardware"):
         if texts := list(dict.fromkeys(text for text in shown[name] if text)):
-            told.append(f"{name.capitalize()} here: {'; '.join(texts)}.")
-    return [" ".join(told)] if told else []
+            sentences.append(f"{name.capitalize()} here: {'; '.join(texts)}.")
+    return [" ".join(sentences)] if sentences else []

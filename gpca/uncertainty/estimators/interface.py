@@ -218,8 +218,7 @@ def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
 
 
 def _batched(pair: Pair, method: str) -> Starter:
-    from gpca.alignment.batched_icp import BatchedICP
-    from gpca.alignment.batched_plane_icp import BatchedPlaneICP
+    from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 
     settings = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)
     icp: BatchedICP | BatchedPlaneICP

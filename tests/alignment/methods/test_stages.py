@@ -50,5 +50,5 @@ def test_few_matches_and_no_weight_are_failures(objects):
 def test_normals_of_the_source_turn_with_it(objects):
     pair, T_true = small_motion(objects)
     matches = Stages().match(pair, T_true)
-    assert np.median(matches.cosines()) == pytest.approx(1, abs=1e-6)  # most neighbours lie on the same face
+    assert np.median(matches.cosines()) == pytest.approx(1, abs=1e-6)  # most neighbors lie on the same face
     assert np.median(Stages().match(pair, np.eye(4)).cosines()) < 0.999

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE
 from gpca.experiments.diagnosis.judged import Judged
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
-from gpca.causes.labels import LABELS, labels_of
+from gpca.causes.dataset import LABELS, labels_of
 
 
 def write_run(folder, causes, source="four", seed=100):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.causes.replay import replay
+from gpca.causes.counterfactuals import replay
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import FAILED

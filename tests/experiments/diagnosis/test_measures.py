@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import spearmanr
 from sklearn.metrics import average_precision_score, balanced_accuracy_score, roc_auc_score
 
-from gpca.causes.labels import LABELS
+from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.experiments.diagnosis.measures import MEASURES, OF_ALARM, OF_FAILED, RECALL, counted, measure
 

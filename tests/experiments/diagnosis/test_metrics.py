@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.attribution.metrics import write_metrics
-from gpca.causes.labels import LABELS, labels_of
+from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.diagnosis import metrics

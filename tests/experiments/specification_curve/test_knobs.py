@@ -8,7 +8,7 @@ from baselines.shap_kl import shapley_values
 from gpca.experiments.specification_curve import knobs
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.evaluation import design_rows, evaluate_design
+from gpca.uncertainty.designs import design_rows, evaluate_design
 from tests.experiments.specification_curve.conftest import rows_of
 
 

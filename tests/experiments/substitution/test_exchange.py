@@ -23,10 +23,9 @@ from gpca.experiments.substitution.exchange import UNTAUGHT, Exchange, registere
 from gpca.experiments.substitution.settings import ExchangeSettings
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
-from gpca.uncertainty.designs import ADDITIVE_KNOBS
+from gpca.uncertainty.designs import ADDITIVE_KNOBS, evaluate_design
 from gpca.uncertainty.estimators import registry as estimator_registry
 from gpca.uncertainty.estimators.interface import EstimatorEntry, FailedEstimate
-from gpca.uncertainty.evaluation import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
 UNCERTAINTY = UncertaintySettings(starts=13, icp_points=64)
