@@ -199,7 +199,7 @@ def _input_error(faults: list[ErrorDetails], settings: Any, adapter: TypeAdapter
     """Return the error that tells the worst fault: an unknown key, or else a value that its type allows."""
     fault = min(faults, key=lambda fault: (fault["type"] not in UNKNOWN, fault["type"].endswith("_type")))
     path = list(_path(settings, fault["loc"][1:]))
-    key, value = ".".join(map(str, path)) or "(top level)", fault["input"]
+    key, value = ".".join(map(str, path)), fault["input"]
     if fault["type"] in UNKNOWN:
         known = list(_keys_at(adapter.json_schema(), path[:-1]))
         close = get_close_matches(str(path[-1]), known, n=1)
@@ -210,7 +210,8 @@ def _input_error(faults: list[ErrorDetails], settings: Any, adapter: TypeAdapter
     if fault["type"] == "missing":
         return InputError(f"{subject} {key}", "is missing", "add it, as in config/config.yaml")
     if fault["type"] == "value_error":
-        return InputError(f"{subject} {key}", str(fault["ctx"]["error"]))
+        error = fault["ctx"]["error"]  # of the settings as a whole, which names them itself, where there is no path
+        return InputError(f"{subject} {key}", str(error)) if path else error
     # Input should be less than ..., String should have ..., List should have at least 1 item after validation, not 0
     message = fault["msg"][fault["msg"].index("should") :].split(" after validation")[0]
     scalar = fault["type"] in ("tuple_type", "list_type") and isinstance(value, str | int | float)

@@ -189,7 +189,7 @@ def write_objects(
     if not places:
         sample_objects(surfaces, source, n_points).save(path, source)
         return
-    used = (surface for surface in surfaces if place_of(surface.name, places, splits).role != UNUSED)
+    used = (surface for surface in surfaces if place_of(surface.name, places).role != UNUSED)
     objects = sample_objects(used, source, n_points)
     of_objects = [places[name] for name in objects.names]
     families, folds = (tuple(getattr(place, name) for place in of_objects) for name in ("cluster", "fold"))

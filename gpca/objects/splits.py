@@ -76,10 +76,12 @@ def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
     return places
 
 
-def place_of(name: str, places: Mapping[str, Place], path: str | Path) -> Place:
+def place_of(name: str, places: Mapping[str, Place]) -> Place:
     """Return an object's place; InputError where the file names others of its source, but not this one."""
     if name not in places:
-        raise InputError(path, f"has no row for the object '{name}'", "add one, or set splits.objects: null")
+        raise InputError(
+            f"object '{name}'", "is in no split", "add it to the file of objects, or set splits.objects: null"
+        )
     return places[name]
 
 

@@ -83,7 +83,7 @@ FAULTS = [
     ("new_concepts.causes", ["noise"], "new_concepts.causes.0: 'noise' should be 'nominal' or 'geometry'"),
     ("new_concepts.embeddings", ["pair"], "new_concepts: setting erring of new_concepts: 'other_samples' is not among"),
     ("real_world.backbones", ["dgcnn", "pointnet3"], "real_world.backbones: no encoder 'pointnet3'; choose one of dg"),
-    ("real_world.virtual", {"count": 4, "views": 1, "train": 30}, "real_world.virtual: needs real_world.datasets: it"),
+    ("real_world.datasets", {}, "real_world.virtual: needs real_world.datasets: it renders their models"),
     ("real_world.virtual", {"count": 4, "views": 1}, "real_world.virtual.train: is missing; add it, as in config/con"),
     ("real_world.scenes.views", 0, "real_world.scenes.views: 0 should be greater than or equal to 1"),
     ("real_world.scenes.distance_m", [0.9, 0.6], "real_world.scenes: scenes distance_m: [0.9, 0.6] is in descending "),
@@ -92,7 +92,6 @@ FAULTS = [
     ("real_world.datasets", {"lm": {"location": "lost"}}, "real_world.datasets: source 'lm': lost does not exist"),
     ("real_world.datasets", {"lm": {}}, "real_world.datasets.lm.location: is missing; add it, as in config/config.ya"),
     ("real_world.initial_pose.form", "guess", "real_world.initial_pose.form: 'guess' should be 'results', "),
-    ("real_world.initial_pose.form", "results", "real_world.initial_pose: form 'results' needs a dataset with result"),
     ("real_world.reductions", ["tsne"], "real_world.reductions.0: 'tsne' should be "),
     ("sources.real_rgbd", folder(), "sources.real_rgbd: is reserved for the frames of real_world"),
     ("methods.icp", {}, "methods.icp: registration method 'icp': unknown; choose one of fgr, "),
@@ -187,8 +186,6 @@ FAULTS = [
     # sources
     ("sources.ycb", None, "sources.ycb: None should be an object"),
     ("sources.ycb.kind", "procedurl", "sources.ycb: kind 'procedurl': is not a kind of source; choose one of"),
-    ("sources.ycb.family", "ycbb", "sources.ycb: family 'ycbb': no such procedural family; choose one of coffee_cup,"),
-    ("sources.ycb.family", MISSING, "sources.ycb: source 'YCB': names no family"),
     ("sources.My", folder(), "sources.My: 'My' should match pattern"),
     ("sources.my", folder(location="lost"), "sources.my: source 'Mine': lost does not exist; correct location, or se"),
     ("sources.my", folder(unit="inch"), "sources.my.unit: 'inch' should be 'm', 'cm' or 'mm'"),
@@ -209,6 +206,26 @@ def test_a_fault_is_one_line_that_names_the_key(key, value, message):
     assert line.startswith("config key ")
     assert message in line
     assert "\n" not in line
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"sources": {"ycb": {"family": "ycbb"}}},
+            "sources.ycb: family 'ycbb': no such procedural family; choose one ",
+        ),
+        ({"sources": {"ycb": {"family": ""}}}, "sources.ycb: source 'YCB': names no family"),
+        (
+            {"real_world": {"initial_pose": {"form": "results"}}},
+            "real_world.initial_pose: form 'results' needs a dataset with result",
+        ),
+    ],
+)
+def test_a_fault_of_a_run_on_stand_ins_is_one_line_too(changes, message):
+    with pytest.raises(InputError) as caught:
+        run_config.check(merged(load("stand_ins"), changes))
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(

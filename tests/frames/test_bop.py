@@ -85,7 +85,6 @@ def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, dama
 FAULTS = {
     "no depth": (lambda f: (f / SCENE / "depth/000001.png").unlink(), "depth/000001.png: no such image"),
     "no mask": (lambda f: (f / SCENE / "mask_visib/000000_000002.png").unlink(), "000000_000002.png: no such image"),
-    "no colour": (lambda f: (f / SCENE / "rgb/000001.png").unlink(), "rgb/000001.png: no such image"),
     "no camera": (lambda f: (f / SCENE / "scene_camera.json").unlink(), "scene_camera.json: no such file"),
     "half unpacked": (lambda f: [p.unlink() for p in (f / SCENE / "depth").iterdir()], "may be half unpacked"),
     "no scene": (lambda f: [p.unlink() for p in f.rglob("scene_gt.json")], "has no test"),

@@ -151,12 +151,13 @@ def test_downloaded_tars_of_views(server, tmp_path):
 
 
 def test_data_files_are_those_that_are_read(tmp_path):
+    entry = CUPS | {"kind": "mesh_folder", "files": ["cups/*.ply", "more/cup_?.ply"]}
     write_bop(tmp_path / "bop" / "toy")
     (tmp_path / "cups").mkdir()
     (tmp_path / "more").mkdir()
     for name in ("cups/b.ply", "cups/a.ply", "cups/notes.txt", "more/cup_1.ply"):
         BOX.export(tmp_path / name, file_type="ply")
-    names = [path.relative_to(tmp_path).as_posix() for path in data_files(resolve(CUPS, str(tmp_path)))]
+    names = [path.relative_to(tmp_path).as_posix() for path in data_files(resolve(entry, str(tmp_path)))]
     assert names == ["cups/a.ply", "cups/b.ply", "more/cup_1.ply"]
     assert [path.name for path in data_files(resolve(BOP, str(tmp_path)))] == ["models_info.json", "obj_000001.ply"]
     assert data_files(resolve({**BOP, "location": "elsewhere"}, str(tmp_path))) == []
