@@ -54,12 +54,12 @@ def stage_files(registrations, tmp_path_factory):
     names = {"sample": registrations.sample, "split": registrations.split}
     save_arrays(folder / "embeddings.npz", {"h": h_S_d.astype(np.float32), **names}, registrations.axes)
     score_S = 0.5 + registrations.sample / 100
-    rows = ["sample,split,object,concept_true,concept_predicted,score_noise,score_pose,score_overlap,"]
+    rows = ["sample,split,object,cluster,concept_true,concept_predicted,score_noise,score_pose,score_overlap,"]
     rows[0] += "variance_noise,variance_pose,variance_overlap,bald,entropy,abstained,icp_calls"
     for i, score in enumerate(score_S):
         scores = np.where(np.arange(3) == place_S[i], score, (1 - score) / 2)
         head = f"{registrations.sample[i]},{registrations.split[i]},{registrations.object_name[i]},"
-        head += f"{registrations.concept[i]},{registrations.concept[i]}"
+        head += f"{registrations.cluster[i]},{registrations.concept[i]},{registrations.concept[i]}"
         bald = f"{0.01 + i / 1000:.6f}"
         rows.append(",".join([head, *(f"{s:.6f}" for s in scores), "0.01,0.0144,0.0025", bald, "0.5,False,0"]))
     (folder / "predictions.csv").write_text("\n".join(rows) + "\n")

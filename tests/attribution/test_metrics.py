@@ -27,7 +27,7 @@ SURE = np.zeros(5, dtype=bool)
 
 def write_predictions(path, true=TRUE, predicted=PREDICTED, abstained=SURE, **columns):
     rows = pd.DataFrame(
-        {"sample": range(len(true)), "split": "test", "object": "cat", "concept_true": true}
+        {"sample": range(len(true)), "split": "test", "object": "cat", "cluster": "pet", "concept_true": true}
         | {"concept_predicted": predicted}
         | {f"score_{concept}": 0.25 for concept in CONCEPTS}
         | {"abstained": abstained, "icp_calls": 0}

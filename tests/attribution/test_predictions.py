@@ -21,7 +21,8 @@ def attribution(n, seed=0, **changed):
 
 def prediction_file(path, **columns):
     """Five predictions by hand, some columns replaced."""
-    rows = {"sample": range(5), "split": "test", "object": "cat", "concept_true": "pose", "concept_predicted": "pose"}
+    rows = {"sample": range(5), "split": "test", "object": "cat", "cluster": "pet"}
+    rows |= {"concept_true": "pose", "concept_predicted": "pose"}
     rows |= {f"score_{concept}": 0.25 for concept in CONCEPTS} | {"abstained": False, "icp_calls": 0}
     pd.DataFrame(rows | columns, index=range(5)).to_csv(path, index=False)
     return path
@@ -33,7 +34,7 @@ def test_the_prediction_file_has_the_columns_and_values_of_the_schema(tmp_path, 
     write_predictions(path, registrations, made)
     rows = read_predictions(path)
     assert list(rows.columns) == [
-        *("sample", "split", "object", "concept_true", "concept_predicted"),
+        *("sample", "split", "object", "cluster", "concept_true", "concept_predicted"),
         *("score_noise", "score_pose", "score_overlap", "variance_noise", "variance_pose", "variance_overlap"),
         *("bald", "entropy", "abstained", "icp_calls"),
     ]

@@ -9,6 +9,7 @@ from gpca.attribution.scores import Attribution
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import Rival
 from gpca.experiments.controls.settings import ControlSettings
+from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -44,7 +45,8 @@ class Head(Nearest):
 def six(registrations):
     """The registrations of the other tests, as if they showed six objects."""
     number = np.arange(len(registrations)) // len(CONCEPTS) % len(NAMES)
-    return replace(registrations, object_name=np.array(NAMES)[number])
+    names = np.array(NAMES)[number]
+    return replace(registrations, object_name=names, cluster=np.array([instance_of(name) for name in names.tolist()]))
 
 
 def seen(registrations, source="tiny"):

@@ -30,6 +30,7 @@ def said(source, tested, control, explainer, wrong, samples=30):
     return pd.DataFrame(
         dict(zip(LABELS, (control, tested, explainer), strict=True))
         | {"sample": number, "split": "test", "object": [f"part_{n % 5}_1_{n}" for n in number]}
+        | {"cluster": [f"part_{n % 5}" for n in number]}
         | {"concept_true": true, "concept_predicted": named, **scores}
         | {"bald": "" if explainer == "head" else 0.0, "entropy": np.where(number < wrong, 0.9, 0.2)}
         | {"abstained": False, "icp_calls": 0}
@@ -111,7 +112,7 @@ def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
     }
 
 
-def test_views_of_one_instance_are_one_object(files):
+def test_intervals_are_over_clusters(files):
     assert set(read_controls(files)["instance"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
 
 

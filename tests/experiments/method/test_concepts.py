@@ -14,6 +14,7 @@ from gpca.experiments.method.concepts import (
     source_before_icp,
 )
 from gpca.io.arrays import save_arrays
+from gpca.objects.splits import DRAWN
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, SEVERITIES_OF, Severities
 
@@ -65,6 +66,8 @@ def files(clouds, tmp_path_factory):
         object_index=rows,
         object_name=NAMES[rows],
         diameter_m=DIAMETERS_M[rows],
+        cluster=NAMES[rows],
+        fold=np.full(24, DRAWN),
         points=np.concatenate(aligned),
         offsets=np.cumsum([0, *map(len, aligned)]),
         target_points=np.concatenate(aligned),

@@ -7,7 +7,6 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.out_of_distribution.samples import (
     PRINCIPAL_COMPONENTS,
-    held_out_objects,
     knn_distance,
     mahalanobis_distance,
     make_sets,
@@ -89,19 +88,9 @@ def test_without_another_source_that_set_is_left_out_and_the_others_are_the_same
         assert array.tobytes() == getattr(sets, name)[kept].astype(array.dtype).tobytes()
 
 
-def test_a_share_of_the_objects_at_least_one_and_never_all_is_held_out():
-    names = np.array([f"part{i}" for i in range(10)])
-    assert len(held_out_objects(names, 0.2, "mine", 0)) == 2
-    assert len(held_out_objects(names[:3], 0.2, "mine", 0)) == 1
-    assert len(held_out_objects(names[:3], 0.9, "mine", 0)) == 2
-    assert held_out_objects(names, 0.2, "mine", 0).tolist() == held_out_objects(names[::-1], 0.2, "mine", 0).tolist()
-    assert len({tuple(held_out_objects(names, 0.2, "mine", seed)) for seed in range(5)}) > 1
-
-
 def test_of_a_single_object_none_is_held_out_and_those_sets_are_left_out(objects, embedded):
     model, registrations = embedded
-    assert len(held_out_objects(np.array(["cup", "cup"]), 0.2, "mine", 0)) == 0
-    alone = replace(registrations, object_name=np.full(len(registrations), "cup"))
+    alone = replace(registrations, cluster=np.full(len(registrations), "cup"))
     sets = make_sets(objects, alone, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
     assert set(sets.set) == {"in_distribution", "severity"}
 
@@ -109,7 +98,8 @@ def test_of_a_single_object_none_is_held_out_and_those_sets_are_left_out(objects
 def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
     model, registrations = embedded
     views = {name: f"mug_{i // 2}_1_{i}" for i, name in enumerate(np.unique(registrations.object_name).tolist())}
-    viewed = replace(registrations, object_name=np.array([views[name] for name in registrations.object_name.tolist()]))
+    names = np.array([views[name] for name in registrations.object_name.tolist()])
+    viewed = replace(registrations, object_name=names, cluster=np.array([name[:5] for name in names.tolist()]))
     sets = make_sets(objects, viewed, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
     seen, unseen = ({name[:5] for name in sets.object_name[sets.set == part]} for part in ("seen_objects", "objects"))
     assert unseen

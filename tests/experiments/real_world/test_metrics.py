@@ -12,8 +12,8 @@ NAMED = ["noise", "pose", "noise", "pose"]
 
 
 def predictions(folder, source, method="dgcnn-none"):
-    rows = {"sample": range(4), "split": "test", "object": ["a", "a", "b", "b"], "concept_true": TRUE}
-    rows |= {"concept_predicted": NAMED, "abstained": False, "icp_calls": 0}
+    rows = {"sample": range(4), "split": "test", "object": ["a", "a", "b", "b"], "cluster": "lm 6"}
+    rows |= {"concept_true": TRUE, "concept_predicted": NAMED, "abstained": False, "icp_calls": 0}
     rows |= {f"score_{c}": [0.8 if name == c else 0.1 for name in NAMED] for c in ("noise", "pose", "overlap")}
     return written(folder / "predictions" / source / method / "seed0.csv", rows)
 

@@ -147,7 +147,8 @@ def test_scores_are_bars_with_their_deviation_and_the_truth_in_bold():
 def predictions(folder, method, seed, confidence):
     named = np.array(CONCEPTS)[np.arange(30) % 3]
     true = np.where(np.arange(30) < 24, named, np.roll(named, 1))  # 80 % are right
-    rows = {"sample": range(30), "split": "test", "object": "a", "concept_true": true, "concept_predicted": named}
+    rows = {"sample": range(30), "split": "test", "object": "a", "cluster": "lm 6"}
+    rows |= {"concept_true": true, "concept_predicted": named}
     rows |= {f"score_{c}": np.where(named == c, confidence, (1 - confidence) / 2) for c in CONCEPTS}
     path = folder / f"predictions/real_rgbd/{method}/seed{seed}.csv"
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,8 @@ CONCEPTS = ("noise", "pose", "overlap")
 
 def row(exchanged, learnt_from, asked_of, explainer, sample, true, named, failure=""):
     known = {"exchanged": exchanged, "learnt_from": learnt_from, "asked_of": asked_of, "explainer": explainer}
-    said = {"sample": sample, "split": "test", "object": "mug", "concept_true": true, "concept_predicted": named}
+    said = {"sample": sample, "split": "test", "object": "mug", "cluster": "mug"}
+    said |= {"concept_true": true, "concept_predicted": named}
     scores = {f"score_{concept}": 0.0 for concept in CONCEPTS}
     return known | said | {"abstained": named == "", "icp_calls": 0, **scores, "failure": failure}
 

@@ -1,0 +1,28 @@
+import numpy as np
+
+from gpca.objects.splits import DRAWN, drawn, unseen
+
+
+def test_a_share_of_the_clusters_at_least_one_and_never_all_is_unseen():
+    clusters = np.array([f"part{i}" for i in range(10)])
+    assert drawn(clusters, 0.2, "mine", 0).sum() == 2
+    assert drawn(clusters[:3], 0.2, "mine", 0).sum() == 1
+    assert drawn(clusters[:3], 0.9, "mine", 0).sum() == 2
+    assert not drawn(clusters[:1], 0.5, "mine", 0).any()
+    assert np.array_equal(drawn(clusters, 0.2, "mine", 0), drawn(clusters[::-1], 0.2, "mine", 0)[::-1])
+    assert len({tuple(drawn(clusters, 0.2, "mine", seed)) for seed in range(5)}) > 1
+
+
+def test_all_rows_of_a_cluster_are_drawn_together():
+    clusters = np.array(["cup", "box", "cup", "can", "box"])
+    for seed in range(5):
+        is_unseen = drawn(clusters, 0.4, "mine", seed)
+        assert len(set(clusters[is_unseen])) == 1
+        assert not set(clusters[is_unseen]) & set(clusters[~is_unseen])
+
+
+def test_seeds_take_turns_with_folds_and_what_only_training_sees_is_never_unseen():
+    folds = np.array([0, 3, DRAWN, 3, 0])
+    assert [np.flatnonzero(unseen(folds, seed)).tolist() for seed in range(3)] == [[0, 4], [1, 3], [0, 4]]
+    assert unseen(np.full(4, DRAWN), 0) is None
+    assert unseen(np.array([1, 1, DRAWN]), 0) is None  # one fold: nothing would be left to train on
