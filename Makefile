@@ -9,8 +9,8 @@ SHELL := /bin/bash
 
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
-CHECKED ?= embedded
-REPORT ?= results/embedded/report.html
+CHECKED ?= default
+REPORT ?= results/default/report.html
 PYTEST_ARGS ?=
 # Wheels only, or a missing one would turn into a long failing compilation; connection_pool has none and is pure Python.
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool

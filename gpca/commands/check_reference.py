@@ -16,7 +16,7 @@ CONFIG = Path("config/config.yaml")  # as seen from the folder of the suite, whe
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the folders; ``--settings`` replaces keys of the config's section ``reference``."""
-    parser.add_argument("folder", type=Path, help="folder of the run, such as results/real")
+    parser.add_argument("folder", type=Path, help="folder of the run, such as results/full")
     parser.add_argument(
         "--reference", type=Path, help="its reference (default: the folder of the same name in reference/ beside it)"
     )

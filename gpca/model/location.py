@@ -11,8 +11,8 @@ from gpca.io.limits import require_file
 VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to take where no other is named
 RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
 SHIPPED = Path(__file__).with_name("shipped.pt")  # comes with the package where `python -m gpca ship` has put it
-BEST_FIRST = ("real", "embedded")  # runs whose model is preferred; that of the smoke run knows next to nothing
-REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results/embedded/model.pt'"
+BEST_FIRST = ("full", "default")  # runs whose model is preferred; that of the smoke run knows next to nothing
+REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results/default/model.pt'"
 
 
 def require_model(path: str | Path) -> None:
@@ -24,7 +24,7 @@ def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Pat
     """Return the path to use: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
 
     Of those in `results`, by default the folder of that name in the working directory, that of the run ``real`` comes
-    first, then ``embedded``, then the newest of any other, and ``smoke`` last.
+    first, then ``default``, then the newest of any other, and ``smoke`` last.
 
     Raises:
         InputError: there is none.

@@ -136,7 +136,7 @@ def test_calibration_comes_from_predictions(tmp_path):
     paths = []
     for method, sure in (("gpca_paper", 0.75), ("other", 0.95)):
         for seed in (100, 101):
-            rows = [(i, "test", "a", "noise", "noise" if i < 75 else "pose", False, 0,
+            rows = [(i, "test", "a", "a", "noise", "noise" if i < 75 else "pose", False, 0,
                      *((sure, 1 - sure) if i < 75 else (1 - sure, sure))) for i in range(100)]  # fmt: skip
             paths.append(tmp_path / PREDICTIONS / "ycb" / method / f"seed{seed}.csv")
             write(paths[-1], heads, rows)

@@ -30,7 +30,8 @@ def predictions(folder, right_of_object, seeds=5, sets=()):
                 named = "overlap" if i < 20 * right and name_of_set in (None, *sets[:1]) else "pose"
                 scores = (float(named == concept) for concept in CONCEPTS)
                 own_set = (name_of_set,) if sets else ()
-                rows.append((len(rows), "test", name, "overlap", named, False, 0, *scores, *own_set))
+                about = (len(rows), "test", name, name.split("_")[0], "overlap", named, False, 0)
+                rows.append((*about, *scores, *own_set))
     of_explainer = folder / ("learners" if sets else "predictions") / "ycb/gpca_paper"
     paths = [of_explainer / f"seed{seed}.csv" for seed in range(100, 100 + seeds)]
     for path in paths:

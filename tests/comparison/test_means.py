@@ -45,7 +45,7 @@ def test_every_quantity_is_of_a_kind(file, quantity, kind):
     assert {of for *_, of in KINDS} == set(SETTINGS["tolerances"])
 
 
-@pytest.mark.parametrize("run", ["real", "embedded"])
+@pytest.mark.parametrize("run", ["full", "default"])
 def test_the_kept_references_can_be_read(run):
     folder = ROOT / "results/reference" / run
     files = [path for path in folder.rglob("*.csv") if str(path.relative_to(folder)) not in reference.NOT_COMPARED]
@@ -63,5 +63,5 @@ def test_a_share_of_the_runs_is_one_of_as_many_as_there_are_seeds(tmp_path):
     (tmp_path / "active_learning.csv").write_text(head + "".join(rows))
     found = {mean.quantity: mean.samples for mean in read_means(tmp_path / "active_learning.csv", {"ycb": 90}).values()}
     assert found == {"reached": 3, "accuracy": 90}
-    table = read_means(ROOT / "results/reference/real/tables/table3_extended.csv")
+    table = read_means(ROOT / "results/reference/full/tables/table3_extended.csv")
     assert {mean.samples for mean in table.values() if mean.quantity == "reached"} == {5}

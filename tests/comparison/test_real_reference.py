@@ -22,9 +22,9 @@ TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items
 
 
 def reference():
-    folder = ROOT / "results/reference/real"
-    real = yaml.safe_load((ROOT / "config/real.yaml").read_text())
-    objects = {name: {"title": name, "stand_in": entry["stand_in"]} for name, entry in real["sources"].items()}
+    folder = ROOT / "results/reference/full"
+    sources = yaml.safe_load((ROOT / "config/sources.yaml").read_text())["sources"]
+    objects = {name: {"title": name, "stand_in": False} for name in sources}
     objects |= {name: {"title": name, "stand_in": False} for name in ("real_rgbd", "model")}
     numbers = read_published()
     named = {number.counterpart.file for number in numbers if number.counterpart}
@@ -40,7 +40,7 @@ def reference():
 def shown():
     """The comparison that the reference keeps."""
     texts = dict.fromkeys(("repeat_of", "reason", "objects", "hardware"), "")
-    return pd.read_csv(ROOT / "results/reference/real/comparison.csv").fillna(texts)
+    return pd.read_csv(ROOT / "results/reference/full/comparison.csv").fillna(texts)
 
 
 def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
@@ -75,19 +75,19 @@ def test_every_repeat_has_the_value_that_was_judged(shown):
 
 
 def test_the_verdicts_of_the_reference_are_of_every_sentence():
-    verdicts = read_verdicts(ROOT / "results/reference/real/claims.csv")
+    verdicts = read_verdicts(ROOT / "results/reference/full/claims.csv")
     assert list(dict.fromkeys(verdicts["claim"])) == [claim.name for claim in read_claims()]
-    assert counted(verdicts) in (ROOT / "results/reference/real/tables/claims.md").read_text()
+    assert counted(verdicts) in (ROOT / "results/reference/full/tables/claims.md").read_text()
 
 
 def test_the_page_of_the_reference_counts_its_verdicts(shown):
-    page = (ROOT / "results/reference/real/comparison.md").read_text()
+    page = (ROOT / "results/reference/full/comparison.md").read_text()
     assert counts_table(shown, TOLERANCES) in page
     assert summary(shown) in page
 
 
 def test_the_reason_of_labels_at_random_has_the_numbers_of_the_reference(shown):
-    rows = read_metrics(ROOT / "results/reference/real/active_learning.csv")
+    rows = read_metrics(ROOT / "results/reference/full/active_learning.csv")
     rare = rows[(rows["table"] == "active_learning/rare") & (rows["metric"] == "labels_to_target")]
     labels = rare.groupby(["method", "source"])["value"].mean().round().astype(int)
     reason = shown[(shown["table"] == "III") & (shown["column"] == "#Labels Random")]["reason"].iloc[0]

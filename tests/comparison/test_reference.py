@@ -174,10 +174,10 @@ def test_what_is_missing_comes_with_the_command_that_makes_it(folders, capsys):
 
 
 def test_a_run_with_a_config_of_its_own_is_made_with_it(folders, capsys):
-    here = folders[0].rename(folders[0].with_name("real"))
+    here = folders[0].rename(folders[0].with_name("full"))
     (here / "tables/table1.csv").unlink()
     assert check([here], "--reference", str(folders[1])) == 1
-    assert capsys.readouterr().err.endswith(f"snakemake -j2 {here}/tables/table1.csv --configfile config/real.yaml\n")
+    assert capsys.readouterr().err.endswith(f"snakemake -j2 {here}/tables/table1.csv --configfile config/full.yaml\n")
 
 
 def one_line(capsys):

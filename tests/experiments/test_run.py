@@ -21,6 +21,11 @@ def config():
 
 
 @pytest.fixture(scope="module")
+def stand_ins():
+    return without_false(load("stand_ins"))
+
+
+@pytest.fixture(scope="module")
 def sources(config):
     return check(deepcopy(config))
 
@@ -96,8 +101,8 @@ def test_an_explainer_of_uncertainties_is_given_its_design(config, sources):
     }
 
 
-def test_a_stand_in_says_so_wherever_its_title_stands(config, sources):
-    settings = settings_of(config, sources)
+def test_a_stand_in_says_so_wherever_its_title_stands(stand_ins):
+    settings = settings_of(stand_ins, check(deepcopy(stand_ins)))
     for title in (*settings["source_titles"].values(), settings["frames_title"], settings["model_title"]):
         assert "procedural stand-in" in title
 
@@ -113,7 +118,7 @@ def test_a_stand_in_says_so_wherever_its_title_stands(config, sources):
         ),
     ],
 )
-def test_tables_tell_what_encoders_of_frames_were_pretrained_on(config, sources, changes, told):
-    settings = settings_of(config | {"real_world": config["real_world"] | changes}, sources)
+def test_tables_tell_what_encoders_of_frames_were_pretrained_on(stand_ins, sources, changes, told):
+    settings = settings_of(stand_ins | {"real_world": stand_ins["real_world"] | changes}, sources)
     assert settings["frames_pretrained_on"] == told
     assert settings["frames_rendered"] == ("virtual" in changes)

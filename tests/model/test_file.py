@@ -109,13 +109,13 @@ def none_shipped(tmp_path, monkeypatch):
 
 
 def test_the_best_model_of_the_workflow_is_taken(tmp_path, none_shipped):
-    with pytest.raises(InputError, match=f"none in .*snakemake -j2 results/embedded/model.pt.*{VARIABLE}"):
+    with pytest.raises(InputError, match=f"none in .*snakemake -j2 results/default/model.pt.*{VARIABLE}"):
         model_path(results=tmp_path)
-    for run in ("smoke", "older", "mine", "embedded", "real"):
+    for run in ("smoke", "older", "mine", "default", "full"):
         (tmp_path / run).mkdir()
         (tmp_path / run / "model.pt").touch()
         os.utime(tmp_path / run / "model.pt", (1000 + (run == "mine"), 1000 + (run == "mine")))
-    for run in ("real", "embedded", "mine", "older", "smoke"):
+    for run in ("full", "default", "mine", "older", "smoke"):
         assert model_path(results=tmp_path) == tmp_path / run / "model.pt"
         (tmp_path / run / "model.pt").unlink()
 

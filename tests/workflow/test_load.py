@@ -21,10 +21,10 @@ def all_of(patterns):
     return [path for files in patterns.values() for path in ([files] if isinstance(files, str) else files)]
 
 
-@pytest.mark.parametrize("config", ["embedded", "smoke", "real"])
+@pytest.mark.parametrize("config", ["default", "smoke", "full", "stand_ins"])
 def test_every_config_loads_offline_and_asks_for_all_results(project, planned, config):
     if config != "smoke":
-        file = "config" if config == "embedded" else config
+        file = "config" if config == "default" else config
         planned = project.dry_run("all", "--configfile", f"config/{file}.yaml")
     settings = without_false(load_config(*{"smoke", "real"} & {config}))
     names = names_of(settings, check(deepcopy(settings)))

@@ -43,7 +43,7 @@ FOUND = [
     *("active_learning.csv", "recovery.csv"),
 ]
 ROOT_OF_RUN = Path("results", config["run"])
-REFERENCE = ROOT / "results/reference/real/comparison.csv"
+REFERENCE = ROOT / "results/reference/full/comparison.csv"
 
 
 onsuccess:

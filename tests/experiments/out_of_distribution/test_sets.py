@@ -15,7 +15,8 @@ def sets(n=12):
     concept = np.tile(["noise", "pose", "overlap"], 2 * n)
     h = random.normal(size=(6 * n, 4)) + 3 * (concept == "pose")[:, None]
     distance = random.random((6 * n, len(DISTANCES)))
-    return ShiftedSets(names, split, np.tile(np.arange(n), 6), concept, np.full(6 * n, "cup"), h, distance)
+    cup = np.full(6 * n, "cup")
+    return ShiftedSets(names, split, np.tile(np.arange(n), 6), concept, cup, cup, h, distance)
 
 
 def test_a_file_gives_back_what_was_saved(tmp_path):

@@ -47,7 +47,7 @@ def run_files(embedded, tmp_path_factory):
     for path in paths.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     embedded.save(paths["registrations"])
-    columns = {name: getattr(embedded, name) for name in ("split", "sample", "concept", "object_name")}
+    columns = {name: getattr(embedded, name) for name in ("split", "sample", "concept", "object_name", "cluster")}
     distance = np.linspace(0, 1, len(embedded))[:, None] * np.ones(len(DISTANCES))
     ShiftedSets(set=np.full(len(embedded), "in_distribution"), h=embedded.embedding, distance=distance, **columns).save(
         paths["sets"], embedded.axes
