@@ -21,6 +21,7 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
+NO_COLOR = "none"
 COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
 FRAME_COLUMNS = (  # all that the file may hold
     *COLUMNS,
@@ -39,7 +40,7 @@ class Instances:
         T_camera_object_true, T_camera_object_init: (I, 4, 4), meters.
         init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
         camera_3_3: (I, 3, 3) K in pixels.
-        colour: (I,) path of the color image; empty where there is none.
+        colour: (I,) path of the color image; `NO_COLOR` where there is none.
         fold: (I,) that the scene is tested with; `DRAWN` where no file says so, or where only training sees it.
         points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
             ``points_m[offsets[i]:offsets[i + 1]]``.
@@ -71,6 +72,11 @@ class Instances:
     def pixels_of(self, i: int) -> np.ndarray:
         """Return the pixels (P, 2) of instance i."""
         return self.pixels[self.offsets[i] : self.offsets[i + 1]]
+
+    @property
+    def is_colored(self) -> np.ndarray:
+        """(I,) the frame has a color image."""
+        return self.colour != NO_COLOR
 
     @property
     def cluster(self) -> np.ndarray:

@@ -23,7 +23,7 @@ from gpca.frames.estimates import (
     read_pose_errors,
 )
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
-from gpca.frames.instances import Instances
+from gpca.frames.instances import NO_COLOR, Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_center
@@ -178,7 +178,7 @@ def read_instances(
         of_dataset: list[tuple[_Objects, Frame, int, dict]] = []
         for frame in progress(frames, f"frames of {dataset.name}"):
             shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
-            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or "")}
+            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or NO_COLOR)}
             shown["fold"] = dataset.fold(frame.scene)
             of_dataset += [(catalog, frame, n, shown | row) for n, row in catalog.in_frame(frame, left_out)]
         observations = [catalog.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]

@@ -23,7 +23,7 @@ def require_model(path: str | Path) -> None:
 def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Path:
     """Return the path to use: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
 
-    Of those in `results`, by default the folder of that name in the working directory, that of the run ``real`` comes
+    Of those in `results`, by default the folder of that name in the working directory, that of the run ``full`` comes
     first, then ``default``, then the newest of any other, and ``smoke`` last.
 
     Raises:

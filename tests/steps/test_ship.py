@@ -99,17 +99,26 @@ def places(entry):
     """Return a file that an entry of the full protocol reads in each of the places that its config names."""
     named = [f"/data/{entry['location']}/file"]
     for key in ("results", "errors", "url", "urls"):
-        given = entry.get(key, [])
+        given = entry.get(key) or []
         named += [given] if isinstance(given, str) else given
     return named
 
 
-REAL = yaml.safe_load((ROOT / "config/real.yaml").read_text())
-ENTRIES = REAL["sources"] | REAL["real_world"]["datasets"]
+BOP = yaml.safe_load((ROOT / "config/bop.yaml").read_text())
+ENTRIES = BOP["sources"] | BOP["real_world"]["datasets"]
+SUMS = (ROOT / "data/SHA256SUMS").read_text().splitlines()
+
+
+def test_every_file_of_the_repositorys_data_that_a_run_reads_has_a_license():
+    names = [line.split("  ")[1] for line in SUMS]
+    read = [name for name in names if "/" in name and not name.endswith(".md")]
+    assert len(read) > 100
+    for name in read:
+        assert licenses_of(f"data/{name}", ROOT), name
 
 
 @pytest.mark.parametrize("name", ENTRIES)
-def test_every_dataset_of_the_full_protocol_has_a_license(name):
+def test_every_dataset_that_is_downloaded_has_a_license(name):
     for place in places(ENTRIES[name]):
         assert licenses_of(place, ROOT), place
 

@@ -49,8 +49,8 @@ def draw_real_world_example(
     objects = ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)
     samples = read_samples(poses_csv, predictions_csv)
-    colored_I = instances.colour != ""
-    row = choose_sample(samples, predictions_csv, np.where(colored_I, np.diff(instances.offsets), 0))
+    shown_px = np.where(instances.is_colored, np.diff(instances.offsets), 0)
+    row = choose_sample(samples, predictions_csv, shown_px)
     sample = samples.iloc[row]
     i = int(sample["instance"])
     camera = _Camera(instances, i, registrations, row)
