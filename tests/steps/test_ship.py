@@ -83,7 +83,8 @@ def test_the_card_has_the_numbers_of_the_run_and_the_same_run_gives_the_same_byt
     for words in (
         hashlib.sha256(first["shipped.pt"]).hexdigest(), f"{len(first['shipped.pt'])} bytes", "commit `c0ffee`",
         f"trained on {model.diagnoser.classifier.samples} registrations", "| Tiny things | 3 | diagnosis |",
-        "| Frames | 3 | GP-CA |", "| LINEMOD in BOP | CC BY 4.0 | seen: the card of a copy of the dataset | Tiny things; Frames |",
+        "| Frames | 3 | GP-CA |",
+        "| LINEMOD in BOP | CC BY 4.0 | seen: the card of a copy of the dataset | Tiny things; Frames |",
         "| LINEMOD-Occlusion in BOP | CC BY-SA 4.0 | seen: ", "0.752 (0.702 to 0.802) | – | – | – | – | 300 (5) |",
         "above 0.0312 of", "noise 0.01 to 0.0834", '- `moved: "observed"`', f"{model.diagnoser.threshold:.3f}",
     ):  # fmt: skip

@@ -113,7 +113,7 @@ class Project:
 
     def copy(self, folder):
         """Copy everything, results and Snakemake's memory of them included."""
-        shutil.copytree(self.folder, folder)
+        shutil.copytree(self.folder, folder, symlinks=True)
         return Project(folder)
 
     def results(self, *suffixes):
@@ -152,6 +152,7 @@ def _sources_copied(origin, folder):
             shutil.copytree(origin / name, folder / name, ignore=unfinished)
         else:
             shutil.copy2(origin / name, folder / name)
+    (folder / "data").symlink_to(ROOT / "data")  # only read, and as large as all the rest
     return Project(folder)
 
 

@@ -26,7 +26,7 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, planned, c
     if config != "smoke":
         file = "config" if config == "default" else config
         planned = project.dry_run("all", "--configfile", f"config/{file}.yaml")
-    settings = without_false(load_config(*{"smoke", "real"} & {config}))
+    settings = without_false(load_config(*{"smoke", "full", "stand_ins"} & {config}))
     names = names_of(settings, check(deepcopy(settings)))
     asked = {path for result in results_of(names) for path in (*result.all_files, *all_of(result.files(names)))}
     asked |= {
@@ -38,7 +38,7 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, planned, c
     asked |= {"comparison.csv", "tables/claims.tex", "index.html"}
     assert {f"results/{config}/{path}" for path in asked} <= planned.outputs
     assert all(path.startswith(f"results/{config}/") for path in planned.outputs)
-    assert ("render_scenes" in planned.jobs) == (config != "real")
+    assert ("render_scenes" in planned.jobs) == (config in ("smoke", "stand_ins"))
     assert "profiles/default" in planned.messages
     assert not (project.folder / "results").exists()
 
@@ -133,7 +133,7 @@ def test_a_snakefile_elsewhere_plans_into_the_working_directory(project, tmp_pat
     here = tmp_path / "here"
     here.mkdir()
     done = project.plan("--snakefile", project.folder / "Snakefile", "--directory", here, "table2")
-    assert "results/embedded/tables/table2_per_concept.md" in done.stdout
+    assert "results/default/tables/table2_per_concept.md" in done.stdout
 
 
 def test_a_module_may_have_a_config_of_its_own_over_the_defaults(project, tmp_path):
