@@ -1,7 +1,7 @@
 """Whether a model tells right registrations from wrong ones, on objects and frames that its diagnoser never learned.
 
-    python benchmarks/detection.py --model results/real/model.pt --frames results/real [--name real_rgbd] [--seed 0]
-    python benchmarks/detection.py --model results/embedded/model.pt --objects objects.npz [--pairs 20]
+    python benchmarks/detection.py --model results/full/model.pt --frames results/full [--name real_rgbd] [--seed 0]
+    python benchmarks/detection.py --model results/default/model.pt --objects objects.npz [--pairs 20]
 
 With --frames, of the depth frames of a run: a registration failed where ICP ends at an ADD(-S) of more than 3 % of the
 diameter and is nominal below 2 %, as in docs/causes.md; between them it does not count. AUROC of the diagnosis, of the

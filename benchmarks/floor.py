@@ -1,6 +1,6 @@
 """How much the floor ε under the covariances of the poses decides: SHAP, SA and who is causal, at floors 1e-9 to 1e-3.
 
-    python benchmarks/floor.py results/real
+    python benchmarks/floor.py results/full
 
 No ICP runs: the covariances of a run that is there give every uncertainty anew (gpca.uncertainty.spread.divergence),
 and `shap_additive` and `sa_local_additive` are asked again. `clean` is the uncertainty of a clean pair against another
@@ -37,7 +37,7 @@ DESIGNS_READ = ("additive", "causal")
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("run", type=Path, help="folder of a run, e.g. results/real")
+    parser.add_argument("run", type=Path, help="folder of a run, e.g. results/full")
     folder = parser.parse_args(arguments).run
     result = {}
     try:

@@ -1,7 +1,7 @@
 """How long one explanation takes, from two clouds to scores, against the same steps by plain means.
 
     python benchmarks/latency.py [--threads 1] [--points 512] [--pairs 12] [--repeats 50] [--draws 1000]
-    python benchmarks/latency.py --model results/real/model.pt [--points 512] ...
+    python benchmarks/latency.py --model results/full/model.pt [--points 512] ...
 
 Both register the same clouds and hold the same weights and posterior, in one process and in turn (A B A B …), so that
 whatever else the machine does meets both. Ours is the explainer of `python -m gpca explain` with its model loaded. The

@@ -4,7 +4,7 @@
     python benchmarks/pipeline.py --existing real [--write docs/reproducing.md]
 
 The first form makes everything afresh as the run `benchmark` (results/benchmark is removed first) and takes the wall
-time with a clock; without --configfile it is the embedded default. The second only reads the files of a run that is
+time with a clock; without --configfile it is the default run. The second only reads the files of a run that is
 there. Two records are read: the provenance sidecars (seconds of work inside a step, peak memory) and Snakemake's
 benchmark files (seconds of the whole job). From cores × wall time, the core time, follow
 

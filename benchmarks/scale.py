@@ -1,11 +1,11 @@
 """What a run scales to: more cores for the same run, and more datasets, seeds and explainers on a cluster.
 
-    python benchmarks/scale.py results/real [--configfile config/real.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
-    python benchmarks/scale.py results/real --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
+    python benchmarks/scale.py results/full [--configfile config/full.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
+    python benchmarks/scale.py results/full --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
 
 The first form schedules the jobs of a finished run, each with the seconds of its benchmark file, on several
 numbers of cores (Snakemake's own start and the cores' shared memory are not in it), and names the chain of jobs that no
-core shortens. The second plans the embedded default with so many datasets (copies of its own), seeds and explainers,
+core shortens. The second plans the default run with so many datasets (copies of its own), seeds and explainers,
 dry, and takes the core time and memory of that plan. A job of the plan takes the mean seconds of its rule in the
 finished run, in proportion to the results that it reads and writes: many jobs loop over the seeds. A rule that was not
 measured counts as the mean of the others, in the queue or out of it. Transfer between datasets is left out, as its cost

@@ -1,7 +1,7 @@
 """What each table and figure of a finished run takes: jobs, core time, wall time, memory.
 
-    python benchmarks/targets.py results/real [--configfile config/real.yaml] [--config data_dir=/data] [--cores 2]
-    python benchmarks/targets.py results/real --write docs/reproducing.md
+    python benchmarks/targets.py results/full [--configfile config/full.yaml] [--config data_dir=/data] [--cores 2]
+    python benchmarks/targets.py results/full --write docs/reproducing.md
 
 Snakemake's plan of the whole run (a dry run, nothing is made) says which jobs a target needs; the run's benchmark files
 say how long each took and how much memory it held. Core time is the sum over those jobs. Wall time is that of a
@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
 def parser_of_run(description: str | None) -> argparse.ArgumentParser:
     """Return a parser of the folder of a finished run and of what that was configured by."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, help="folder of a finished run, such as results/real")
+    parser.add_argument("folder", type=Path, help="folder of a finished run, such as results/full")
     parser.add_argument("--configfile", type=Path, help="config of that run; default config/{run}.yaml, if it exists")
     parser.add_argument("--config", nargs="+", default=[], metavar="KEY=VALUE", help="as for snakemake")
     return parser

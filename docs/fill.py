@@ -33,7 +33,7 @@ from gpca.errors import InputError  # noqa: E402
 from gpca.io.files import whole_file  # noqa: E402
 
 DEFINITIONS = Path(__file__).with_name("numbers.yaml")
-REFERENCE = ROOT / "results/reference/real"
+REFERENCE = ROOT / "results/reference/full"
 NUMBER = re.compile(r"(?<![\w.])(-?\d[\d.]*)<!--(\w+)-->")
 PASSAGE = re.compile(r"(?<=<!--begin )(\w+)-->\n(.*?)(?=<!--end \1-->)", re.DOTALL)
 CONDITION = re.compile(r"<!--if (\w+)-->")

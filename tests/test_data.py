@@ -18,7 +18,7 @@ from gpca.objects.bop import read_models_info
 from gpca.objects.canonical import ObjectClouds, sample_objects, write_objects
 from gpca.objects.repository import DATA, VERSION, require_whole
 from gpca.objects.source import resolve, surfaces
-from gpca.objects.splits import read_object_splits, read_scene_splits
+from gpca.objects.splits import TRAINING, read_object_splits, read_scene_splits
 
 PARTS = ("ycb", "ycbv", "lm", "lmo", "estimates")
 LARGEST_BYTES = 40e6
@@ -109,8 +109,8 @@ def test_every_frame_is_read_and_every_instance_lies_on_its_model(name):
 def test_development_reads_other_scenes_than_are_tested():
     chosen_by = {frame.scene for frame in dataset("ycbv", role="development").frames()}
     folds = {scene: dataset("ycbv").fold(scene) for scene in read_scene_splits(SCENES, "ycbv")}
-    assert chosen_by == {scene for scene, fold in folds.items() if fold == -1} == {0, 1, 2}
-    assert {fold for fold in folds.values() if fold != -1} == {0, 1}
+    assert chosen_by == {scene for scene, fold in folds.items() if fold == TRAINING} == {0, 1, 2}
+    assert {fold for fold in folds.values() if fold != TRAINING} == {0, 1}
 
 
 def test_a_scene_of_a_dataset_that_the_splits_lack_is_named():

@@ -187,7 +187,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files; there are no settings."""
     parser.add_argument(
-        "--model", required=True, type=Path, help="model in the folder of its run, such as results/real/model.pt"
+        "--model", required=True, type=Path, help="model in the folder of its run, such as results/full/model.pt"
     )
     parser.add_argument("--out", required=True, type=Path, help="the model to ship, such as gpca/model/shipped.pt")
     parser.add_argument("--card", required=True, type=Path, help="its card, such as gpca/model/shipped.md")

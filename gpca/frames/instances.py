@@ -14,7 +14,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.io.arrays import REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import numbers, read_csv
-from gpca.objects.splits import unseen
+from gpca.objects.splits import DRAWN, unseen
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import generator
 
@@ -41,7 +41,7 @@ class Instances:
         init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
         camera_3_3: (I, 3, 3) K in pixels.
         colour: (I,) path of the color image; `NO_COLOR` where there is none.
-        fold: (I,) that the scene is tested with; `DRAWN` where no file says so, or where only training sees it.
+        fold: (I,) that the scene is tested with, `DRAWN` or `TRAINING` (:mod:`gpca.objects.splits`).
         points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
             ``points_m[offsets[i]:offsets[i + 1]]``.
         pixels: (ΣP, 2) int32, where each was seen, (u, v).
@@ -86,22 +86,26 @@ class Instances:
     def split(self, source: str, seed: int, test_share: float) -> dict[str, np.ndarray]:
         """Return the rows of ``train`` and ``test``: whole scenes, as one in training would give another frame away.
 
-        The seed's fold is tested; without folds, scenes in an order of the seed's, until the share is met.
+        The seed's fold is tested. Of scenes without a fold, so many as hold the share, in an order of the seed's.
 
         Raises:
             InputError: all frames are of one scene.
         """
-        is_test = unseen(self.fold, seed)
-        if is_test is not None:
-            return {"train": np.flatnonzero(~is_test), "test": np.flatnonzero(is_test)}
-        _, scene_I = np.unique(self.cluster, return_inverse=True)
-        scenes = generator(source, seed, "split").permutation(scene_I.max() + 1)
-        if len(scenes) < 2:
+        by_fold = unseen(self.fold, seed)
+        is_test = np.zeros(len(self), bool) if by_fold is None else by_fold
+        is_drawn = self.fold == DRAWN
+        is_test[is_drawn] = self._drawn(is_drawn, source, seed, test_share)
+        if is_test.all() or not is_test.any():
             raise InputError(f"instances of {source}", "all are from one scene", "give frames from at least two scenes")
-        sizes_G = np.bincount(scene_I)[scenes]
-        n_test = 1 + int(np.sum(np.cumsum(sizes_G)[:-1] < test_share * len(self)))
-        is_test = np.isin(scene_I, scenes[: min(n_test, len(scenes) - 1)])
         return {"train": np.flatnonzero(~is_test), "test": np.flatnonzero(is_test)}
+
+    def _drawn(self, rows: np.ndarray, source: str, seed: int, test_share: float) -> np.ndarray:
+        """Return which of the rows are in scenes that are drawn for testing: a share, at least one scene, never all."""
+        _, scene_n = np.unique(self.cluster[rows], return_inverse=True)
+        scenes = generator(source, seed, "split").permutation(len(np.unique(scene_n)))
+        sizes_G = np.bincount(scene_n, minlength=len(scenes))[scenes]
+        n_test = 1 + int(np.sum(np.cumsum(sizes_G)[:-1] < test_share * len(scene_n)))
+        return np.isin(scene_n, scenes[: min(n_test, len(scenes) - 1)])
 
     def save(self, path: str | Path, source: str) -> None:
         """Write the npz described in results/README.md."""

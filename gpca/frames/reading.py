@@ -27,7 +27,7 @@ from gpca.frames.instances import NO_COLOR, Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
 from gpca.objects import bop
 from gpca.objects.canonical import ObjectClouds, bounding_center
-from gpca.objects.splits import DRAWN, EVALUATION, Place
+from gpca.objects.splits import DRAWN, EVALUATION, TRAINING, Place
 from gpca.objects.surface import Surface
 from gpca.objects.symmetry import find_symmetries, read_symmetries
 from gpca.process.progress import progress
@@ -79,9 +79,11 @@ class Dataset:
         return self.role == EVALUATION or self.places[frame.scene].role == self.role
 
     def fold(self, scene: int) -> int:
-        """Return the fold that a scene is tested with; `DRAWN` where no file says so, or for training alone."""
-        place = self.places.get(scene)
-        return place.fold if place is not None and place.role == self.role else DRAWN
+        """Return the fold that a scene is tested with, `DRAWN` where no file says so, `TRAINING` if it never is."""
+        if not self.places:
+            return DRAWN
+        place = self.places[scene]
+        return place.fold if place.role == self.role else TRAINING
 
     def models_folder(self) -> Path:
         """Return the folder of its models."""

@@ -22,7 +22,8 @@ from gpca.errors import InputError
 from gpca.io.csv_file import read_csv
 from gpca.seeds import generator
 
-DRAWN = -1  # the fold of what no file deals into folds, and of scenes that only training sees
+DRAWN = -1  # the fold of what no file deals into folds
+TRAINING = -2  # the fold of scenes for development, which are never tested but may be trained on
 DEVELOPMENT, EVALUATION, UNUSED = ROLES = ("development", "evaluation", "unused")
 
 
@@ -90,7 +91,7 @@ def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:
 
     The seeds take turns with the folds that a source has.
     """
-    folds = np.unique(fold_N[fold_N != DRAWN])
+    folds = np.unique(fold_N[fold_N >= 0])
     if len(folds) < 2:
         return None
     return fold_N == folds[seed % len(folds)]

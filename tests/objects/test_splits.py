@@ -1,6 +1,6 @@
 import numpy as np
 
-from gpca.objects.splits import DRAWN, drawn, unseen
+from gpca.objects.splits import DRAWN, TRAINING, drawn, unseen
 
 
 def test_a_share_of_the_clusters_at_least_one_and_never_all_is_unseen():
@@ -22,7 +22,7 @@ def test_all_rows_of_a_cluster_are_drawn_together():
 
 
 def test_seeds_take_turns_with_folds_and_what_only_training_sees_is_never_unseen():
-    folds = np.array([0, 3, DRAWN, 3, 0])
+    folds = np.array([0, 3, TRAINING, 3, 0])
     assert [np.flatnonzero(unseen(folds, seed)).tolist() for seed in range(3)] == [[0, 4], [1, 3], [0, 4]]
     assert unseen(np.full(4, DRAWN), 0) is None
     assert unseen(np.array([1, 1, DRAWN]), 0) is None  # one fold: nothing would be left to train on

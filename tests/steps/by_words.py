@@ -99,7 +99,7 @@ def job_of(step: str, words: list[str]) -> Job:
             values[name].append(word)
     threads = int(os.environ.get("OMP_NUM_THREADS", 1))
     names = {name: _value(step, name, texts) for name, texts in values.items()}
-    always = {"settings": {}, "threads": threads, "data_dir": None, "downloads": Path("data/downloads")}
+    always = {"settings": {}, "threads": threads, "data_dir": None, "downloads": Path("downloads")}
     return Job(**always | {"surface_points": 16384} | names)
 
 

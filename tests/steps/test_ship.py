@@ -45,7 +45,7 @@ def run(model, objects, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "real"
     (folder / "objects").mkdir(parents=True)
     replace(model, stand_in=False, title="Frames").save(folder / "model.pt")
-    learnt = [f"results/real/{name}/seed0.npz" for name in ("model_causes/tiny", "registrations/frames")]
+    learnt = [f"results/full/{name}/seed0.npz" for name in ("model_causes/tiny", "registrations/frames")]
     record(folder / "model.pt", learnt, SETTINGS)
     for name, inputs, settings in (
         ("tiny", [MESH], {"entry": {"title": "Tiny things", "stand_in": False, "url": "https://x/lm_models.zip"}}),

@@ -19,11 +19,11 @@ TASKS = re.findall(r"^\| \d+ \| (.+?) \| \[.+?\]\((.+?)#(.+?)\) \|$", PAGE.read_
 ELSEWHERE = {
     "install": ("pip install .", "tests/test_package.py::test_the_command_runs_anywhere"),
     "make one": (
-        "snakemake -j2 results/embedded/tables/table2_per_concept.md",
+        "snakemake -j2 results/default/tables/table2_per_concept.md",
         "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows",
     ),
     "use your own meshes": (
-        "snakemake -j2 results/embedded/tables/table2_per_concept.md --config data_dir=/data",
+        "snakemake -j2 results/default/tables/table2_per_concept.md --config data_dir=/data",
         "tests/workflow/test_extension.py::test_a_folder_of_meshes_and_a_rule_of_an_own_source_become_rows",
     ),
     "add an explainer": ('EXPLAINERS = {"nearest_quality"', "tests/test_adding.py::test_an_explainer"),
