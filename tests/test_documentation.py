@@ -93,7 +93,7 @@ def snakemake_plans():
     """
     parser = ArgumentParser()
     for option in ("--profile", "--configfile", "--config"):
-        parser.add_argument(option)
+        parser.add_argument(option, **({"nargs": "+"} if option == "--configfile" else {}))
     for option in ("-j", "-q", "--report"):  # a report is not made in a dry run
         parser.add_argument(option, dest="unplanned")
     parser.add_argument("-n", "--report-after-run", action="store_true", dest="unplanned")
@@ -101,6 +101,7 @@ def snakemake_plans():
     plans = []
     for command in commands("snakemake "):
         given = vars(parser.parse_intermixed_args(shlex.split(command)[1:]))
+        given["configfile"] = " ".join(given["configfile"] or ())
         named = {name: given[name] for name in ("profile", "configfile", "config") if given[name]}
         # An option is spoken of; or a config that a page shows, which tests/workflow/test_tasks.py plans.
         if not given["targets"] or given["configfile"] in SHOWN:
@@ -121,7 +122,7 @@ def snakemake_plans():
 def test_every_snakemake_command_can_be_planned(options, targets, tmp_path):
     if "profile" in options:
         pytest.importorskip("snakemake_executor_plugin_slurm")
-    words = [word for name, value in options.items() for word in (f"--{name}", value)]
+    words = [word for name, value in options.items() for word in (f"--{name}", *value.split())]
     words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in (*words, "--", *sorted(targets))]
     plan = subprocess.run(
         [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", *words], cwd=ROOT, capture_output=True, text=True
