@@ -125,7 +125,7 @@ def test_symmetric_objects_are_judged_by_the_shape(four, monkeypatch):
 def test_a_single_object_is_refused(four):
     one = replace(four, names=four.names[2:3], diameters_m=four.diameters_m[2:3], clouds=four.clouds[2:3])
     assert isinstance(one, ObjectClouds)
-    with pytest.raises(InputError, match=r"causes of one: has objects of one family alone, which cannot be split"):
+    with pytest.raises(InputError, match="causes of one: has objects of one family alone, which cannot be split"):
         draw_causes(one, "one", 100, CauseSettings(**FEW))
 
 

@@ -67,7 +67,7 @@ FAULTS = {
     ],
     "causes": [
         (untouched, {"--objects": "nowhere.npz"}, "nowhere.npz: no such file"),
-        (one_object, {}, r"causes of tiny: 1 object\(s\) cannot be split"),
+        (one_object, {}, "causes of tiny: has objects of one family alone, which cannot be split"),
         (untouched, settings("causes", icp={"method": "generalized"}), "the target has no normals; use point_to_point"),
         (untouched, {"--candidates": "causes.npz"}, "causes.npz"),
     ],
