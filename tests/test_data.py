@@ -49,7 +49,13 @@ def test_every_file_is_listed_with_its_checksum():
 
 @pytest.mark.parametrize("part", PARTS)
 def test_every_part_has_its_license_beside_it(part):
-    assert re.search("CC BY(-SA)? 4.0|MIT License", (DATA / part / "LICENSE.md").read_text())
+    text = (DATA / part / "LICENSE.md").read_text()
+    assert re.search("CC BY(-SA)? 4.0|MIT License", text)
+    assert "http" in text
+    assert "Changed here: " in text
+    if "MIT License" in text:  # which wants both notices in every copy
+        assert "Copyright (c)" in text
+        assert "shall be included in all copies" in text
     assert f"({part}/LICENSE.md)" in (DATA / "README.md").read_text()
 
 
@@ -57,8 +63,10 @@ def test_a_family_has_one_role_and_one_fold_in_all_sources():
     rows = read_csv(OBJECTS, ("source", "object", "name", "family", "role", "fold"))
     used = rows[rows["role"] != "unused"]
     assert (used.groupby("family")[["role", "fold"]].nunique() == 1).all(axis=None)
-    unused = set(rows.loc[rows["role"] == "unused", "family"])
-    assert unused <= set(used.loc[used["role"] == "evaluation", "family"])  # the reason why they are
+    unused = rows[rows["role"] == "unused"]
+    assert len(unused) == 2
+    assert all((DATA / "ycb" / f"{name}.ply").is_file() for name in unused["object"])
+    assert set(unused["family"]) <= set(used.loc[used["role"] == "evaluation", "family"])  # the reason why they are
 
 
 def test_an_object_is_in_one_source_and_the_mug_in_ycb_alone():
@@ -161,6 +169,8 @@ def test_data_that_is_not_as_published_is_refused(folder: Path, change, message)
     with pytest.raises(InputError) as caught:
         require_whole(folder)
     assert message in str(caught.value)
+    assert "git checkout -- data" in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
 
 
 def test_data_as_published_passes(folder):
