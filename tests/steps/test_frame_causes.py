@@ -63,6 +63,18 @@ def test_every_explainer_is_judged_on_the_frames(asked):
     assert bool(both) == (STATE in set(rows["metric"]))
 
 
+def test_instances_from_other_initial_poses_have_a_name_of_their_own_and_the_draws_of_the_frames(call, asked, tiny):
+    folder, words = call
+    tiny[0].save(folder / "estimated.npz", "tiny_estimated")
+    tiny[1].save(folder / "their_objects.npz", "tiny_estimated")
+    renamed = {"instances.npz": "estimated.npz", "objects.npz": "their_objects.npz", "said.csv": "said_too.csv"}
+    renamed |= {"seed100.npz": "other.npz", "seed100.csv": "other.csv"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main([renamed.get(word, word) for word in words] + ["--name", "tiny_estimated"]) == 0
+    assert (folder / "said_too.csv").read_bytes() == (folder / "said.csv").read_bytes()
+
+
 def test_the_table_says_how_few_there_are(asked):
     titles = {name: name for name in SETTINGS["explainers"]}
     table = table9_frames(collect(*asked), {"title": "Tiny", "stand_in": True}, titles)

@@ -46,6 +46,7 @@ rule measure_frame_causes:
             }
         ),
         source=FRAMES,
+        name=ESTIMATED,
         folders=DATA_FOLDERS,
     script:
         "../scripts/step.py"

@@ -60,7 +60,8 @@ def run(job: Job) -> None:
 
 
 def _measure(job: Job) -> tuple[Causes, pd.DataFrame]:
-    instances, objects = Instances.load(job.instances, job.source), ObjectClouds.load(job.objects, job.source)
+    name = job.get("name", job.source)  # of the initial poses; the draws are those of the frames
+    instances, objects = Instances.load(job.instances, name), ObjectClouds.load(job.objects, name)
     require_of_objects(instances, objects, job.instances)
     chosen = FrameCauseSettings(**job.section("frames"))
     rows = chosen_instances(instances, job.source, chosen)
