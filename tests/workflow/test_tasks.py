@@ -78,11 +78,11 @@ def test_a_severity_is_changed_an_explainer_dropped_and_a_bop_dataset_named(proj
         assert words[words.index("--configfile") + 1] == name
         (project.folder / name).write_text(block(name, page=pages[name]))
     assert project.gpca(*command("change", "python -m gpca")[3:]).returncode == 0
-    dataset = tmp_path / "data/bop/my_lab"  # planned here; tests/frames/test_steps.py reads one
+    dataset = tmp_path / "lab/bop/my_lab"  # planned here; tests/frames/test_steps.py reads one
     (dataset / "models").mkdir(parents=True)
     for name in ("foundationpose_mylab-test.csv", "models/models_info.json"):
         (dataset / name).touch()
-    words = ["all", *SMOKE, *configs, "--config", f"data_dir={tmp_path}/data"]
+    words = ["all", *SMOKE, *configs, "--config", f"data_dir={tmp_path}/lab"]
     planned = project.plan(*words).stdout
     assert set(re.findall(r"^register +(\d+)$", planned, re.MULTILINE)) == {"6"}  # two sources, three seeds
     changed = with_defaults(*(read_file(project.folder / name) for name in configs))
@@ -112,7 +112,7 @@ def test_samples_are_labelled(smoke, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").symlink_to(smoke.folder / "results")
     (tmp_path / "answers").write_text("overlap\n/quit\n")
-    words = [word.replace("/embedded/", "/smoke/") for word in command("label", "python -m gpca label")[3:]]
+    words = [word.replace("/default/", "/smoke/") for word in command("label", "python -m gpca label")[3:]]
     with (tmp_path / "answers").open() as typed:
         monkeypatch.setattr(sys, "stdin", typed)
         assert main(words) == 0
