@@ -37,7 +37,7 @@ pathvars:
 STAGES = "objects registrations causes frames virtual_frames encoders uncertainty explainers model"
 EXPERIMENTS = [each.name for each in experiments() if each.has_rules]
 ENDS_WITH = ["collected", "results", "comparison", "targets"]
-TOPICS = ["common", *STAGES.split(), *EXPERIMENTS, *ENDS_WITH]
+TOPICS = ["common", "functions", *STAGES.split(), *EXPERIMENTS, *ENDS_WITH]
 for topic in dict.fromkeys(TOPICS):
 
     include: f"workflow/rules/{topic}.smk"

@@ -10,33 +10,6 @@ CONTROL_EXPLAINERS = {
 }
 
 
-def controls_of(seed):
-    """Return the controls of a seed: all, but those that need a further encoder for the first seeds alone."""
-    further = int(seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
-    return [
-        n for n in CONTROLS["controls"] if further or n == UNSEEN or n not in RETRAINED
-    ]
-
-
-def retrained(wildcards):
-    """Return the controls and ways of training for which a seed has encoders of their own."""
-    further = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
-    own = [name for name in controls_of(wildcards.seed) if name in RETRAINED]
-    return own + (NAMES["control_encoder"] if further else [])
-
-
-def control_settings(wildcards, **further):
-    own = {name: CONTROLS[name] for name in CONTROLS if name != "explainers"}
-    own["controls"] = controls_of(wildcards.seed)
-    encoder = config["encoders"][CONTROL_ENCODER]
-    return as_json({"controls": own, "encoder": encoder, **further})
-
-
-def other_sources(wildcards):
-    """Return the sources that explainers of this one are asked about besides, where there is transfer."""
-    return [name for name in NAMES["transfer_source"] if name != wildcards.source]
-
-
 rule controls:
     input:
         collect(

@@ -1,12 +1,6 @@
 # Registrations with measured causes -> what explainers say of them.
 
 
-def read_by(cause_explainer):
-    """Return the folder of what an explainer of causes reads."""
-    entry = explainer_entry(cause_explainer, CAUSES)
-    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"
-
-
 rule diagnoses:
     input:
         collect(

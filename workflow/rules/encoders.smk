@@ -1,12 +1,6 @@
 # Registrations -> encoders -> embeddings, and their reductions.
 
 
-def encoder_settings(wildcards, changes=None):
-    """Return an encoder's section of the config, with changes and the ICP that a reading repeats."""
-    icp = {"icp": config["registrations"]["icp"]}
-    return as_json(config["encoders"][wildcards.backbone] | (changes or {}) | icp)
-
-
 rule encoders:
     input:
         collect(

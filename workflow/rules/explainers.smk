@@ -2,12 +2,6 @@
 from gpca.experiments.run import explainer_of, files_behind
 
 
-def explainer_settings(wildcards):
-    """Return the settings of an explainer in the config, or of one that is asked about frames alone."""
-    name = explainer_of(wildcards.explainer, NAMES)
-    return config["explainers"].get(name) or REAL_WORLD["explainers"].get(name) or {}
-
-
 rule predictions:
     input:
         collect(

@@ -11,25 +11,6 @@ NEW_SETTINGS = {
 }
 
 
-def encoders_of_others(wildcards):
-    """Return encoders that saw other samples: those of the next seed, and of the next source, where there are any."""
-    seeds, sources = [str(seed) for seed in SEEDS], list(SOURCES)
-    own = (wildcards.source, wildcards.seed)
-    following = {
-        "other_samples": (wildcards.source, following_one(seeds, wildcards.seed)),
-        "other_source": (following_one(sources, wildcards.source), wildcards.seed),
-    }
-    return {
-        name: f"<results>/encoders/{source}/{config['embedding']['encoder']}/seed{seed}.pt"
-        for name, (source, seed) in following.items()
-        if name in config["new_concepts"]["embeddings"] and (source, seed) != own
-    }
-
-
-def following_one(names, name):
-    return names[(names.index(name) + 1) % len(names)]
-
-
 rule learn_new_concepts:
     input:
         registrations="<results>/registrations/{source}/seed{seed}.npz",

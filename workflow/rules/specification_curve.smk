@@ -17,65 +17,6 @@ READING_SECTIONS = {
 }
 
 
-def read_by_readings(wildcards):
-    """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
-    group = GROUPS[wildcards.reading_group]
-    if wildcards.reading_group == FRAME_INPUT:
-        return read_by_frame_input()
-    sources = [name for name in group.sources if name in SOURCES]
-    seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
-    made = "predictions"
-    methods = [name for name in group.methods if name in config["explainers"]]
-    if wildcards.reading_group == "diagnostics":
-        made = "learners"
-        methods = [name for name in group.methods if name in config["learners"]]
-    if not group.sources:
-        sources, seeds, methods = [FRAMES], SEEDS, NAMES["backbone"]
-    patterns = {
-        "registrations": "<results>/registrations/{source}/seed{seed}.npz",
-        "sets": "<results>/shifted/{source}/seed{seed}.npz",
-        "predictions": f"<results>/{made}/{{source}}/{{method}}/seed{{seed}}.csv",
-        "embeddings": "<results>/embeddings/{source}/{method}/seed{seed}.npz",
-    }
-    embedded = [method.replace("-", "/") for method in methods]
-    return {
-        kind: collect(
-            patterns[kind],
-            source=sources,
-            method=embedded if kind == "embeddings" else methods,
-            seed=SEEDS[:1] if kind == "embeddings" else seeds,
-        )
-        for kind in group.reads
-    }
-
-
-def read_by_frame_input():
-    """Return the frames of its seeds with what the protocol's encoder makes of them, and what others start from."""
-    of = {"source": FRAMES, "seed": SEEDS[: READINGS["frame_seeds"]]}
-    return {
-        "registrations": [
-            *collect("<results>/registrations/{source}/seed{seed}.npz", **of),
-            *(PRETRAINED_ON if REAL_WORLD["pretraining"] else []),
-        ],
-        "poses": collect("<results>/poses/{source}/seed{seed}.csv", **of),
-        "predictions": collect(
-            f"<results>/predictions/{{source}}/{BACKBONE}-none/seed{{seed}}.csv", **of
-        ),
-    }
-
-
-def reading_sections(group):
-    """Return the sections of the config that a group reads beside its choices."""
-    if group != FRAME_INPUT:
-        return READING_SECTIONS
-    training = (REAL_WORLD["training"] or {}).get(BACKBONE) or {}
-    of_frames = {"pretraining": REAL_WORLD["pretraining"] or {}, "training": training}
-    encoder = {"encoder": config["encoders"][BACKBONE]}
-    return (
-        {name: READING_SECTIONS[name] for name in ("icp", "gpca")} | of_frames | encoder
-    )
-
-
 rule reading:
     input:
         unpack(read_by_readings),

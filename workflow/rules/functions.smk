@@ -1,0 +1,124 @@
+# Settings and inputs of jobs of single topics, where they take more than a line; the linter wants them apart from rules.
+
+
+def encoder_settings(wildcards, changes=None):
+    """Return an encoder's section of the config, with changes and the ICP that a reading repeats."""
+    icp = {"icp": config["registrations"]["icp"]}
+    return as_json(config["encoders"][wildcards.backbone] | (changes or {}) | icp)
+
+
+def explainer_settings(wildcards):
+    """Return the settings of an explainer in the config, or of one that is asked about frames alone."""
+    name = explainer_of(wildcards.explainer, NAMES)
+    return config["explainers"].get(name) or REAL_WORLD["explainers"].get(name) or {}
+
+
+def controls_of(seed):
+    """Return the controls of a seed: all, but those that need a further encoder for the first seeds alone."""
+    further = int(seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    return [
+        n for n in CONTROLS["controls"] if further or n == UNSEEN or n not in RETRAINED
+    ]
+
+
+def retrained(wildcards):
+    """Return the controls and ways of training for which a seed has encoders of their own."""
+    further = int(wildcards.seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
+    own = [name for name in controls_of(wildcards.seed) if name in RETRAINED]
+    return own + (NAMES["control_encoder"] if further else [])
+
+
+def control_settings(wildcards, **further):
+    own = {name: CONTROLS[name] for name in CONTROLS if name != "explainers"}
+    own["controls"] = controls_of(wildcards.seed)
+    encoder = config["encoders"][CONTROL_ENCODER]
+    return as_json({"controls": own, "encoder": encoder, **further})
+
+
+def other_sources(wildcards):
+    """Return the sources that explainers of this one are asked about besides, where there is transfer."""
+    return [name for name in NAMES["transfer_source"] if name != wildcards.source]
+
+
+def read_by(cause_explainer):
+    """Return the folder of what an explainer of causes reads."""
+    entry = explainer_entry(cause_explainer, CAUSES)
+    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"
+
+
+def encoders_of_others(wildcards):
+    """Return encoders that saw other samples: those of the next seed, and of the next source, where there are any."""
+    seeds, sources = [str(seed) for seed in SEEDS], list(SOURCES)
+    own = (wildcards.source, wildcards.seed)
+    following = {
+        "other_samples": (wildcards.source, following_one(seeds, wildcards.seed)),
+        "other_source": (following_one(sources, wildcards.source), wildcards.seed),
+    }
+    return {
+        name: f"<results>/encoders/{source}/{config['embedding']['encoder']}/seed{seed}.pt"
+        for name, (source, seed) in following.items()
+        if name in config["new_concepts"]["embeddings"] and (source, seed) != own
+    }
+
+
+def following_one(names, name):
+    return names[(names.index(name) + 1) % len(names)]
+
+
+def read_by_readings(wildcards):
+    """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
+    group = GROUPS[wildcards.reading_group]
+    if wildcards.reading_group == FRAME_INPUT:
+        return read_by_frame_input()
+    sources = [name for name in group.sources if name in SOURCES]
+    seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
+    made = "predictions"
+    methods = [name for name in group.methods if name in config["explainers"]]
+    if wildcards.reading_group == "diagnostics":
+        made = "learners"
+        methods = [name for name in group.methods if name in config["learners"]]
+    if not group.sources:
+        sources, seeds, methods = [FRAMES], SEEDS, NAMES["backbone"]
+    patterns = {
+        "registrations": "<results>/registrations/{source}/seed{seed}.npz",
+        "sets": "<results>/shifted/{source}/seed{seed}.npz",
+        "predictions": f"<results>/{made}/{{source}}/{{method}}/seed{{seed}}.csv",
+        "embeddings": "<results>/embeddings/{source}/{method}/seed{seed}.npz",
+    }
+    embedded = [method.replace("-", "/") for method in methods]
+    return {
+        kind: collect(
+            patterns[kind],
+            source=sources,
+            method=embedded if kind == "embeddings" else methods,
+            seed=SEEDS[:1] if kind == "embeddings" else seeds,
+        )
+        for kind in group.reads
+    }
+
+
+def read_by_frame_input():
+    """Return the frames of its seeds with what the protocol's encoder makes of them, and what others start from."""
+    of = {"source": FRAMES, "seed": SEEDS[: READINGS["frame_seeds"]]}
+    return {
+        "registrations": [
+            *collect("<results>/registrations/{source}/seed{seed}.npz", **of),
+            *(PRETRAINED_ON if REAL_WORLD["pretraining"] else []),
+        ],
+        "poses": collect("<results>/poses/{source}/seed{seed}.csv", **of),
+        "predictions": collect(
+            f"<results>/predictions/{{source}}/{BACKBONE}-none/seed{{seed}}.csv", **of
+        ),
+    }
+
+
+def reading_sections(group):
+    """Return the sections of the config that a group reads beside its choices."""
+    if group != FRAME_INPUT:
+        return READING_SECTIONS
+    training = (REAL_WORLD["training"] or {}).get(BACKBONE) or {}
+    of_frames = {"pretraining": REAL_WORLD["pretraining"] or {}, "training": training}
+    encoder = {"encoder": config["encoders"][BACKBONE]}
+    return (
+        {name: READING_SECTIONS[name] for name in ("icp", "gpca")} | of_frames | encoder
+    )
