@@ -89,7 +89,7 @@ def test_every_step_and_rule_file_has_its_stage():
     written = {str(path.relative_to(rules)) for path in rules.rglob("*.smk")}
     steps = {step for name in written for step in re.findall(r'step="gpca\.([\w.]+)"', (rules / name).read_text())}
     assert steps == {name for _, _, modules, _ in stages for name in code(modules)}
-    assert files == written - {"common.smk"}
+    assert files == written - {"common.smk", "functions.smk"}
 
 
 def test_every_folder_of_the_results_that_rules_write_has_its_stage():

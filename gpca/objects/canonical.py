@@ -13,7 +13,7 @@ from gpca import seeds
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import is_name
-from gpca.objects.splits import DRAWN, UNUSED, place_of, read_object_splits
+from gpca.objects.splits import DRAWN, families_and_folds, read_object_splits, without_unused
 from gpca.objects.surface import Surface, instance_of
 from gpca.process.environment import open3d_cloud, require_open3d
 
@@ -171,29 +171,18 @@ def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
 
 
 def write_objects(
-    surfaces: Iterable[Surface],
-    source: str,
-    path: str | Path,
-    n_points: int = 16384,
-    splits: str | Path | None = None,
+    surfaces: Iterable[Surface], source: str, path: str | Path, n_points: int = 16384, splits: Path | None = None
 ) -> None:
     """Write the canonical clouds of a source to an objects npz (read it with :class:`ObjectClouds`).
 
-    Args:
-        splits: a file that says which objects are alike and unseen together (:mod:`gpca.objects.splits`).
+    A file of `splits` says which objects are alike (:mod:`gpca.objects.splits`).
 
     Raises:
         InputError: no object at all, two of one name, or a fault in one of them; nothing is written then.
     """
     places = read_object_splits(splits, source) if splits else {}
-    if not places:
-        sample_objects(surfaces, source, n_points).save(path, source)
-        return
-    used = (surface for surface in surfaces if place_of(surface.name, places).role != UNUSED)
-    objects = sample_objects(used, source, n_points)
-    of_objects = [places[name] for name in objects.names]
-    families, folds = (tuple(getattr(place, name) for place in of_objects) for name in ("cluster", "fold"))
-    replace(objects, families=families, folds=folds).save(path, source)
+    objects = sample_objects(without_unused(surfaces, places), source, n_points)
+    replace(objects, **families_and_folds(objects.names, places)).save(path, source)
 
 
 def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:

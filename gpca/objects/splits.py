@@ -12,14 +12,15 @@ The role is ``development`` (what settings are chosen by), ``evaluation`` or, of
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gpca.errors import InputError
 from gpca.io.csv_file import read_csv
+from gpca.objects.surface import Surface
 from gpca.seeds import generator
 
 DRAWN = -1  # the fold of what no file deals into folds
@@ -77,13 +78,26 @@ def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
     return places
 
 
-def place_of(name: str, places: Mapping[str, Place]) -> Place:
-    """Return an object's place; InputError where the file names others of its source, but not this one."""
-    if name not in places:
-        raise InputError(
-            f"object '{name}'", "is in no split", "add it to the file of objects, or set splits.objects: null"
-        )
-    return places[name]
+def without_unused(surfaces: Iterable[Surface], places: Mapping[str, Place]) -> Iterator[Surface]:
+    """Yield the surfaces of objects that have a use; all where there are no places.
+
+    Raises:
+        InputError: the file names objects of the source, but not this one.
+    """
+    for surface in surfaces:
+        if places and surface.name not in places:
+            remedy = "add it to the file of objects, or set splits.objects: null"
+            raise InputError(f"object '{surface.name}'", "is in no split", remedy)
+        if not places or places[surface.name].role != UNUSED:
+            yield surface
+
+
+def families_and_folds(names: Iterable[str], places: Mapping[str, Place]) -> dict[str, Any]:
+    """Return ``families`` and ``folds`` of objects; nothing where there are no places."""
+    if not places:
+        return {}
+    of_objects = [places[name] for name in names]
+    return {"families": tuple(of.cluster for of in of_objects), "folds": tuple(of.fold for of in of_objects)}
 
 
 def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:
