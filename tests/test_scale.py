@@ -64,7 +64,7 @@ def test_a_larger_run_has_as_many_of_each_and_passes_the_check():
     sources = check(config)
     assert (len(sources), len(config["seeds"]), len(config["explainers"])) == (7, 4, 20)
     assert "transfer" not in config["controls"]["controls"]
-    assert {entry["kind"] for entry in sources.values()} == {"procedural"}
+    assert {entry["kind"] for entry in sources.values()} == {"bop", "mesh_folder"}
     with pytest.raises(InputError, match="--sources 2: cannot be planned; give 3 to"):
         scale.larger_config(2, 4, 20)
 

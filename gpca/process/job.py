@@ -138,9 +138,10 @@ def as_process(name: str, function: Callable[[], int | None]) -> int:
 @contextmanager
 def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
     """Give the block a `status` to set; the faults that end in one line set it themselves."""
-    process = SimpleNamespace(status=0)
+    process, begun = SimpleNamespace(status=0), False
     try:
         with certain_interrupts(), standard_streams():
+            begun = True
             yield process
     except (InputError, OSError) as fault:
         say(f"{prefix}{fault}")
@@ -151,6 +152,8 @@ def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
     except KeyboardInterrupt:
         say(f"{prefix}stopped; repeat the command to continue")
         process.status = 130
+    if not begun:  # the streams themselves are at fault
+        sys.exit(process.status)
 
 
 def keep_freed_memory() -> None:
