@@ -1,6 +1,7 @@
 """Make the folders ycb, ycbv, lm, lmo and estimates of this folder, and SHA256SUMS, from a folder of the originals.
 
     python data/make_data.py ORIGINALS
+    python data/make_data.py --checksums    # SHA256SUMS alone, after a change to a text or a split
 
 ORIGINALS has the layout that the datasheet (README.md) describes under "Collection". What is written depends on it
 alone, to the byte. Hand-written files (README.md, VERSION, splits/, the licences) stay as they are.
@@ -16,7 +17,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import open3d as o3d
 import trimesh
 from PIL import Image
 
@@ -103,6 +103,8 @@ def write_scans(scans: list[Path], folder: Path) -> None:
 
 def decimated(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Return a mesh of at most `DEVELOPMENT_FACES` faces, by quadric decimation (Garland and Heckbert 1997)."""
+    import open3d as o3d  # here, as the checksums do without
+
     vertices, faces = o3d.utility.Vector3dVector(mesh.vertices), o3d.utility.Vector3iVector(mesh.faces.astype(np.int32))
     fewer = o3d.geometry.TriangleMesh(vertices, faces).simplify_quadric_decimation(DEVELOPMENT_FACES)
     return trimesh.Trimesh(np.asarray(fewer.vertices), np.asarray(fewer.triangles), process=False)
@@ -166,6 +168,9 @@ def is_left_out(path: Path) -> bool:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "bop").is_dir():
+    if sys.argv[1:] == ["--checksums"]:
+        write_checksums()
+    elif len(sys.argv) == 2 and (Path(sys.argv[1]) / "bop").is_dir():
+        main(Path(sys.argv[1]))
+    else:
         sys.exit("usage: python data/make_data.py ORIGINALS, a folder with bop/ and ycb/ (README.md, Collection)")
-    main(Path(sys.argv[1]))

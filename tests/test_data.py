@@ -2,6 +2,9 @@
 
 import hashlib
 import re
+import shutil
+import subprocess
+import sys
 from collections import defaultdict
 from pathlib import Path
 
@@ -45,6 +48,14 @@ def test_every_file_is_listed_with_its_checksum():
     assert {path.relative_to(DATA).as_posix() for path in paths} - beside == set(listed())
     assert all(hashlib.sha256((DATA / name).read_bytes()).hexdigest() == sha256 for name, sha256 in listed().items())
     assert sum(path.stat().st_size for path in paths) < LARGEST_BYTES
+
+
+def test_checksums_can_be_renewed_alone(tmp_path):
+    (tmp_path / "part").mkdir()
+    (tmp_path / "part/mesh.ply").write_bytes(b"ply")
+    shutil.copy(DATA / "make_data.py", tmp_path)
+    subprocess.run([sys.executable, tmp_path / "make_data.py", "--checksums"], check=True)
+    assert (tmp_path / "SHA256SUMS").read_text() == f"{hashlib.sha256(b'ply').hexdigest()}  part/mesh.ply\n"
 
 
 @pytest.mark.parametrize("part", PARTS)
