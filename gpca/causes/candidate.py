@@ -33,6 +33,7 @@ class Candidate:
         severity: by name, 0 where not applied.
         model_at_truth: (P, 3) the model where no pose error is, if it is rendered where the registration starts; None
             where it is the same everywhere.
+        toward_hidden: (3,) unit vector along which the surface was cut off; None where no half-space has cut it.
     """
 
     applied: np.ndarray
@@ -43,6 +44,7 @@ class Candidate:
     T_init: np.ndarray
     severity: dict[str, float]
     model_at_truth: np.ndarray | None = None
+    toward_hidden: np.ndarray | None = None
 
     def observed(self, causes: tuple[int, ...]) -> np.ndarray:
         """Return the observed cloud with these of the applied causes."""
@@ -82,7 +84,8 @@ def draw_candidate(
     jitter = random.normal(scale=severity["noise"], size=clean.shape)
     anywhere = random.uniform(-0.5, 0.5, size=clean.shape)
     is_outlier = random.random(len(clean)) < severity["outliers"]
-    along = (clean * random_direction(random)).sum(axis=1)
+    toward_hidden = random_direction(random)
+    along = (clean * toward_hidden).sum(axis=1)
     cause_of = {"noise": NOISE, "outliers": NOISE, "rotation_rad": POSE, "translation": POSE, "crop": OVERLAP}
     return Candidate(
         applied=applied,
@@ -92,4 +95,5 @@ def draw_candidate(
         kept=within_half_space(along, severity["crop"], FEWEST_POINTS),
         T_init=misplacement(severity["rotation_rad"], severity["translation"], random),
         severity={name: value if applied[cause_of[name]] else 0.0 for name, value in severity.items()},
+        toward_hidden=toward_hidden,
     )

@@ -134,6 +134,20 @@ class Replay:
     observed: list[np.ndarray]
 
 
+def surface_of(objects: ObjectClouds, causes: Causes, row: int) -> np.ndarray:
+    """Return the points (N, 3) of a sample's object, in diameters."""
+    index = int(causes.registrations.object_index[row])
+    return objects.points(index).astype(np.float64) / float(objects.diameters_m[index])
+
+
+def candidate_of(
+    causes: Causes, row: int, surface: np.ndarray, source: str, seed: int, settings: CauseSettings
+) -> Candidate:
+    """Return the candidate that a sample is, drawn again from the points of its object and the same settings."""
+    random = generator(source, seed, "causes", str(causes.registrations.split[row]), int(causes.candidate[row]))
+    return draw_candidate(surface, draw_applied(settings, random), settings, random)
+
+
 def replay(objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings) -> Replay:
     """Return the results of ICP under each subset from the initial pose itself.
 
@@ -141,11 +155,7 @@ def replay(objects: ObjectClouds, causes: Causes, row: int, source: str, seed: i
         InputError: the objects or the settings are not those that the sample was drawn with.
     """
     registrations = causes.registrations
-    split, number = str(registrations.split[row]), int(causes.candidate[row])
-    index = int(registrations.object_index[row])
-    surface = objects.points(index).astype(np.float64) / float(objects.diameters_m[index])
-    random = generator(source, seed, "causes", split, number)
-    candidate = draw_candidate(surface, draw_applied(settings, random), settings, random)
+    candidate = candidate_of(causes, row, surface_of(objects, causes, row), source, seed, settings)
     registrar = Registrar(candidate, settings)
     observed = []
     for present in SUBSETS:

@@ -46,6 +46,13 @@ def test_each_cause_changes_what_it_should_and_nothing_else(candidates):
     assert np.array_equal(candidate.start((1,)), candidate.T_init)
 
 
+def test_the_surface_is_cut_off_along_the_direction_that_it_says(candidates):
+    for candidate in candidates:
+        along = candidate.clean @ candidate.toward_hidden
+        lost = np.delete(along, candidate.kept)
+        assert along[candidate.kept].max() <= lost.min()
+
+
 def test_noise_is_as_strong_as_it_says_and_outliers_are_few(candidates):
     for candidate in candidates:
         offset = np.abs(candidate.noisy - candidate.clean)
