@@ -19,7 +19,7 @@ COLUMNS = ("split", "object", "group", "several", "kept", "refused")
 UNSEEN: Group = ("any", False)  # of a candidate that was not registered
 REMEDIES = {
     NOMINAL: "lower causes.severities, raise causes.limits.nominal",
-    BORDERLINE: "raise causes.limits.failed",
+    BORDERLINE: "raise success.error",
     "noise": "raise causes.severities.noise or causes.severities.outliers, lower causes.points",
     "pose": "raise causes.severities.rotation_deg or causes.severities.translation",
     "overlap": "raise causes.severities.crop",

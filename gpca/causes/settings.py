@@ -54,7 +54,7 @@ class Limits:
 
     Attributes:
         nominal: mean error below which nothing is wrong.
-        failed: mean error above which a registration has failed.
+        failed: mean error above which a registration has failed: the config's ``success.error``.
         cause: part of the error above which a concept is one of the causes.
         clean: share of the clean pairs whose uncertainty is no larger than a nominal registration's may be.
     """

@@ -8,6 +8,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.config.layers import with_defaults, with_types
 from gpca.config.leave_out import check_left_out, names_left_out, without_false
 from gpca.config.schema import whole_config
+from gpca.config.success import with_success
 from gpca.encoders.registry import require_backbone
 from gpca.encoders.settings import require_draws
 from gpca.errors import InputError, require_names, with_key
@@ -33,14 +34,15 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
         of_module: it is what another workflow gives this one as a module, so that the defaults are not below it yet.
 
     Returns:
-        the config of this run, without what it leaves out; the sources that :func:`check` returns.
+        the config of this run, without what it leaves out, with its definition of success wherever it is needed; the
+        sources that :func:`check` returns.
 
     Raises:
         InputError: what :func:`check` raises.
     """
     whole = with_types(with_defaults(config) if of_module else config, command_line)
     sources = check(whole)
-    return without_false(whole), sources
+    return with_success(without_false(whole)), sources
 
 
 def check(config: dict) -> dict[str, dict]:
@@ -59,6 +61,7 @@ def check(config: dict) -> dict[str, dict]:
     require_plain(config, "config key")
     whole = without_false(config)
     read_settings(whole_config(), whole, "config key")
+    whole = with_success(whole)
     check_left_out(config)
 
     def left_out(key: str) -> set[str]:

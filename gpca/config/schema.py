@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from gpca.alignment.success import SuccessSettings
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.comparison.published import UNITS
@@ -110,6 +111,7 @@ class SharedSections:
     seeds: Distinct[Annotated[int, Bounds(minimum=0, maximum=2**32 - 1)]]
     objects: Objects
     splits: Splits
+    success: SuccessSettings
     registrations: Annotated[dict, part_of(RegistrationSettings)]
     encoders: Annotated[dict[Name, NamedEncoder], Field(min_length=1)]
     reductions: Reductions

@@ -93,7 +93,7 @@ def test_what_is_off_when_clean_is_wanted_only_where_it_has_a_share():
         ),
         (
             ["borderline"],
-            "borderline samples; raise causes.limits.failed, or move part of causes.shares.borderline to anoth",
+            "borderline samples; raise success.error, or move part of causes.shares.borderline to anoth",
         ),
     ],
 )

@@ -53,8 +53,9 @@ STEP_OPTIONS = {
         "--settings": {
             "estimator_pairs": {
                 "methods": {"point_to_point": 2}, "train": 8, "train_starts": 7, "points": 64, "starts": 20,
-                "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6, "failed": 0.03,
+                "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6,
             },
+            "success": {"error": 0.03},
             "estimators": {"brossard": {}, "cello": {"steps": 2}},
         },
         "--seeds": 0, "--estimators": ["brossard", "cello"], "--objects": "objects.npz", "--causes": "causes.npz",
@@ -73,7 +74,7 @@ STEP_OPTIONS = {
     },
     "register_methods": COMMON | {
         "--settings": {
-            "method_pairs": {"samples": 3, "points": 64, "success": 0.02, "global_start": "fgr"},
+            "method_pairs": {"samples": 3, "points": 64, "global_start": "fgr"},
             "methods": {"point_to_point": {}, "fgr": {}},
         },
         "--seeds": 0, "--methods": ["point_to_point", "fgr"], "--objects": "objects.npz",

@@ -50,7 +50,10 @@ rule estimate:
     params:
         step="gpca.experiments.estimators.step",
         settings=as_json(
-            {name: config[name] for name in ("estimator_pairs", "estimators")}
+            {
+                name: config[name]
+                for name in ("estimator_pairs", "estimators", "success")
+            }
         ),
         estimators=NAMES["estimator"],
         seeds=SEEDS,

@@ -78,7 +78,7 @@ EXPERIMENT = Experiment(
             "control_severities.csv",
             "gpca.experiments.controls.severity:collect",
             {"prediction_files": CONTROLLED, "sample_files": "control_samples/{source}/seed{control_seed}.csv"},
-            {"severities": "registrations.severities", "bins": "controls.bins", "success": "controls.success"},
+            {"severities": "registrations.severities", "bins": "controls.bins", "success": "success.error"},
         ),
     ),
     names=names,

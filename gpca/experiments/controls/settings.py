@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, Different, Distinct, PositiveShare
+from gpca.settings import Bounds, Count, Different, Distinct
 
 PAPER = "paper"  # the protocol itself, which every control is compared with
 Control = Literal[
@@ -43,7 +43,6 @@ class ControlSettings:
         seeds: how many of the run's seeds are used, from the first.
         draw_points: range of the random number of points of a cloud where density is matched.
         folds: the number of folds of a source's objects, of which one is unseen.
-        success: ADD(-S) below which a registration has succeeded, relative to the diameter.
         bins: the number of equally wide bins of each severity.
     """
 
@@ -53,7 +52,6 @@ class ControlSettings:
     seeds: Count = 3
     draw_points: tuple[Points, Points] = (200, 512)
     folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3
-    success: PositiveShare = 0.02
     bins: Annotated[int, Bounds(minimum=1, maximum=20)] = 4
 
     def __post_init__(self) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 from gpca.alignment.methods.registry import method_entry, methods, require_local
 from gpca.errors import InputError, with_key
 from gpca.experiments.estimators.covariances import REFERENCE
 from gpca.experiments.estimators.settings import EstimatorPairSettings
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
+from gpca.settings import part_of
 from gpca.uncertainty.estimators.registry import estimator_entry, estimators, require_estimator_settings
 
 
@@ -38,9 +39,10 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     }
 
 
+Pairs = Annotated[dict, part_of(EstimatorPairSettings, without=("failed",))]  # success.error says what has failed
 EXPERIMENT = Experiment(
     name="estimators",
-    sections={"estimators": ByName, "estimator_pairs": EstimatorPairSettings},
+    sections={"estimators": ByName, "estimator_pairs": Pairs},
     tidy=(
         Tidy(
             "estimators.csv",

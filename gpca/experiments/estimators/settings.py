@@ -23,7 +23,7 @@ class EstimatorPairSettings:
         starts: of the reference, Monte-Carlo.
         start_rotation_deg, start_translation: root mean square angle and length of all starts' offsets.
         floor: variance that is added to every covariance before it is judged; a spread below it counts as none.
-        failed: error from which a registration has failed, ADD or ADD-S in diameters.
+        failed: error from which a registration has failed, ADD or ADD-S in diameters: the config's ``success.error``.
     """
 
     methods: dict[str, Annotated[int, Bounds(minimum=1, maximum=100_000)]]

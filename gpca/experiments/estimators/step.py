@@ -16,7 +16,7 @@ from gpca.process.provenance import record_provenance
 def run(job: Job) -> None:
     """Ask every estimator, seed by seed."""
 
-    settings = EstimatorPairSettings(**job.section("estimator_pairs"))
+    settings = EstimatorPairSettings(**job.section("estimator_pairs"), failed=job.section("success")["error"])
     for name in settings.methods:
         require_local(name)
     estimators = job.by_name("estimators", job.estimators)

@@ -42,6 +42,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "methods": {name: {"title": entry.title, "is_global": entry.is_global} for name, entry in entries.items()},
         "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
         "global_start": config["method_pairs"]["global_start"],
+        "success_curve": list(config["success"]["curve"]),
     }
 
 
@@ -53,7 +54,7 @@ EXPERIMENT = Experiment(
             "registration_methods.csv",
             "gpca.experiments.registration_methods.metrics:collect_trials",
             {"files": "methods/{source}/{method}/seed{seed}.csv"},
-            {"severities": "registrations.severities"},
+            {"severities": "registrations.severities", "success": "success"},
         ),
     ),
     names=names,

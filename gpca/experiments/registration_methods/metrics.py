@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpca.alignment.success import SuccessSettings, success_within
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 INITIAL, NO_START = "initial", "none"  # where a registration starts, or the name of a global method
 SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
 MEASURED = ("add_relative", "rotation_error_rad", "translation_error")
-COLUMNS = ("sample", "concept", "start", "success", "failure", *SEVERITY_COLUMNS, *MEASURED)
+COLUMNS = ("sample", "concept", "start", "failure", *SEVERITY_COLUMNS, *MEASURED)
 TABLE = "registration_methods"  # `table` of the tidy rows reads this
 TIMED = "method_"  # with a method behind it, the folder of its seconds
 BINS = ("low", "middle", "high")  # thirds of what is drawn
@@ -36,24 +37,28 @@ def row_name(method: str, start: str) -> str:
 
 
 def read_trials(path: str | Path) -> pd.DataFrame:
-    """Read a file of the step ``register_methods``: `success` as booleans, numbers as numbers, the rest as text."""
+    """Read a file of the step ``register_methods``: numbers as numbers, the rest as text."""
     rows = read_csv(path, COLUMNS, others=("object", "symmetric", "fitness", "inlier_rmse"))
     for name in (*SEVERITY_COLUMNS, *MEASURED):
         rows[name] = numbers(path, rows, name)
-    return rows.assign(success=rows["success"] == "True")
+    return rows
 
 
-def collect_trials(files: Iterable[str | Path], severities: Mapping[str, Iterable[float]]) -> pd.DataFrame:
+def collect_trials(
+    files: Iterable[str | Path], severities: Mapping[str, Iterable[float]], success: Mapping[str, Any]
+) -> pd.DataFrame:
     """Return the tidy metrics of files named `…/{source}/{method}/seed{seed}.csv`; results/README.md lists them.
 
     Their `method` is named by :func:`row_name`; their `concept` is a cause, a cause and a bin, or all.
 
     Args:
         severities: the config's ranges, from which the registrations were drawn.
+        success: the config's section.
 
     Raises:
         InputError: no files, a name of another form, a missing column, no rows, an unknown cause.
     """
+    limits = SuccessSettings(**success)
     records = []
     for path in files:
         source, method, seed = source_method_seed(path)
@@ -64,8 +69,11 @@ def collect_trials(files: Iterable[str | Path], severities: Mapping[str, Iterabl
                 of_concept = of_start[chosen[of_start.index]]
                 if of_concept.empty:
                     continue
-                for metric, value in _metrics(of_concept).items():
-                    records.append((TABLE, source, row_name(method, start), metric, concept, seed, float(value)))
+                values = _metrics(of_concept, limits.error)
+                if concept == ALL:
+                    values |= {success_within(limit): _success(of_concept, limit) for limit in limits.curve}
+                row = (TABLE, source, row_name(method, start))
+                records += [(*row, metric, concept, seed, float(value)) for metric, value in values.items()]
     return tidy(records, "registration methods")
 
 
@@ -117,9 +125,14 @@ def share_of_milder(rows: pd.DataFrame, concept: str, severities: Mapping[str, I
     return np.where(mean_S < 0.5, 2 * mean_S**2, 1 - 2 * (1 - mean_S) ** 2)  # of the mean of two uniform numbers
 
 
-def _metrics(rows: pd.DataFrame) -> dict[str, float]:
+def _success(rows: pd.DataFrame, limit: float) -> float:
+    """Return the share with an error below a limit; a method that gave up has no success."""
+    return ((rows["failure"] == "") & (rows["add_relative"] < limit)).mean()
+
+
+def _metrics(rows: pd.DataFrame, limit: float) -> dict[str, float]:
     return {
-        "success": rows["success"].mean(),
+        "success": _success(rows, limit),
         "failed": (rows["failure"] != "").mean(),
         "add": rows["add_relative"].mean(),
         "rotation_deg": np.rad2deg(rows["rotation_error_rad"].mean()),

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
+from gpca.alignment.success import success_within
 from gpca.attribution.metrics import ALL
 from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, bin_name, row_name
 from gpca.objects.title import stand_in_clause
@@ -68,6 +69,30 @@ def table11_registration(
     )
 
 
+def table11_thresholds(
+    metrics: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    methods: Mapping[str, Mapping],
+    global_start: str,
+    left_out: Mapping[str, str],
+    curve: Iterable[float],
+) -> Table:
+    """Return successes by the error below which a registration is one: starts × methods by limits of `curve`."""
+    table = _table("table11_thresholds")
+    columns = {success_within(limit): Column(f"{100 * limit:g} % d (%)") for limit in curve}
+    for labels, name in _rows(methods, global_start):
+        table.add_row(
+            labels, {key: cell_over_sources(metrics, metrics, sources, name, key, ALL, 100) for key in columns}
+        )
+    table.compare_down(columns, same=1)
+    return table.build(
+        caption="Registrations that succeed, by the error that is allowed" + stand_in_clause(sources.values()),
+        column_head="error below",
+        columns=columns,
+        footnotes=_notes(table, metrics, sources, left_out),
+    )
+
+
 def table11_severity(
     metrics: pd.DataFrame,
     sources: Mapping[str, Mapping],
@@ -123,7 +148,7 @@ def _notes(
     pairs = cell_over_sources(metrics, metrics, sources, row_name(method, start), "success", ALL, 1)
     per_seed = pairs.test_samples // pairs.seeds if pairs else 0
     notes = [
-        f"{mean_over(table.most_seeds(), per_seed)}. A success is off by less than the config's `method_pairs.success` "
+        f"{mean_over(table.most_seeds(), per_seed)}. A success is off by less than the config's `success.error` "
         "of the diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own "
         "account is no success. Bold: best of a start."
     ]

@@ -38,7 +38,7 @@ def try_methods(
 ) -> dict[str, pd.DataFrame]:
     """Return for each method a row per pair and start, with the seconds that it took.
 
-    A method that fails has its reason in the row, and no success. Normals are estimated beforehand, as the same ones
+    A method that fails has its reason in the row. Normals are estimated beforehand, as the same ones
     serve all methods; what a method loads or compiles at its first call is loaded before the first pair.
 
     Args:
@@ -78,9 +78,8 @@ def try_methods(
         for name, method in made.items():
             for started_at, outcome, seconds in _attempts(name, method, pair, start, coarse):
                 errors = judge(outcome.T_target_source, T_true)
-                success = outcome.converged and errors["add_relative"] < settings.success
                 of_outcome = {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
-                row_of_trial = known | {"start": started_at, "success": success} | errors | of_outcome
+                row_of_trial = known | {"start": started_at} | errors | of_outcome
                 records[name].append(row_of_trial | {"seconds": seconds})
     return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
 

@@ -18,6 +18,7 @@ from gpca.experiments.registration_methods.metrics import (
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 
+SUCCESS = {"error": 0.03, "curve": [0.005, 0.03, 0.5]}
 RANGES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05, 0.30], "crop": [0.2, 0.6]}
 
 
@@ -31,7 +32,7 @@ def trials(starts=("initial", "fgr"), **changes):
         for start in starts:
             good = sample < 3 and start == starts[0]
             errors = dict(zip(MEASURED, (0.01, 0.1, 0.02) if good else (0.3, 1.1, 0.2), strict=True))
-            known = {"sample": sample, "concept": CONCEPTS[sample % 3], "start": start, "success": good}
+            known = {"sample": sample, "concept": CONCEPTS[sample % 3], "start": start}
             told = known | (mild if sample < 3 else severe) | errors
             records.append(told | {"failure": "" if good else "lost, alas"})
     return pd.DataFrame(records).assign(**changes)
@@ -56,13 +57,15 @@ def value(metrics, **wanted):
 
 
 def test_every_start_cause_and_bin_has_its_metrics(written):
-    metrics = collect_trials([written(trials(), seed=seed) for seed in (0, 1)], RANGES)
+    metrics = collect_trials([written(trials(), seed=seed) for seed in (0, 1)], RANGES, SUCCESS)
     assert tuple(metrics.columns) == TIDY
     assert set(metrics["method"]) == {"gicp", "fgr+gicp"}
     first = metrics[metrics["seed"] == 1]
     told = {"method": "gicp", "concept": "all"}
     assert value(first, metric="success", **told) == pytest.approx(0.5)
     assert value(first, metric="failed", **told) == pytest.approx(0.5)
+    # What gave up is no success, however large an error is allowed.
+    assert [value(first, metric=f"success_{limit}", **told) for limit in ("0.5", "3", "50")] == [0, 0.5, 0.5]
     assert value(first, metric="add", **told) == pytest.approx(0.155)
     assert value(first, metric="rotation_deg", **told) == pytest.approx(np.rad2deg(0.6))
     assert value(first, metric="translation", **told) == pytest.approx(0.11)
@@ -76,7 +79,7 @@ def test_every_start_cause_and_bin_has_its_metrics(written):
 
 
 def test_a_global_method_has_one_row_of_its_name(written):
-    metrics = collect_trials([written(trials(("none",)), "fgr")], RANGES)
+    metrics = collect_trials([written(trials(("none",)), "fgr")], RANGES, SUCCESS)
     assert set(metrics["method"]) == {"fgr"}
     assert [row_name("gicp", start) for start in ("initial", "none", "teaser")] == ["gicp", "gicp", "teaser+gicp"]
 
@@ -109,7 +112,7 @@ def test_seconds_are_means_of_each_start(tmp_path):
 
 def test_the_file_is_read_as_it_was_written(written):
     rows = read_trials(written(trials()))
-    assert rows["success"].tolist() == trials()["success"].tolist()
+    assert rows["add_relative"].tolist() == trials()["add_relative"].tolist()
     assert set(rows["failure"]) == {"", "lost, alas"}
     assert rows[list(SEVERITY_COLUMNS)].to_numpy() == pytest.approx(
         trials()[list(SEVERITY_COLUMNS)].to_numpy(), abs=1e-6
@@ -118,11 +121,11 @@ def test_the_file_is_read_as_it_was_written(written):
 
 def test_what_is_no_number_is_named(written):
     with pytest.raises(InputError, match="column 'add_relative' contains values that are not finite numbers"):
-        collect_trials([written(trials(add_relative=np.nan))], RANGES)
+        collect_trials([written(trials(add_relative=np.nan))], RANGES, SUCCESS)
 
 
 def test_no_files_are_a_fault(tmp_path):
     with pytest.raises(InputError, match="no files were given"):
-        collect_trials([], RANGES)
+        collect_trials([], RANGES, SUCCESS)
     with pytest.raises(InputError, match="no files were given"):
         collect_seconds([])

@@ -4,7 +4,7 @@ import pytest
 
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
-from gpca.experiments.registration_methods.tables import table11_registration, table11_severity
+from gpca.experiments.registration_methods.tables import table11_registration, table11_severity, table11_thresholds
 from gpca.pairs.perturbation import CONCEPTS
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
@@ -74,6 +74,15 @@ def test_causes_and_severities_have_columns_and_their_pairs_are_counted(metrics)
     assert list(table.columns)[:3] == ["noise_low", "noise_middle", "noise_high"]
     assert (0, "noise_low") in table.cells and (0, "noise_middle") not in table.cells
     assert "Pairs of all seeds, by column: 120, 0, 120, 120, 0, 120, 120, 0, 120." in table.markdown()
+
+
+def test_allowing_larger_errors_has_a_column_each(metrics):
+    own = records("success_10", lambda *_: 0.9) + [row for row in records("test_samples", samples) if row[4] == "all"]
+    for row in (row for row in metrics.itertuples(index=False) if row.metric == "success"):
+        own.append(tuple(row))
+    table = table11_thresholds(tidy(own, "methods"), SOURCES, METHODS, "fgr", {}, [0.05, 0.1])
+    assert list(table.columns) == ["success_5", "success_10"]
+    assert table.cells[0, "success_10"].mean == pytest.approx(92) and (0, "success_5") not in table.cells
 
 
 def test_what_is_left_out_and_what_stands_in_is_said(metrics, seconds):
