@@ -154,6 +154,7 @@ def attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, di
     metrics = {
         "accuracy": {ALL: accuracy(*judged)} | concept_accuracy(*judged, concepts),
         "test_samples": {ALL: len(test)} | samples,
+        "clusters": {ALL: test["cluster"].nunique()} | test.groupby("concept_true")["cluster"].nunique().to_dict(),
         "abstention_rate": {ALL: test["abstained"].mean()},
         "permuted_accuracy": {ALL: permuted_accuracy(counts)},
         "icp_calls": {ALL: test["icp_calls"].mean()},

@@ -89,4 +89,5 @@ def _bounds_of(counterpart: Counterpart, rows, weights_B_N: np.ndarray) -> tuple
     hits_N = ((rows["concept_predicted"] == named) & ~rows["abstained"]).to_numpy(float)
     weights_B_n = weights_B_N[:, of_concept.to_numpy()]
     with np.errstate(invalid="ignore"):  # a draw without any sample of the concept has no share
-        return bounds(weights_B_n @ hits_N[of_concept.to_numpy()] / weights_B_n.sum(axis=1))
+        share_B = weights_B_n @ hits_N[of_concept.to_numpy()] / weights_B_n.sum(axis=1)
+    return bounds(share_B, weights_B_n)

@@ -24,7 +24,7 @@ KINDS = (
     *(("*", pattern, "nats") for pattern in ("kl_*", "nne", "nees")),
     ("tables/table12_*", "auroc_failed", "share"),
     *(("*", pattern, "nats") for pattern in ("*nll*", "*elbo*")),
-    *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "delay", "calls", "parameters")),
+    *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "clusters", "delay", "calls", "parameters")),
     *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*", "*_wrong")),
     *(("*recovery.csv", counted, "count") for counted in ("episodes", "tries", "acted_first", "actions")),
     *(("tables/table5_*", pattern, "share") for pattern in ("*aurc", "augrc", "brier")),

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights, wilson_interval
+from gpca.attribution.confidence import bounds, independent, pigeonhole_weights, wilson_interval
 from gpca.seeds import generator
 
 SEED = np.repeat([100, 101], 6)
@@ -26,6 +26,28 @@ def test_bounds_are_those_of_the_draws_that_have_a_value():
     values = np.append(np.arange(101.0), np.nan)
     assert bounds(values) == pytest.approx((2.5, 97.5))
     assert np.isnan(bounds(np.array([np.nan]))).all()
+
+
+def test_a_share_that_all_draws_agree_on_has_wilsons_interval_of_its_clusters():
+    weights = draws("tiny")
+    assert independent(weights) == 2 * 3  # an object counts once in each seed, with two samples of each
+    assert independent(weights[:, OBJECT == "cup"]) == 2
+    ones = np.ones(len(weights))
+    assert bounds(ones) == (1, 1)
+    assert bounds(ones, weights) == wilson_interval(6, 6)
+    assert bounds(0 * ones, weights) == wilson_interval(0, 6)
+    assert bounds(0.5 * ones, weights) == wilson_interval(3, 6)
+    varied = np.linspace(0.5, 1, len(weights))
+    assert bounds(varied, weights) == bounds(varied)
+
+
+def test_a_difference_that_all_draws_agree_on_has_a_width_too():
+    weights = draws("tiny")
+    ones, most = np.ones(len(weights)), wilson_interval(0, 6)[1]
+    assert bounds(0 * ones, weights, difference=True) == (-most, most)
+    low, high = wilson_interval(3, 6)
+    assert bounds(0.5 * ones, weights, difference=True) == (low, high)
+    assert bounds(-0.5 * ones, weights, difference=True) == (-high, -low)
 
 
 def test_the_wilson_interval_is_that_of_the_literature():

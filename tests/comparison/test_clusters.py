@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.predictions import PREDICTION_COLUMNS
 from gpca.comparison.clusters import cluster_intervals, folder_behind, folders_behind
 from gpca.comparison.values import value_of_run
@@ -43,7 +44,8 @@ def test_objects_that_differ_make_the_interval_wide(tmp_path):
     alike = predictions(tmp_path / "alike", dict.fromkeys("abcdef", 0.75))
     apart = predictions(tmp_path / "apart", dict(zip("abcdef", (1, 1, 1, 0.5, 0.5, 0.5), strict=True)))
     low, high = cluster_intervals([number()], alike)[ACCURACY]
-    assert low == high == pytest.approx(0.75)  # no object and no seed is unlike the others
+    # No object and no seed is unlike the others, so that six objects in five seeds count.
+    assert (low, high) == pytest.approx(wilson_interval(0.75 * 30, 30))
     low, high = cluster_intervals([number()], apart)[ACCURACY]
     assert 0.5 <= low < 0.6
     assert 0.9 < high <= 1.0
@@ -54,7 +56,7 @@ def test_objects_that_differ_make_the_interval_wide(tmp_path):
 
 def test_confusions_are_shares_too(tmp_path):
     files = predictions(tmp_path, dict.fromkeys("abc", 0.75))
-    assert cluster_intervals([number(counterpart=TAKEN)], files)[TAKEN] == pytest.approx((0.25, 0.25))
+    assert cluster_intervals([number(counterpart=TAKEN)], files)[TAKEN] == pytest.approx(wilson_interval(3.75, 15))
     other = replace(TAKEN, concept="noise")  # of which there is no sample
     assert np.isnan(cluster_intervals([number(counterpart=other)], files)[other]).all()
 
@@ -65,12 +67,12 @@ def test_of_learners_the_set_that_is_named_counts(tmp_path):
     beyond = replace(within, table="learners/severity")
     found = cluster_intervals([number(counterpart=within), number(counterpart=beyond)], files)
     assert found[within] == (0.5, 1.0)
-    assert found[beyond] == (0.0, 0.0)
+    assert found[beyond] == wilson_interval(0, 10)
 
 
 def test_views_of_one_instance_are_one_object(tmp_path):
     files = predictions(tmp_path, {"cup_1_1": 1.0, "cup_1_2": 0.0})
-    assert cluster_intervals([number()], files)[ACCURACY] == pytest.approx((0.5, 0.5))
+    assert cluster_intervals([number()], files)[ACCURACY] == pytest.approx(wilson_interval(2.5, 5))
 
 
 def test_what_is_no_share_of_samples_has_none(tmp_path):

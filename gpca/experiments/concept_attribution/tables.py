@@ -128,8 +128,10 @@ def _cell(
     of_cell = rows_where(metrics, source=source, method=explainer, concept=concept)
     values_R = rows_where(of_cell, metric=metric)["value"].to_numpy() * (100 if metric in _SHARES else 1)
     counted = "causal_samples" if metric.startswith("causal") else "test_samples"
-    samples = int(rows_where(of_cell, metric=counted)["value"].sum())
-    return None if metric == "causal_accuracy" and samples < _LEAST_CAUSAL else cell_of_repeats(values_R, samples)
+    samples, clusters = (int(rows_where(of_cell, metric=name)["value"].sum()) for name in (counted, "clusters"))
+    if metric == "causal_accuracy" and samples < _LEAST_CAUSAL:
+        return None
+    return cell_of_repeats(values_R, samples, clusters=clusters)
 
 
 def _repeats(table: TableBuilder, metrics: pd.DataFrame, explainers: Iterable[str]) -> str:

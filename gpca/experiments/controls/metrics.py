@@ -138,7 +138,7 @@ def collect_intervals(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
                 other = (compared["control"] == (control if plain else PAPER)) & compared["seed"].isin(
                     rows["seed"][mask]
                 )
-                against, _ = _measures(compared[other], weights_of_compared[:, other.to_numpy()])
+                against, _, _ = _measures(compared[other], weights_of_compared[:, other.to_numpy()])
                 records += _records(source, str(explainer), (control, trained_on), own, against)
     return pd.DataFrame(records, columns=list(COLUMNS))
 
@@ -152,7 +152,8 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
     return read_numbers(path, COLUMNS, COLUMNS[5:], optional=COLUMNS[8:])
 
 
-Measured = tuple[dict[str, np.ndarray], tuple[int, int]]  # values by metric; numbers of samples and seeds
+# Values by metric; numbers of samples and seeds; how often each draw has each sample.
+Measured = tuple[dict[str, np.ndarray], tuple[int, int], np.ndarray]
 Group = tuple[str, str]  # control, trained on
 
 
@@ -166,12 +167,15 @@ def _weights(source: str, rows: pd.DataFrame) -> np.ndarray:
 def _records(
     source: str, explainer: str, group: Group, measured: Measured, against: Mapping[str, np.ndarray]
 ) -> Iterator[tuple]:
-    (control, trained_on), (values, counts) = group, measured
+    (control, trained_on), (values, counts, drawn_B_N) = group, measured
     for metric, value_B in values.items():
         if np.isfinite(value_B[0]):
             change_B = value_B - against[metric]
             own = (control, source, trained_on, explainer, metric, *counts)
-            yield (*own, value_B[0], *bounds(value_B[1:]), change_B[0], *bounds(change_B[1:]))
+            of_value = bounds(value_B[1:], drawn_B_N)
+            is_itself = control == PAPER and not plain_of(explainer)  # of which there is nothing to doubt
+            of_change = bounds(change_B[1:], None if is_itself else drawn_B_N, difference=True)
+            yield (*own, value_B[0], *of_value, change_B[0], *of_change)
 
 
 def _groups(rows: pd.DataFrame, source: str) -> dict[Group, np.ndarray]:
@@ -192,4 +196,4 @@ def _measures(rows: pd.DataFrame, weights_B_N: np.ndarray) -> Measured:
     with np.errstate(divide="ignore", invalid="ignore"):
         accuracy_B = (weights_B_N * right_N).sum(axis=1) / weights_B_N.sum(axis=1)
     measures = {"accuracy": accuracy_B, "auroc_error": auroc_error(rows, "entropy", weights_B_N)}
-    return measures, (len(rows), rows["seed"].nunique())
+    return measures, (len(rows), rows["seed"].nunique()), weights_B_N[1:]

@@ -22,6 +22,8 @@ OF_CAUSES = (
 )
 MEASURES = (*OF_CAUSES[:2], *OF_ALARM, *OF_CAUSES[2:])
 OF_FAILED = ("dominant_accuracy", "spearman_attribution", "cosine_attribution", "deletion_gain")
+# Shares of samples or of pairs of them, among them the frames': an interval of these is never of no width.
+SHARES = (*OF_CAUSES[:3], *OF_ALARM[:3], "state_accuracy")
 SMALLER_IS_BETTER = ("false_alarm_rate", "nominal_calibration")
 BINS = 10  # of the calibration error
 
@@ -51,12 +53,12 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     return measures
 
 
-def counted(samples: Judged, metric: str) -> int:
-    """Return how many samples a measure is taken over: those of a label, and of these the nominal or the failed."""
+def counted(samples: Judged, metric: str) -> np.ndarray:
+    """Return which samples (N,) a measure is taken over: those of a label, and of these the nominal or the failed."""
     labeled_N, nominal_N = samples.label != BORDERLINE, samples.label == NOMINAL
     if metric in OF_FAILED:
-        return int((labeled_N & ~nominal_N).sum())
-    return int((nominal_N if metric == "false_alarm_rate" else labeled_N).sum())
+        return labeled_N & ~nominal_N
+    return nominal_N if metric == "false_alarm_rate" else labeled_N
 
 
 def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ from gpca.attribution.metrics import ABSTAINED, ALL, PREDICTED_AS, confusion, ti
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, joined, read_judged
-from gpca.experiments.diagnosis.measures import MEASURES, SMALLER_IS_BETTER, counted, measure
+from gpca.experiments.diagnosis.measures import MEASURES, SHARES, SMALLER_IS_BETTER, counted, measure
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
 
@@ -140,12 +140,15 @@ def rows_of(
             (explainer for explainer in values if explainer != CEILING and metric in values[explainer]),
             key=lambda explainer: values[explainer][metric][0] * (1 if metric in SMALLER_IS_BETTER else -1),
         )
+        counted_N = counted(any_samples, metric)
+        drawn_B_n = drawn_B_N[:, counted_N] if metric in SHARES else None
         for explainer, of_explainer in values.items():
             if metric not in of_explainer:
                 continue
             rival = next((name for name in ranked if name != explainer), "") if explainer != CEILING else ""
             apart = of_explainer[metric] - values[rival][metric] if rival else np.full(len(weights_B_N), np.nan)
-            of_value, of_difference = bounds(of_explainer[metric][1:]), bounds(apart[1:])
-            own = (source, explainer, metric, counted(any_samples, metric), seeds)
+            of_value = bounds(of_explainer[metric][1:], drawn_B_n)
+            of_difference = bounds(apart[1:], drawn_B_n, difference=True)
+            own = (source, explainer, metric, int(counted_N.sum()), seeds)
             rows.append((*own, of_explainer[metric][0], *of_value, rival, apart[0], *of_difference))
     return rows

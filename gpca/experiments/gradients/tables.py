@@ -60,7 +60,7 @@ def tcav(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapp
     table = TableBuilder("tcav", {"source": "Dataset", "tested": "Concept"})
     columns: dict[str, Column] = {}
     for name in classes:
-        columns[f"score_{name}"] = Column(f"Class {name} (%)")
+        columns[f"score_{name}"] = Column(f"Class {name} (%)", of_samples=False)
         columns[f"significant_{name}"] = Column(f"seeds, {name}", decimals=0, interval=False)
     columns["probe"] = Column("Probes right (%)")
     for source, entry in sources.items():

@@ -25,7 +25,7 @@ PRINTED = (  # The paper's table has these rows.
 _HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
 _MEASURES = {  # Each measure of the grid has a column, and a factor to the column's unit.
     "accuracy": (Column("Accuracy (%)"), 100),
-    "confidence": (Column("Confidence (%)"), 100),
+    "confidence": (Column("Confidence (%)", of_samples=False), 100),
     "ece": (Column("ECE (share)", decimals=3, limits=(0, 1), least_is_best=True), 1),
     "nll": (Column("NLL (nats)", decimals=3, limits=(0, inf), least_is_best=True), 1),
     "elbo": (Column("ELBO (nats)", decimals=3, limits=(-inf, inf)), 1),

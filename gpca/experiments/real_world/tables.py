@@ -119,13 +119,15 @@ def _cells(
     if not seeds:
         return {}
     samples = int(_values(metrics, method, "test_samples", scale=1).sum())
-    cells: dict[str, Cell | None] = {"accuracy": cell_of_repeats(accuracy_R, samples)}
+    clusters = {concept: int(_values(metrics, method, "clusters", concept, 1).sum()) for concept in (ALL, *CONCEPTS)}
+    cells: dict[str, Cell | None] = {"accuracy": cell_of_repeats(accuracy_R, samples, clusters=clusters[ALL])}
     if seeds > 1:
         cells["deviation"] = plain_cell(float(accuracy_R.std(ddof=1)), seeds, samples)
     if not is_first and seeds == len(reference_R):
         cells["difference"] = cell_of_repeats(accuracy_R - reference_R, samples)
     for concept in CONCEPTS:
-        cells[concept] = cell_of_repeats(_values(metrics, method, concept=concept), samples)
+        of_concept_R = _values(metrics, method, concept=concept)
+        cells[concept] = cell_of_repeats(of_concept_R, samples, clusters=clusters[concept])
     if parameters is not None:
         cells["parameters"] = plain_cell(parameters / 1000, seeds, samples)
     return cells

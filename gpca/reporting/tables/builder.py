@@ -7,10 +7,15 @@ from itertools import product
 
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause, title_of
+from gpca.reporting.tables.cells import share_within_limits
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
 from gpca.reporting.words import plural, span
 
 INTERVAL = "± is the half-width of the 95 % t-interval over the seeds"
+NEAR_LIMITS = (
+    "In brackets, where that is 0 or reaches beyond 0 or 100 %: the farther bounds of it and of Wilson's interval, for "
+    "which a cluster of objects or scenes counts once in each seed (docs/comparison.md)."
+)
 Label = tuple[str, str]  # key for the CSV, title for the reader
 
 
@@ -95,6 +100,8 @@ class TableBuilder:
     def build(self, caption: str, column_head: str, columns: Mapping[str, Column], footnotes: Iterable[str]) -> Table:
         """Return the table with its columns, which may depend on the cells that there are."""
         self.require_rows()
+        cells = {key: share_within_limits(cell, columns[key[1]]) for key, cell in self.cells.items()}
+        is_shown = any(cell is not self.cells[key] and columns[key[1]].interval for key, cell in cells.items())
         return Table(
             name=self.name,
             caption=caption,
@@ -102,8 +109,8 @@ class TableBuilder:
             rows=tuple(self.rows),
             column_head=column_head,
             columns=columns,
-            cells=self.cells,
-            footnotes=tuple(footnotes),
+            cells=cells,
+            footnotes=(*footnotes, *((NEAR_LIMITS,) if is_shown else ())),
             compared=tuple(self._compared),
         )
 

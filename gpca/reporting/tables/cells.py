@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from math import isfinite, nan
+from dataclasses import replace
+from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import mean_interval
-from gpca.reporting.tables.table import LEAST_SEEDS, Cell
+from gpca.reporting.tables.table import LEAST_SEEDS, SHARE, Cell, Column
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +28,9 @@ def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
     return frame if chosen is None else frame[chosen]
 
 
-def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bool = False) -> Cell | None:
+def cell_of_repeats(
+    values_R: Collection[float], test_samples: int, at_least: bool = False, clusters: int = 0
+) -> Cell | None:
     """Return the mean over R repeats with the half-width of its t-interval, or None without any repeat.
 
     Fewer than `LEAST_SEEDS` repeats have no interval.
@@ -36,12 +39,31 @@ def cell_of_repeats(values_R: Collection[float], test_samples: int, at_least: bo
         values_R: One value per seed, in the column's unit.
         test_samples: The number of test samples of all seeds together.
         at_least: Whether some repeat was stopped before it was done, which makes the mean a lower bound.
+        clusters: In how many clusters the samples are, those of each seed counted; 0 where that is not known.
     """
     if len(values_R) == 0:
         return None
     mean, low, _ = mean_interval(values_R)
     half_width = mean - low if len(values_R) >= LEAST_SEEDS else nan
-    return Cell(mean, half_width, len(values_R), test_samples, at_least)
+    return Cell(mean, half_width, len(values_R), test_samples, at_least, clusters=clusters)
+
+
+def share_within_limits(cell: Cell, column: Column) -> Cell:
+    """Return the cell of a share in % with bounds, where its t-interval has no width or reaches beyond 0 or 100 %.
+
+    They are the farther ones of that interval, cut at the limits, and of Wilson's. For this a cluster counts once in
+    each seed, or where the clusters are not known, a sample in one seed alone; without either there is no interval.
+    """
+    is_share = column.of_samples and column.limits == SHARE and not column.beside
+    if not is_share or cell.bounds or cell.at_least or isnan(cell.half_width):
+        return cell
+    (least, most), low, high = column.limits, cell.mean - cell.half_width, cell.mean + cell.half_width
+    if cell.half_width >= 0.5 * 10.0**-column.decimals and least <= low and high <= most:
+        return cell
+    if not (trials := cell.clusters or cell.test_samples // cell.seeds) or not least <= cell.mean <= most:
+        return replace(cell, half_width=nan)
+    of_wilson = wilson_interval(cell.mean / most * trials, trials)
+    return replace(cell, bounds=(max(least, min(low, most * of_wilson[0])), min(most, max(high, most * of_wilson[1]))))
 
 
 def cell_of_all_samples(values_R: Sequence[float], samples_R: Sequence[float]) -> Cell | None:

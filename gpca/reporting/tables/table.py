@@ -15,6 +15,7 @@ from gpca.io.files import whole_file
 
 EMPTY = "–"  # A dash stands where there is no number.
 LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.
+SHARE = (0.0, 100.0)  # limits of a share in percent
 _COLUMN_CHARACTERS = 50  # This many fill one column of a two-column paper.
 _TEXT_CHARACTERS = 100  # This many fill both columns.
 _SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"
@@ -26,7 +27,8 @@ class Cell:
 
     The half-width is NaN where there is no interval, as over fewer than `LEAST_SEEDS`. A mean that is `at_least` so
     large has none either, since some repeats were stopped before they were done. Another interval than that over the
-    seeds (a bootstrap's, Wilson's) has `bounds`, and is printed by these.
+    seeds (a bootstrap's, Wilson's) has `bounds`, and is printed by these. `clusters` are the combinations of a seed and a
+    cluster that the samples are of; 0 where their number is not known.
     """
 
     mean: float
@@ -35,6 +37,7 @@ class Cell:
     test_samples: int
     at_least: bool = False
     bounds: tuple[float, float] | None = None
+    clusters: int = 0
 
 
 @dataclass(frozen=True)
@@ -44,16 +47,18 @@ class Column:
     `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them. Of some
     quantities, as the labels that were needed, the least is best. A column `beside` another has none of its own: its
     cells stand with their sign in brackets behind the other's; the CSV holds both. Of a quantity with a `heavy_tail`,
-    an interval wider than the mean is not printed, as it would reach below zero.
+    an interval wider than the mean is not printed, as it would reach below zero. `of_samples` is False for percentages
+    that are no shares of samples, such as mean confidences.
     """
 
     title: str
     decimals: int = 1
     interval: bool = True
-    limits: tuple[float, float] = (0.0, 100.0)
+    limits: tuple[float, float] = SHARE
     least_is_best: bool = False
     beside: str = ""
     heavy_tail: bool = False
+    of_samples: bool = True
 
     def text(self, cell: Cell) -> str:
         """Return e.g. ``97.7 ± 0.4``, ``97.7 (96.9 to 98.2)`` or ``> 52.0``; beside another ``+1.2; 0.4 to 1.9``."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
 from gpca.experiments.concept_attribution.tables import table1_extended, table1_single_baselines, table2_per_concept
@@ -34,10 +35,10 @@ def metrics():
         {
             ("linemod", "gpca", "noise"): [0.99, 1.0, 1.0],
             ("linemod", "gpca", "pose"): [0.90, 0.92, 0.94],
-            ("linemod", "gpca", "all"): [0.97, 0.98, 0.99],
+            ("linemod", "gpca", "all"): [0.96, 0.97, 0.98],
             ("linemod", "shap_additive", "noise"): [0.4, 0.5, 0.3],
-            ("linemod", "shap_additive", "all"): [0.3, 0.3, 0.3],
-            ("ycb", "gpca", "all"): [1.0, 1.0, 0.97],
+            ("linemod", "shap_additive", "all"): [0.29, 0.3, 0.31],
+            ("ycb", "gpca", "all"): [0.94, 0.95, 0.96],
         }
     )
 
@@ -46,8 +47,8 @@ def test_table1_has_the_papers_explainers_with_predictions_in_its_order(metrics)
     markdown = table1_single_baselines(metrics, REAL, EXPLAINERS).markdown()
     assert "| Dataset | SHAP | GP-CA |" in markdown
     # s = 0.01, t_2 = 4.3027: ± 2.48 points; the dash stands where SHAP has no predictions.
-    assert "| LINEMOD | 30.0 ± 0.0 | **98.0 ± 2.5** |" in markdown
-    assert "| YCB | – | 99.0 ± 4.3 |" in markdown
+    assert "| LINEMOD | 30.0 ± 2.5 | **97.0 ± 2.5** |" in markdown
+    assert "| YCB | – | 95.0 ± 2.5 |" in markdown
     assert "Mean over 3 seeds, 200 test samples each" in markdown
     assert "95 % t-interval" in markdown
     assert "stand-in" not in markdown
@@ -66,7 +67,7 @@ def test_table1_says_who_explains_fewer_samples(metrics):
 def test_table2_has_concepts_as_columns_and_only_gpca_as_rows(metrics):
     markdown = table2_per_concept(metrics, REAL, EXPLAINERS).markdown()
     assert "| Dataset | Explainer | Noise | Pose | All |" in markdown
-    assert "| LINEMOD | GP-CA | **99.7 ± 1.4** | 92.0 ± 5.0 | 98.0 ± 2.5 |" in markdown
+    assert "| LINEMOD | GP-CA | **99.7 (92.3 to 100.0)** | 92.0 ± 5.0 | 97.0 ± 2.5 |" in markdown
     assert "SHAP" not in markdown
 
 
@@ -87,6 +88,17 @@ def test_one_seed_has_no_interval():
     assert table.records()[1] == ("ycb", "gpca", 50.0, "", "", 1, 200, False)
 
 
+def test_a_share_near_its_limits_never_has_an_interval_of_no_width():
+    metrics = tidy({("ycb", "gpca", "all"): [1.0, 1.0, 1.0], ("linemod", "gpca", "all"): [1.0, 1.0, 0.97]})
+    clusters = [("attribution", "ycb", "gpca", "clusters", "all", seed, 4.0) for seed in range(3)]
+    metrics = pd.concat([metrics, pd.DataFrame(clusters, columns=list(TIDY_COLUMNS))])
+    table = table1_single_baselines(metrics, REAL, EXPLAINERS)
+    low, _ = wilson_interval(12, 12)  # four clusters in three seeds
+    assert f"| YCB | 100.0 ({100 * low:.1f} to 100.0) |" in table.markdown()
+    assert "| LINEMOD | 99.0 (94.7 to 100.0) |" in table.markdown()  # that of the seeds is wider, and is cut
+    assert table.footnotes[-1].startswith("In brackets")
+
+
 def test_different_numbers_of_seeds_are_told():
     metrics = tidy({("ycb", "gpca", "all"): [0.5, 0.6], ("linemod", "gpca", "all"): [0.5, 0.6, 0.7]})
     assert "Mean over 2 to 3 seeds" in table1_single_baselines(metrics, REAL, EXPLAINERS).markdown()
@@ -97,9 +109,9 @@ def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
     with (tmp_path / "t.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     gpca = next(row for row in rows if (row["source"], row["explainer"]) == ("linemod", "gpca"))
-    assert float(gpca["mean"]) == 98.0
-    assert float(gpca["ci_low"]) == pytest.approx(98 - 2.484138, abs=1e-6)
-    assert float(gpca["ci_high"]) == 100.0
+    assert float(gpca["mean"]) == 97.0
+    assert float(gpca["ci_low"]) == pytest.approx(97 - 2.484138, abs=1e-6)
+    assert float(gpca["ci_high"]) == pytest.approx(97 + 2.484138, abs=1e-6)
     assert (gpca["n_seeds"], gpca["n_test"]) == ("3", "600")
     assert len(rows) == 3
     assert (tmp_path / "t.md").read_text(encoding="utf-8").startswith("**Mean accuracy")
@@ -154,7 +166,7 @@ def test_latex_is_balanced_and_escaped(metrics):
     sources = {"linemod": {"title": r"A_1 & 50 % ~ \x {b}", "stand_in": False}}
     latex = table1_single_baselines(metrics, sources, EXPLAINERS).latex()
     assert (
-        r"A\_1 \& 50 \% \textasciitilde{} \textbackslash{}x \{b\} & 30.0 $\pm$ 0.0 & \textbf{98.0 $\pm$ 2.5} \\"
+        r"A\_1 \& 50 \% \textasciitilde{} \textbackslash{}x \{b\} & 30.0 $\pm$ 2.5 & \textbf{97.0 $\pm$ 2.5} \\"
         in latex
     )
     for environment in ("table", "tabular"):
@@ -202,10 +214,10 @@ def full(source, explainer, accuracies, **metrics):
 def everything():
     return pd.concat(
         [
-            full("ycb", "gpca", [0.9, 0.9, 0.9], icp_calls=0.0, seconds_per_sample=0.0204),
+            full("ycb", "gpca", [0.89, 0.9, 0.91], icp_calls=0.0, seconds_per_sample=0.0204),
             full("ycb", "shap_additive", [0.3, 0.4, 0.35], test_samples=60.0, causal_samples=21.0),
             full("ycb", "shap_oracle", [0.97, 0.97, 0.97]),
-            full("linemod", "gpca", [0.8, 0.8, 0.8]),
+            full("linemod", "gpca", [0.79, 0.8, 0.81]),
         ]
     )
 
@@ -217,8 +229,8 @@ def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
         "| Dataset | Explainer | Accuracy (%) | Relabeled (%) | Causal (%) | n causal "
         "| Abstained (%) | ICP calls | Seconds | n |"
     )
-    assert lines[4] == "| LINEMOD | GP-CA | 80.0 ± 0.0 | 90.0 ± 0.0 | 50.0 ± 0.0 | 80 | 12.5 | 400 | 0.250 | 200 |"
-    assert lines[5] == "| YCB | GP-CA | **90.0 ± 0.0** | 90.0 ± 0.0 | 50.0 ± 0.0 | 80 | 12.5 | 0 | 0.020 | 200 |"
+    assert lines[4] == "| LINEMOD | GP-CA | 80.0 ± 2.5 | 90.0 (85.1 to 93.4) | 50.0 (39.3 to 60.7) | 80 | 12.5 | 400 | 0.250 | 200 |"
+    assert lines[5] == "| YCB | GP-CA | **90.0 ± 2.5** | 90.0 (85.1 to 93.4) | 50.0 (39.3 to 60.7) | 80 | 12.5 | 0 | 0.020 | 200 |"
     assert lines[6].startswith("| YCB | SHAP | 35.0 ± 12.4 |")
     assert lines[6].endswith("| 21 | 12.5 | 400 | 0.250 | 60 |")
     assert "60 to 200 test samples each" in table.footnotes[0]
@@ -239,7 +251,7 @@ def test_extended_csv_is_one_line_per_number(everything):
     assert records[0] == ("source", "explainer", "metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
     assert len(records) == 1 + 4 * 8
     assert ("ycb", "gpca", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 3, 600, False) in records
-    assert ("ycb", "shap_additive", "causal_accuracy", 50.0, 50.0, 50.0, 3, 63, False) in records
+    assert ("ycb", "shap_additive", "causal_accuracy", 50.0, 30.337916, 69.662084, 3, 63, False) in records
     assert ("ycb", "shap_additive", "accuracy", 35.0, 22.579311, 47.420689, 3, 180, False) in records
     assert ("ycb", "gpca", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
 

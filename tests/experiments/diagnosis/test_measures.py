@@ -27,7 +27,7 @@ def weights(request, judged):
 def test_a_measure_depends_on_as_many_samples_as_are_counted(judged, metric):
     kinds = {"failed": ~np.isin(judged.label, [NOMINAL, BORDERLINE]), "nominal": judged.label == NOMINAL}
     wanted = ["failed"] if metric in OF_FAILED else ["nominal"] if metric == "false_alarm_rate" else list(kinds)
-    assert counted(judged, metric) == sum(kinds[kind].sum() for kind in wanted)
+    assert counted(judged, metric).sum() == sum(kinds[kind].sum() for kind in wanted)
     if metric in OF_FAILED:  # the others need no sample: their weights may be anything
         alone = np.where(kinds["failed"], 1.0, 0.0)
         assert one(judged, alone)[metric] == pytest.approx(one(judged)[metric])

@@ -24,7 +24,7 @@ def test_table5_shows_accuracy_and_diagnostics_and_marks_the_best(diagnostics):
     markdown = table5_learners(diagnostics, REAL, LEARNERS).markdown()
     assert "| Dataset | Learner | Accuracy (%) | ρ | AURC | E-AURC | AUGRC | ECE (share) |" in markdown
     assert "| YCB | GPC | 96.0 ± 2.5 | **0.520 ± 0.050** | **0.0040 ± 0.0000** |" in markdown
-    assert "**99.0 ± 2.5**" in markdown
+    assert "**99.0 (89.5 to 100.0)**" in markdown
     assert "**0.020 ± 0.000**" in markdown
     assert "LINEMOD" not in markdown
     assert "Mean over 3 seeds" in markdown
