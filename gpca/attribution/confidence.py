@@ -35,9 +35,7 @@ def pigeonhole_weights(random: np.random.Generator, *factors: np.ndarray) -> np.
     return weights_B_N
 
 
-def bounds(
-    values_B: np.ndarray, drawn_B_N: np.ndarray | None = None, difference: bool = False
-) -> tuple[float, float]:
+def bounds(values_B: np.ndarray, drawn_B_N: np.ndarray | None = None, difference: bool = False) -> tuple[float, float]:
     """Return the bounds of `LEVEL` of the draws; those without a value are left out, and NaN is returned for none.
 
     Args:
@@ -61,9 +59,9 @@ def bounds(
 
 
 def independent(drawn_B_N: np.ndarray) -> int:
-    """Return how many combinations of levels, as of a seed and a cluster, N samples are of, by the draws that have them.
+    """Return how many combinations of levels, as of a seed and a cluster, the N samples are of.
 
-    Samples of one combination are in the same draws equally often.
+    Samples of one combination are in every draw equally often.
     """
     return len({column.tobytes() for column in np.ascontiguousarray(drawn_B_N.T)})
 

@@ -27,8 +27,8 @@ class Cell:
 
     The half-width is NaN where there is no interval, as over fewer than `LEAST_SEEDS`. A mean that is `at_least` so
     large has none either, since some repeats were stopped before they were done. Another interval than that over the
-    seeds (a bootstrap's, Wilson's) has `bounds`, and is printed by these. `clusters` are the combinations of a seed and a
-    cluster that the samples are of; 0 where their number is not known.
+    seeds (a bootstrap's, Wilson's) has `bounds`, and is printed by these. `clusters` are the combinations of a seed
+    and a cluster that the samples are of; 0 where their number is not known.
     """
 
     mean: float
