@@ -21,7 +21,7 @@ from gpca.causes.candidate import Candidate, draw_applied, draw_candidate
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.shapley import ALL, NONE, SUBSETS
-from gpca.causes.truth import LARGEST_ERROR
+from gpca.causes.truth import capped
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import POSE
@@ -114,7 +114,7 @@ class Counterfactuals:
         if causes not in self._measured:
             runs = self._registrar.run(causes, self._xi_n_6)
             # An error is that of the model's pose in what was observed.
-            errors_n = np.minimum(self._errors(inverses(runs.T_target_source_n)), LARGEST_ERROR)
+            errors_n = capped(self._errors(inverses(runs.T_target_source_n)))
             if not np.isfinite(errors_n).all():
                 raise Unmeasurable("not finite")
             self._measured[causes] = float(errors_n.mean()), runs.covariance(np.eye(4))

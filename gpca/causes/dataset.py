@@ -32,6 +32,8 @@ class Causes:
         T_target_source_runs: (S, n, 4, 4) what ICP found from n starts around the initial pose, in meters; the first is
             the initial pose itself. They are for explainers, and not the runs that the truth was measured by.
         fitness_runs, inlier_rmse_runs: (S, n) of these.
+        error_shown: (S,) min(ADD(-S), d/2) / d of the registration that is shown, the first of these runs. The truth is
+            a mean over others, so this one may be right where the truth says failed, and the reverse.
         truth: of all S.
         truth_again: of the T test samples, measured from other starts: how well anything could do.
     """
@@ -44,6 +46,7 @@ class Causes:
     T_target_source_runs: np.ndarray
     fitness_runs: np.ndarray
     inlier_rmse_runs: np.ndarray
+    error_shown: np.ndarray
     truth: Truth
     truth_again: Truth
 

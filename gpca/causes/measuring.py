@@ -14,7 +14,7 @@ from gpca.causes.dataset import COLUMNS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
 from gpca.causes.subjects import Subject
-from gpca.causes.truth import Truth, joined
+from gpca.causes.truth import Truth, capped, joined
 from gpca.io.names import Axes
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
@@ -78,6 +78,7 @@ class Measuring:
             "T_target_source_runs": np.stack(poses_n_m),
             "fitness_runs": runs.fitness_n,
             "inlier_rmse_runs": runs.inlier_rmse_n,
+            "error_shown": capped(subject.errors(inverse(runs.T_target_source_n[0])[None]))[0],
         }
 
     def _twists(self, axes: tuple, starts: str) -> np.ndarray:

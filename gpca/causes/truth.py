@@ -66,9 +66,30 @@ class Truth:
         return np.where(self.geometry & (self.error[:, NONE] > self.phi.max(axis=1)), GEOMETRY, named_S)
 
     @property
+    def tied(self) -> np.ndarray:
+        """(S, 3) whether each concept adds as much as the one that adds most, up to `cause_limit`."""
+        return self.phi >= self.phi.max(axis=1, keepdims=True) - self.cause_limit
+
+    @property
+    def margin(self) -> np.ndarray:
+        """(S,) by how much the largest φ exceeds the next one."""
+        ranked_S_3 = np.sort(self.phi, axis=1)
+        return ranked_S_3[:, -1] - ranked_S_3[:, -2]
+
+    @property
     def causes(self) -> np.ndarray:
         """(S, 3) whether each concept is one of the causes."""
         return self.phi > self.cause_limit
+
+
+def capped(error_N: np.ndarray) -> np.ndarray:
+    """Return errors in diameters, none larger than `LARGEST_ERROR`."""
+    return np.minimum(error_N, LARGEST_ERROR)
+
+
+def state_of_errors(error_N: np.ndarray, truth: Truth) -> np.ndarray:
+    """Return the states (N,) of single registrations, which have an error and no uncertainty, by the truth's limits."""
+    return np.select([error_N < truth.nominal_limit, error_N > truth.failed_limit], [NOMINAL, FAILED], BORDERLINE)
 
 
 def joined(truths: list[Truth]) -> Truth:

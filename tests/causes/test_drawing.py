@@ -147,3 +147,12 @@ def test_what_fails_without_a_cause_is_drawn_of_other_objects_for_each_split(fou
 
 def test_where_nothing_fails_without_a_cause_there_is_nothing(four):
     assert draw_geometry(four, "four", 100, CauseSettings(**FEW), {"train": 3, "test": 2}, 4) is None
+
+
+def test_the_error_shown_is_that_of_the_first_run(causes, subjects):
+    registrations, of_index = causes.registrations, {subject.index: subject for subject in subjects}
+    for row in range(len(causes)):
+        subject = of_index[int(registrations.object_index[row])]
+        T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
+        expected = min(subject.errors((T_true @ inverse(T_icp))[None])[0], 0.5)
+        assert causes.error_shown[row] == pytest.approx(expected, abs=2e-3)

@@ -53,6 +53,7 @@ EXPERIMENT = Experiment(
     tidy=(
         Tidy("causes.csv", "gpca.experiments.diagnosis.metrics:collect", DIAGNOSED, rule="cause_metrics"),
         Tidy("cause_intervals.csv", "gpca.experiments.diagnosis.metrics:collect_intervals", DIAGNOSED),
+        Tidy("cause_strata.csv", "gpca.experiments.diagnosis.strata:collect_strata", DIAGNOSED),
     ),
     sections={"diagnosis": Section},
     names=names,

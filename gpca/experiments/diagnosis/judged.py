@@ -12,7 +12,7 @@ import numpy as np
 from gpca.attribution.metrics import source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
-from gpca.causes.truth import NOMINAL, Truth
+from gpca.causes.truth import NOMINAL, Truth, state_of_errors
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of_file
@@ -32,6 +32,9 @@ class Judged:
         label: one of :data:`gpca.causes.dataset.LABELS`, or ``borderline``.
         instance: the object, views of one instance together. seed: the repeat.
         error: (N, 8) v of every subset of the causes. phi: (N, 3). causes: (N, 3) whether each is one of them.
+        tied: (N, 3) whether each adds as much as the dominant one, up to the limit of a cause. margin: between the two
+            largest φ.
+        shown: state of the registration that the explainer sees, by its own error. symmetric: the error is ADD-S.
         alarm: how wrong the explainer takes the registration to be, larger is worse. scores: (N, 3) of the causes.
         named: the label that it names; empty where it names none.
         nominal: its score of "nominal".
@@ -43,6 +46,10 @@ class Judged:
     error: np.ndarray
     phi: np.ndarray
     causes: np.ndarray
+    tied: np.ndarray
+    margin: np.ndarray
+    shown: np.ndarray
+    symmetric: np.ndarray
     alarm: np.ndarray
     scores: np.ndarray
     named: np.ndarray
@@ -50,6 +57,10 @@ class Judged:
 
     def __len__(self) -> int:
         return len(self.label)
+
+    def subset(self, rows: np.ndarray) -> Judged:
+        """Return the given rows, which may be a mask."""
+        return Judged(*(getattr(self, field.name)[rows] for field in fields(Judged)))
 
     @property
     def names_causes(self) -> bool:
@@ -127,6 +138,10 @@ def _judged(causes: Causes, seed: int, alarm_N, scores_N_4: np.ndarray, named_N:
         error=truth.error,
         phi=truth.phi,
         causes=truth.causes,
+        tied=truth.tied,
+        margin=truth.margin,
+        shown=state_of_errors(causes.error_shown, truth),
+        symmetric=causes.symmetric,
         alarm=np.asarray(alarm_N, float),
         scores=scores_N_4[:, 1:],
         named=named_N,

@@ -16,25 +16,36 @@ from gpca.pairs.perturbation import CONCEPTS
 
 RECALL = 0.9  # of the failed, at which false alarms are counted
 OF_ALARM = ("auroc_failed", "auprc_failed", "false_alarm_rate", "nominal_calibration")
+OF_STATES = ("state_accuracy", "state_accuracy_shown", "auroc_failed_shown")
+HEADLINES = ("regret", "tied_accuracy")
 OF_CAUSES = (
-    *("balanced_accuracy", "dominant_accuracy", "average_precision"),
+    *(*HEADLINES, "named_right", "balanced_accuracy", "dominant_accuracy", "average_precision"),
     *("spearman_attribution", "cosine_attribution", "deletion_gain"),
 )
-MEASURES = (*OF_CAUSES[:2], *OF_ALARM, *OF_CAUSES[2:])
-OF_FAILED = ("dominant_accuracy", "spearman_attribution", "cosine_attribution", "deletion_gain")
-# Shares of samples or of pairs of them, among them the frames': an interval of these is never of no width.
-SHARES = (*OF_CAUSES[:3], *OF_ALARM[:3], "state_accuracy")
-SMALLER_IS_BETTER = ("false_alarm_rate", "nominal_calibration")
+MEASURES = (*OF_CAUSES[:5], *OF_ALARM, *OF_STATES, *OF_CAUSES[5:])
+OF_FAILED = (*HEADLINES, "dominant_accuracy", "spearman_attribution", "cosine_attribution", "deletion_gain")
+OF_SHOWN = ("state_accuracy_shown", "auroc_failed_shown")
+# Shares of samples or of pairs of them: an interval of these is never of no width.
+SHARES = (*OF_CAUSES[1:6], *OF_ALARM[:3], *OF_STATES)
+SMALLER_IS_BETTER = ("regret", "false_alarm_rate", "nominal_calibration")
 BINS = 10  # of the calibration error
 
 
 def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Return every measure (B,) of :data:`MEASURES` that the explainer has.
 
+    - regret: of a failed sample, the error that the best single removal would take away minus that which the named
+      cause's removal takes away, as a share of the error; mean. Naming nominal, or nothing, removes nothing.
+    - tied_accuracy: as dominant_accuracy, but any cause counts whose φ is that of the dominant one up to the limit of a
+      cause.
+    - named_right: share of the nominal and the failed whose label is named, causes counted as in tied_accuracy.
     - balanced_accuracy: mean over nominal and the three dominant causes of the share that is named rightly.
     - dominant_accuracy: share of the failed whose dominant cause has the largest score among the causes.
     - auroc_failed, auprc_failed: how well the alarm tells failed from nominal.
     - false_alarm_rate: share of the nominal above the alarm that finds 90 % of the failed.
+    - state_accuracy: mean of the shares of the nominal and of the failed that are called so; of what is shown
+      (_shown), by the state of that registration alone, whatever it does from other starts.
+    - auroc_failed_shown: as auroc_failed, by the same state.
     - nominal_calibration: expected calibration error of the score of "nominal", in ten bins.
     - average_precision: of each cause's score for being one of the causes, mean over the causes.
     - spearman_attribution, cosine_attribution: between scores and φ of a failed sample, mean.
@@ -42,7 +53,13 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """
     labeled_N = samples.label != BORDERLINE
     failed_N = labeled_N & (samples.label != NOMINAL)
+    shown_N = samples.shown != BORDERLINE
+    called_failed_N = samples.nominal < samples.scores.max(axis=1)
+    alarms_shown = ranking(samples.alarm[shown_N], samples.shown[shown_N] != NOMINAL, weights_B_N[:, shown_N])
     measures = {
+        "state_accuracy": _state_accuracy(samples.label, called_failed_N, weights_B_N),
+        "state_accuracy_shown": _state_accuracy(samples.shown, called_failed_N, weights_B_N),
+        "auroc_failed_shown": alarms_shown["area"],
         **_of_alarm(samples.alarm[labeled_N], failed_N[labeled_N], weights_B_N[:, labeled_N]),
         "nominal_calibration": _calibration_error(
             samples.nominal[labeled_N], samples.label[labeled_N] == NOMINAL, weights_B_N[:, labeled_N]
@@ -55,6 +72,8 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
 
 def counted(samples: Judged, metric: str) -> np.ndarray:
     """Return which samples (N,) a measure is taken over: those of a label, and of these the nominal or the failed."""
+    if metric in OF_SHOWN:
+        return samples.shown != BORDERLINE
     labeled_N, nominal_N = samples.label != BORDERLINE, samples.label == NOMINAL
     if metric in OF_FAILED:
         return labeled_N & ~nominal_N
@@ -71,9 +90,11 @@ def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) ->
         ranking(samples.scores[labeled_N, i], samples.causes[labeled_N, i], weights_B_N[:, labeled_N])["precision"]
         for i in range(len(CONCEPTS))
     ]
-    without_N = samples.error[np.arange(len(samples)), ALL ^ (1 << first_N)]
-    gain_N = 1 - without_N / np.maximum(samples.error[:, ALL], 1e-9)
+    rows_N = np.arange(len(samples))
+    gain_N, tied_N = gains(samples)[rows_N, first_N], samples.tied[rows_N, first_N]
     return {
+        **of_decisions(samples, weights_B_N),
+        "tied_accuracy": _mean(tied_N[failed_N], of_failed),
         "balanced_accuracy": np.mean(recalls, axis=0),
         "dominant_accuracy": _mean((np.array(CONCEPTS)[first_N] == samples.label)[failed_N], of_failed),
         "average_precision": np.mean(precisions, axis=0),
@@ -81,6 +102,32 @@ def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) ->
         "cosine_attribution": _mean(_cosines(scores_F_3, np.maximum(phi_F_3, 0)), of_failed),
         "deletion_gain": _mean(gain_N[failed_N], of_failed),
     }
+
+
+def of_decisions(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    """Return regret and named_right, which judge what is named alone, whatever the other scores are."""
+    labeled_N = samples.label != BORDERLINE
+    failed_N = labeled_N & (samples.label != NOMINAL)
+    gain_N_3, named_N_3 = gains(samples), samples.named[:, None] == np.array(CONCEPTS)
+    regret_N = np.maximum(gain_N_3.max(axis=1), 0) - np.where(named_N_3, gain_N_3, 0).sum(axis=1)
+    right_N = np.where(failed_N, (named_N_3 & samples.tied).any(axis=1), samples.named == samples.label)
+    return {
+        "regret": _mean(regret_N[failed_N], weights_B_N[:, failed_N]),
+        "named_right": _mean(right_N[labeled_N], weights_B_N[:, labeled_N]),
+    }
+
+
+def gains(samples: Judged) -> np.ndarray:
+    """Return (N, 3) the share of each sample's error that goes if a single cause is removed."""
+    all_N = np.maximum(samples.error[:, ALL], 1e-9)
+    return np.stack([1 - samples.error[:, ALL ^ 1 << cause] / all_N for cause in range(len(CONCEPTS))], axis=1)
+
+
+def _state_accuracy(state_N: np.ndarray, called_failed_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
+    nominal_N = state_N == NOMINAL
+    failed_N = ~nominal_N & (state_N != BORDERLINE)
+    groups = ((nominal_N, ~called_failed_N), (failed_N, called_failed_N))
+    return np.mean([_mean(right_N[of_N], weights_B_N[:, of_N]) for of_N, right_N in groups], axis=0)
 
 
 def _of_alarm(alarm_N: np.ndarray, failed_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

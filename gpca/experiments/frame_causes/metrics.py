@@ -12,7 +12,7 @@ import numpy as np
 from gpca.attribution.confidence import pigeonhole_weights
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
-from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL
+from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by
 from gpca.experiments.diagnosis.measures import MEASURES, measure
@@ -37,8 +37,7 @@ def collect(
     """Return the intervals of the diagnosis for explainers that learned from no frame.
 
     The columns are those of :func:`gpca.experiments.diagnosis.metrics.collect_intervals`. Beside its measures
-    stand `STATE`, the mean of the shares of the nominal and of the failed that are called so, and the number of
-    `SAMPLES`; what has no value, as there are no samples for it, has no row.
+    stands the number of `SAMPLES`; what has no value, as there are no samples for it, has no row.
     Intervals are over scenes, objects and seeds, which are drawn with replacement each. The counts of `KINDS` are those
     of all frames, and of each dataset alone, ``real_rgbd/{dataset}``.
 
@@ -67,7 +66,7 @@ def collect(
     rows = _counts(REAL_WORLD, of_all)
     for dataset, of_dataset in of_all.groupby("dataset"):
         rows += _counts(f"{REAL_WORLD}/{dataset}", of_dataset)
-    rows += rows_of(REAL_WORLD, judged, drawn_B_N, _measured, (SAMPLES, STATE, *MEASURES))
+    rows += rows_of(REAL_WORLD, judged, drawn_B_N, _measured, (SAMPLES, *MEASURES))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -90,19 +89,9 @@ def _seeds(*file_lists: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.
 
 
 def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    measures = {STATE: _state_accuracy(samples, weights_B_N), **measure(samples, weights_B_N)}
+    measures = measure(samples, weights_B_N)
     measures[SAMPLES] = np.full(len(weights_B_N), float(len(samples)))  # also where nothing else can be measured
     return measures
-
-
-def _state_accuracy(samples: Judged, weights_B_N: np.ndarray) -> np.ndarray:
-    called_failed_N = samples.nominal < samples.scores.max(axis=1)
-    nominal_N, borderline_N = samples.label == NOMINAL, samples.label == BORDERLINE
-    shares = []
-    for of_N, right_N in ((nominal_N, ~called_failed_N), (~nominal_N & ~borderline_N, called_failed_N)):
-        with np.errstate(invalid="ignore", divide="ignore"):
-            shares.append((weights_B_N * (of_N & right_N)).sum(axis=1) / (weights_B_N * of_N).sum(axis=1))
-    return np.mean(shares, axis=0)
 
 
 def _counts(source: str, rows: pd.DataFrame) -> list[tuple]:

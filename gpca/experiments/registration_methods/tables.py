@@ -69,7 +69,7 @@ def table11_registration(
     )
 
 
-def table11_thresholds(
+def table11_limits(
     metrics: pd.DataFrame,
     sources: Mapping[str, Mapping],
     methods: Mapping[str, Mapping],
@@ -78,7 +78,7 @@ def table11_thresholds(
     curve: Iterable[float],
 ) -> Table:
     """Return successes by the error below which a registration is one: starts × methods by limits of `curve`."""
-    table = _table("table11_thresholds")
+    table = _table("table11_limits")
     columns = {success_within(limit): Column(f"{100 * limit:g} % d (%)") for limit in curve}
     for labels, name in _rows(methods, global_start):
         table.add_row(

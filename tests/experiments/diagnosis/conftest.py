@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.causes.dataset import LABELS
-from gpca.causes.truth import BORDERLINE
+from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.experiments.diagnosis.judged import Judged
 
 
@@ -27,6 +27,10 @@ def random_judged(n=60, seed=0, skill=1.0):
         error=error,
         phi=phi,
         causes=phi > 0.01,
+        tied=phi >= phi.max(axis=1, keepdims=True) - 0.01,
+        margin=np.diff(np.sort(phi, axis=1), axis=1)[:, -1],
+        shown=random.choice([NOMINAL, BORDERLINE, FAILED], size=n),
+        symmetric=random.random(n) < 0.3,
         alarm=1 - scores[:, 0],
         scores=scores[:, 1:],
         named=np.array(LABELS)[scores.argmax(axis=1)],

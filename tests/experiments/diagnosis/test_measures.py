@@ -6,8 +6,18 @@ from scipy.stats import spearmanr
 from sklearn.metrics import average_precision_score, balanced_accuracy_score, roc_auc_score
 
 from gpca.causes.dataset import LABELS
-from gpca.causes.truth import BORDERLINE, NOMINAL
-from gpca.experiments.diagnosis.measures import MEASURES, OF_ALARM, OF_FAILED, RECALL, counted, measure
+from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
+from gpca.experiments.diagnosis.measures import (
+    MEASURES,
+    OF_ALARM,
+    OF_FAILED,
+    OF_SHOWN,
+    OF_STATES,
+    RECALL,
+    counted,
+    measure,
+    of_decisions,
+)
 
 
 def one(samples, weights=None):
@@ -25,6 +35,9 @@ def weights(request, judged):
 
 @pytest.mark.parametrize("metric", MEASURES)
 def test_a_measure_depends_on_as_many_samples_as_are_counted(judged, metric):
+    if metric in OF_SHOWN:
+        assert counted(judged, metric).sum() == (judged.shown != BORDERLINE).sum()
+        return
     kinds = {"failed": ~np.isin(judged.label, [NOMINAL, BORDERLINE]), "nominal": judged.label == NOMINAL}
     wanted = ["failed"] if metric in OF_FAILED else ["nominal"] if metric == "false_alarm_rate" else list(kinds)
     assert counted(judged, metric).sum() == sum(kinds[kind].sum() for kind in wanted)
@@ -58,8 +71,40 @@ def test_the_others_are_what_they_say(judged, weights):
     assert found["dominant_accuracy"] == pytest.approx(np.average(right, weights=weight))
     ranks = [spearmanr(a, b).statistic for a, b in zip(judged.scores[failed], judged.phi[failed], strict=True)]
     assert found["spearman_attribution"] == pytest.approx(np.average(np.nan_to_num(ranks), weights=weight))
+    near = judged.phi[failed].max(axis=1) - judged.phi[failed][np.arange(failed.sum()), first] <= 0.01
+    assert found["tied_accuracy"] == pytest.approx(np.average(near, weights=weight))
     left = judged.error[failed, 7 - (1 << first)]
     assert found["deletion_gain"] == pytest.approx(np.average(1 - left / judged.error[failed, 7], weights=weight))
+
+
+@pytest.fixture
+def failure(judged):
+    """One failure of 0.4 d, of which removing noise takes 0.1 away, pose 0.3, and overlap adds 0.04."""
+    error_8 = np.full(8, 0.2)
+    error_8[7], error_8[6], error_8[5], error_8[3] = 0.4, 0.3, 0.1, 0.44
+    row = judged.subset(np.flatnonzero(judged.label == "pose")[:1])
+    return replace(row, error=error_8[None], tied=np.array([[False, True, False]]))
+
+
+@pytest.mark.parametrize(
+    ("named", "regret", "right"),
+    [("pose", 0.0, 1), ("noise", 0.5, 0), ("overlap", 0.85, 0), (NOMINAL, 0.75, 0), ("", 0.75, 0)],
+)
+def test_regret_is_what_the_named_cause_leaves_of_what_the_best_one_takes_away(failure, named, regret, right):
+    found = of_decisions(replace(failure, named=np.array([named])), np.ones((1, 1)))
+    assert found["regret"] == pytest.approx(regret) and found["named_right"] == right
+
+
+def test_where_no_removal_helps_doing_nothing_has_no_regret(failure):
+    worse = replace(failure, error=np.where(np.arange(8) == 7, 0.1, 0.3)[None], named=np.array([NOMINAL]))
+    assert of_decisions(worse, np.ones((1, 1)))["regret"] == 0
+
+
+def test_the_registration_that_is_shown_is_judged_by_its_own_state(judged):
+    by_own = replace(judged, alarm=(judged.shown == FAILED).astype(float))
+    assert one(by_own)["auroc_failed_shown"] == 1 > one(by_own)["auroc_failed"]
+    always = replace(judged, nominal=np.full(len(judged), 2.0))
+    assert one(always)["state_accuracy"] == one(always)["state_accuracy_shown"] == 0.5
 
 
 def test_false_alarms_are_counted_where_nine_of_ten_failures_are_found(judged):
@@ -77,13 +122,16 @@ def test_the_score_of_nominal_is_calibrated_where_it_comes_true_as_often_as_it_s
 
 def test_a_gate_names_no_cause_and_has_the_measures_of_an_alarm_alone(judged):
     gate = replace(judged, named=np.full(len(judged), ""))
-    assert set(one(gate)) == set(OF_ALARM)
+    assert set(one(gate)) == {*OF_ALARM, *OF_STATES}
 
 
 def test_samples_between_the_limits_count_nowhere(judged):
     known = judged.label != BORDERLINE
     changed = np.where(known, judged.alarm, 99.0)
-    assert one(replace(judged, alarm=changed)) == pytest.approx(one(judged))
+    found, expected = one(replace(judged, alarm=changed)), one(judged)
+    assert {name: found[name] for name in found if name not in OF_SHOWN} == pytest.approx(
+        {name: expected[name] for name in expected if name not in OF_SHOWN}
+    )
 
 
 def test_without_failures_or_without_nominal_samples_nothing_is_told_apart(judged):

@@ -4,7 +4,7 @@ import pytest
 
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
-from gpca.experiments.registration_methods.tables import table11_registration, table11_severity, table11_thresholds
+from gpca.experiments.registration_methods.tables import table11_limits, table11_registration, table11_severity
 from gpca.pairs.perturbation import CONCEPTS
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
@@ -80,7 +80,7 @@ def test_allowing_larger_errors_has_a_column_each(metrics):
     own = records("success_10", lambda *_: 0.9) + [row for row in records("test_samples", samples) if row[4] == "all"]
     for row in (row for row in metrics.itertuples(index=False) if row.metric == "success"):
         own.append(tuple(row))
-    table = table11_thresholds(tidy(own, "methods"), SOURCES, METHODS, "fgr", {}, [0.05, 0.1])
+    table = table11_limits(tidy(own, "methods"), SOURCES, METHODS, "fgr", {}, [0.05, 0.1])
     assert list(table.columns) == ["success_5", "success_10"]
     assert table.cells[0, "success_10"].mean == pytest.approx(92) and (0, "success_5") not in table.cells
 
