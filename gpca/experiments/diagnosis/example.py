@@ -47,8 +47,8 @@ def draw_causes_example(
     """Draw the counterfactuals on the left, and on the right the measured shares and the scores of every explainer.
 
     Left is the observed cloud over the model after ICP with every subset of the causes, and the error v of each.
-    The sample is the failed test sample of three causes whose measured shares are the most even; where none has three,
-    the one with the most causes.
+    The sample is the failed test sample of several causes whose margin, by which its largest φ exceeds the next one, is
+    the median of all these: a usual case with a clear cause, whoever is right about it.
 
     Args:
         objects_npz, causes_npz: Of the shown source and seed, which their paths name.
@@ -61,7 +61,7 @@ def draw_causes_example(
     sections = dict(settings)
     own = CauseSettings.from_dict({k: v for k, v in sections.items() if k != "icp"}, sections.get("icp"))
     shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
-    names, scores_R_4 = _scores(causes, row, predictions_csv, explainers)
+    names, scores_R_4, verdicts = _scores(causes, row, predictions_csv, explainers)
     rows_in = 0.35 + ROW_IN * (len(names) + GAP)
     height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), rows_in)
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, height_in), layout="constrained")
@@ -77,9 +77,11 @@ def draw_causes_example(
         write_below(panel, f"{words}: {100 * causes.truth.error[row, subset]:.1f} %", fontsize=SMALL_PT)
     table, spare = right.subplots(2, 1, height_ratios=(rows_in, max(height_in - HEAD_IN - rows_in, 0.01)))
     spare.set_axis_off()
-    _draw_scores(table, names, scores_R_4)
+    _draw_scores(table, names, scores_R_4, verdicts)
     object_name = object_in_words(causes.registrations.object_name[row], dataset)
-    write_title(figure, f"{title}: {object_name}. Mean error in % of the diameter with each subset of the causes")
+    shown_error = f"{100 * causes.error_shown[row]:.1f} %"
+    words = f"{title}: {object_name}. Mean error in % of the diameter with each subset of the causes"
+    write_title(figure, f"{words} (the registration shown: {shown_error})")
     legend_of_clouds(figure, "model", "observed", gap=0.2)
     return figure
 
@@ -89,18 +91,17 @@ def choose_sample(causes: Causes, path: str | Path) -> int:
     failed = np.flatnonzero((causes.registrations.split == "test") & (causes.truth.state == FAILED))
     if not len(failed):
         raise InputError(path, "has no failed test sample", "raise causes.test")
-    number = causes.truth.causes[failed].sum(axis=1)
-    most = failed[number == number.max()]
-    phi = np.maximum(causes.truth.phi[most], 0)
-    evenness = np.sort(phi / phi.sum(axis=1, keepdims=True), axis=1)[:, -int(max(number.max(), 1))]
-    return int(most[evenness.argmax()])
+    of_several = causes.truth.causes[failed].sum(axis=1) > 1
+    rows = failed[of_several] if of_several.any() else failed
+    return int(rows[np.argsort(causes.truth.margin[rows], kind="stable")[len(rows) // 2]])
 
 
 def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: Mapping[str, str]):
-    """Return the titles of the rows and their numbers (R, 4): the measured shares first."""
-    registrations = causes.registrations
-    phi = np.maximum(causes.truth.phi[row], 0)
-    by_name = {}
+    """Return the titles of the rows, their numbers (R, 4), and who is right: the measured shares first."""
+    registrations, truth = causes.registrations, causes.truth
+    phi = np.maximum(truth.phi[row], 0)
+    tied = np.array(CONCEPTS)[truth.tied[row]]
+    by_name, verdict_of = {}, {}
     for path in [files] if isinstance(files, str) else files:
         _, name, _ = source_method_seed(path)
         rows = read_predictions(path)
@@ -110,25 +111,35 @@ def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: M
         prediction = rows[of_sample].iloc[0]
         if not prediction["abstained"]:
             by_name[name] = [prediction[f"score_{label}"] for label in LABELS]
+            named = prediction["concept_predicted"]
+            right = "right" if named == truth.dominant[row] else "tie" if named in tied else "wrong"
+            verdict_of[name] = right
     named = [name for name in explainers if name in by_name]
     shares = [0.0, *(phi / max(phi.sum(), 1e-9))]
-    return [TRUTH, *(explainers[name] for name in named)], np.array([shares, *(by_name[name] for name in named)], float)
+    scores_R_4 = np.array([shares, *(by_name[name] for name in named)], float)
+    return [TRUTH, *(explainers[name] for name in named)], scores_R_4, ["", *(verdict_of[name] for name in named)]
 
 
-def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray) -> None:
-    """Draw the measured shares, and with a gap below them the scores; the largest of each row is bold."""
+def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray, verdicts: Sequence[str]) -> None:
+    """Draw the measured shares, and with a gap below them the scores; the largest of each row is bold.
+
+    Beside each row stands whether what it names is the dominant cause, or ties with it.
+    """
     place_R = np.arange(len(names)) + GAP * (np.arange(len(names)) > 0)
     sides = -0.5, len(LABELS) - 0.5
     for rows in (slice(0, 1), slice(1, None)):
         if len(place_R[rows]):
             extent = (*sides, place_R[rows][-1] + 0.5, place_R[rows][0] - 0.5)
             panel.imshow(scores_R_4[rows], cmap=blues(), vmin=0, vmax=1, aspect="auto", extent=extent)
-    panel.set(xlim=sides, ylim=(place_R[-1] + 0.5, -0.5))
+    for place, verdict in zip(place_R, verdicts, strict=True):
+        look = {"fontsize": SMALL_PT, "weight": "normal" if verdict == "wrong" else "bold"}
+        panel.text(len(LABELS), place, verdict, ha="center", va="center_baseline", **look)
+    panel.set(xlim=(sides[0], sides[1] + 1), ylim=(place_R[-1] + 0.5, -0.5))
     for (row, column), score in np.ndenumerate(scores_R_4):
         look = {"fontsize": SMALL_PT, "color": color_on_blue(score)}
         look["weight"] = "bold" if score == scores_R_4[row].max() else "normal"
         panel.text(column, place_R[row], f"{score:.2f}", ha="center", va="center_baseline", **look)
     panel.spines[:].set_visible(False)
     panel.set_yticks(place_R, names, fontsize=SMALL_PT)
-    panel.set_xticks(range(len(LABELS)), LABELS, fontsize=SMALL_PT)
+    panel.set_xticks(range(len(LABELS) + 1), [*LABELS, "answer"], fontsize=SMALL_PT)
     panel.tick_params(length=0, pad=2, labeltop=True, labelbottom=False)

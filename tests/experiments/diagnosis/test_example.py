@@ -24,11 +24,14 @@ def test_a_sample_is_drawn_again_where_it_lay(four, causes):
         replay(four, causes, row, "four", 101, CauseSettings(**FEW_CAUSES))
 
 
-def test_the_sample_shown_failed_by_as_many_causes_as_any(causes):
+def test_the_sample_shown_failed_by_several_causes_of_which_one_is_as_clear_as_usual(causes):
     row = choose_sample(causes, "causes.npz")
     failed = causes.rows("test")[causes.truth.state[causes.rows("test")] == FAILED]
-    assert row in failed
-    assert causes.truth.causes[row].sum() == causes.truth.causes[failed].sum(axis=1).max()
+    several = failed[causes.truth.causes[failed].sum(axis=1) > 1]
+    assert row in several
+    margins = causes.truth.margin[several]
+    assert causes.truth.margin[row] in margins[margins >= np.median(margins)]
+    assert (margins >= causes.truth.margin[row]).mean() >= 0.5 or len(margins) == 1
     with pytest.raises(InputError, match="has no failed test sample"):
         choose_sample(causes.subset(causes.rows("train")), "causes.npz")
 
@@ -38,9 +41,10 @@ def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row
 
     figure, panel = plt.subplots()
     numbers = np.array([[0.0, 0.5, 0.3, 0.2], [0.1, 0.2, 0.9, 0.8], [0.7, 0.1, 0.1, 0.1]])
-    _draw_scores(panel, [TRUTH, "Multi-label", "Right"], numbers)
+    _draw_scores(panel, [TRUTH, "Multi-label", "Right"], numbers, ["", "wrong", "tie"])
     assert panel.get_yticks().tolist() == [0, 1 + GAP, 2 + GAP]
-    assert [text.get_text() for text in panel.texts if text.get_fontweight() == "bold"] == ["0.50", "0.90", "0.70"]
+    bold = {text.get_text() for text in panel.texts if text.get_fontweight() == "bold"}
+    assert bold == {"0.50", "0.90", "0.70", "", "tie"}
     plt.close(figure)
 
 
