@@ -120,7 +120,9 @@ def frame_candidate(
         clean=np.concatenate([view.clean[kept], hidden]) / diameter_m,
         noisy=np.concatenate([view.measured[kept], hidden + residuals[random.integers(len(kept), size=len(hidden))]])
         / diameter_m,
+        seen=np.arange(len(kept) + len(hidden)),
         kept=np.arange(len(kept)),
+        T_near=np.eye(4),
         T_init=T_model_observed,
         severity={
             "noise": float(np.sqrt(np.square(residuals).sum(axis=1).mean() / 3)) / diameter_m,

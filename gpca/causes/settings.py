@@ -49,6 +49,24 @@ class CauseSeverities(Severities):
 
 
 @dataclass(frozen=True)
+class Small:
+    """Largest severities where a cause is not applied: they are drawn from 0 on, and nothing is an outlier.
+
+    Attributes:
+        noise, rotation_deg, translation, crop: as in :class:`gpca.pairs.perturbation.Severities`.
+    """
+
+    noise: Share = 0.003
+    rotation_deg: HalfTurn = 5.0
+    translation: Shift = 0.03
+    crop: Hidden = 0.05
+
+    def ranges(self) -> CauseSeverities:
+        """Return the ranges that they are drawn from."""
+        return CauseSeverities(**{name: (0.0, most) for name, most in asdict(self).items()}, outliers=(0.0, 0.0))
+
+
+@dataclass(frozen=True)
 class Limits:
     """The limits that tell the states apart. Errors are relative to the diameter.
 
@@ -99,8 +117,9 @@ class CauseSettings(UncertaintySettings):
     Attributes:
         train, test: samples of each split.
         test_objects: share of the objects that only test samples show, at least one.
-        points: range of the number of points of a cloud, drawn for the model and for what was observed apart.
+        points: range of the number of points of a cloud, drawn for the model and for what is left of the observed one.
         present: probability of each cause.
+        small: what there is of a cause that is not applied.
         moved: the cloud that ICP moves onto the other: the ``model``, which has no partners where surface is missing,
             or what was ``observed``, which has them everywhere.
         several: range of the share that has several causes, of the failed of each dominant cause.
@@ -117,6 +136,7 @@ class CauseSettings(UncertaintySettings):
     present: OpenShare = 0.5
     moved: Moved = MODEL
     severities: CauseSeverities = field(default_factory=CauseSeverities)
+    small: Small = field(default_factory=Small)
     limits: Limits = field(default_factory=Limits)
     shares: Shares = field(default_factory=Shares)
     several: tuple[Share, Share] = (0.3, 0.7)
@@ -128,11 +148,6 @@ class CauseSettings(UncertaintySettings):
             low, high = getattr(self, name)
             if low > high:
                 raise InputError(f"causes {name}", f"[{low}, {high}] is in descending order", "swap the two")
-        low = self.points[0]
-        if (left := round(low * (1 - self.severities.crop[1]))) < FEWEST_POINTS:
-            fault = f"the largest crop leaves {left} of {low} points"
-            remedy = f"raise causes.points or lower causes.severities.crop until at least {FEWEST_POINTS} remain"
-            raise InputError("causes points", fault, remedy)
 
     def runs(self) -> UncertaintySettings:
         """Return the part that says how ICP runs from other starts."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from gpca.alignment.pose_error import PoseErrors
-from gpca.causes.candidate import draw_candidate
+from gpca.causes.candidate import draw_candidate, redrawn
 from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import NONE
@@ -98,7 +98,7 @@ def split_by_object(
 def measure_clean_pairs(
     subjects: list[Subject], source: str, seed: int, settings: CauseSettings
 ) -> tuple[list[Subject], float]:
-    """Measure clean pairs, to which nothing was done.
+    """Measure clean pairs, of which no cause is more than small.
 
     An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind.
 
@@ -137,9 +137,7 @@ def _clean_pair(
     """Return error and uncertainty of a clean pair, None where it has none."""
     random = generator(source, seed, "causes", "clean", subject.name, number)
     first = draw_candidate(subject.surface, np.zeros(len(CONCEPTS), bool), settings, random)
-    rows = random.permutation(len(subject.surface))[: len(first.model) + len(first.clean)]
-    model, clean = np.split(subject.surface[rows], [len(first.model)])
-    second = replace(first, model=model, clean=clean)
+    second = redrawn(first, subject.surface, random)
     xi_n_6 = random.normal(size=(settings.starts, 6)) * settings.deviation_6()
     runs = [Counterfactuals(Registrar(pair, settings), subject.errors, xi_n_6, settings) for pair in (first, second)]
     try:

@@ -86,8 +86,12 @@ def misplace(points: np.ndarray, severities: Severities, random: np.random.Gener
 
 def misplacement(angle_rad: float, distance: float, random: np.random.Generator) -> np.ndarray:
     """Return the transform (4, 4) that turns by an angle about a random axis and shifts in a random direction."""
-    turn = Rotation.from_rotvec(angle_rad * random_direction(random))
-    return rigid_motion(turn.as_matrix(), distance * random_direction(random))
+    return displacement(angle_rad * random_direction(random), distance * random_direction(random))
+
+
+def displacement(turn: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """Return the transform (4, 4) of a rotation vector (3,), in radians, and a shift (3,) after it."""
+    return rigid_motion(Rotation.from_rotvec(turn).as_matrix(), shift)
 
 
 def crop(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:

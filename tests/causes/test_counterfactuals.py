@@ -36,7 +36,7 @@ def test_the_error_is_the_mean_over_the_starts_and_is_cut_off(drill, subset):
     causes = tuple(i for i in range(3) if subset >> i & 1)
     errors = []
     for T in exp(XI):
-        start = inverse(T @ (candidate.T_init if 1 in causes else np.eye(4)))
+        start = inverse(T @ (candidate.T_init if 1 in causes else candidate.T_near))
         icp = BatchedICP(candidate.observed(causes), SETTINGS.icp)
         [pose], _, _ = icp.register(candidate.model, start[None])
         errors.append(min(pose_error(drill.surface[:256], pose, np.eye(4), symmetric=False), 0.5))

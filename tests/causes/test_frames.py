@@ -14,7 +14,7 @@ from gpca.frames.clean_view import clean_view
 from gpca.frames.meshes import meshes_of
 from gpca.frames.reading import Dataset, read_models
 
-SETTINGS = CauseSettings(clean_pairs=20, points=(64, 96))
+SETTINGS = CauseSettings(clean_pairs=20, points=(96, 128))
 POINTS = 256
 UNKNOWN = "bracket"  # no rotation leaves it as it is, so that ADD sees every error
 

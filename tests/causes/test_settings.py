@@ -7,10 +7,8 @@ FAULTS = [
     ({"limits": {"nominal": 0.05}}, "causes limits: nominal 0.05 exceeds failed 0.03; raise failed or lower nominal"),
     ({"shares": {"nominal": 0.5}}, "causes shares: add up to 1.2; make them add up to 1"),
     ({"points": [512, 128]}, r"causes points: \[512, 128\] is in descending order; swap"),
-    (
-        {"points": [64, 128], "severities": {"crop": [0.2, 0.9]}},
-        "the largest crop leaves 6 of 64 points; raise causes.p",
-    ),
+    ({"small": {"crop": 0.96}}, "causes|small.crop"),
+    ({"small": {"rotation_deg": -1}}, "small.rotation_deg"),
     ({"severities": {"outliers": [0.2, 0.1]}}, r"severity outliers: \[0.2, 0.1\] is in descending order"),
     ({"several": [0.7, 0.3]}, r"causes several: \[0.7, 0.3\] is in descending order"),
 ]

@@ -134,7 +134,7 @@ VALUES = [
     ({"causes": {"candidates": 10**6}}, "causes.candidates", "less than or equal to"),
     ({"causes": {"starts": 12}}, "causes.starts", "greater than or equal to 13"),
     ({"causes": {"points": [1024, 128]}}, "causes: causes points", "descending"),
-    ({"causes": {"severities": {"crop": [0.2, 0.95]}}}, "the largest crop leaves 6"),
+    ({"causes": {"small": {"crop": 0.96}}}, "causes.small.crop", "less than or equal to"),
     ({"causes": {"severities": {"outliers": [0.1, 0]}}}, "severity outliers", "descending"),
     ({"success": {"error": 0.01}}, "nominal 0.02 exceeds failed 0.01"),
     ({"causes": {"limits": {"failed": 0.05}}}, "causes.limits.failed", "set success.error"),
