@@ -98,7 +98,7 @@ def test_the_surface_is_cut_off_along_the_direction_that_it_says(candidates):
     for candidate in candidates:
         along = candidate.clean @ candidate.toward_hidden
         lost = np.delete(along, candidate.kept)
-        assert along[candidate.kept].max() <= lost.min()
+        assert along[candidate.kept].max() <= lost.min() + 2 * 5 * 0.003  # but for the least noise
 
 
 def test_noise_is_as_strong_as_it_says_and_outliers_are_few(candidates):
